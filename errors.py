@@ -1,0 +1,80 @@
+"""The errors that bubblefit raises on purpose. Each message says what to do next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class BubblefitError(Exception):
+    """Base of every deliberate error; `exit_code` is what the command line returns."""
+
+    exit_code = 2
+
+
+class InputError(BubblefitError):
+    """A project, card, mesh or data file is not usable.
+
+    Parameters
+    ----------
+    path : the file at fault, or None when the input did not come from a file.
+    field : the key, column or line at fault.
+    problem : what is wrong, what was expected and what to do.
+    """
+
+    exit_code = 2
+
+    def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
+        self.path, self.field, self.problem = path, field, problem
+        where = ": ".join(str(part) for part in (path, field) if part)
+        super().__init__(f"{where}: {problem}" if where else problem)
+
+
+class OutputError(BubblefitError):
+    """The output folder cannot be written (read-only, full, in use)."""
+
+    exit_code = 2
+
+
+class NoFeasibleStart(BubblefitError):
+    """No random start inside the bounds satisfied the constraints."""
+
+    exit_code = 3
+
+
+class SolverFailure(BubblefitError):
+    """An analysis did not end well; there is no result.
+
+    Parameters
+    ----------
+    reason : one line: what happened, at which load.
+    solver : name of the solver.
+    exit_number : the solver's own exit number, where it has one.
+    log_tail : last lines of the solver's log.
+    scratch : folder kept for inspection, or None for in-process solvers.
+    """
+
+    exit_code = 4
+
+    def __init__(
+        self,
+        reason: str,
+        solver: str = "membrane",
+        exit_number: int | None = None,
+        log_tail: str = "",
+        scratch: Path | None = None,
+    ) -> None:
+        self.reason, self.solver, self.exit_number = reason, solver, exit_number
+        self.log_tail, self.scratch = log_tail, scratch
+        text = f"{solver}: {reason}"
+        if exit_number is not None:
+            text += f" (exit number {exit_number})"
+        if scratch is not None:
+            text += f"; scratch kept in {scratch}"
+        if log_tail:
+            text += f"\n{log_tail}"
+        super().__init__(text)
+
+    def __reduce__(self) -> tuple:
+        """Exceptions cross process borders: rebuild from the fields, not from the text."""
+        fields = (self.reason, self.solver, self.exit_number, self.log_tail, self.scratch)
+        return type(self), fields

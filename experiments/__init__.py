@@ -1,0 +1,1 @@
+"""What was measured: displacement fields and the polynomial surfaces fitted to them."""

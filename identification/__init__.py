@@ -1,0 +1,1 @@
+"""Objectives, feasibility, optimisers and the multistart study."""

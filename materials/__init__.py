@@ -1,0 +1,1 @@
+"""The constitutive law, its positivity and the material card."""

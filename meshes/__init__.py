@@ -1,0 +1,1 @@
+"""Quadrilateral meshes with named sets, written and read by meshio."""

@@ -1,0 +1,1 @@
+"""Finite element problems as plain data, known to no solver."""

@@ -1,0 +1,1 @@
+"""Evaluations as units of work: history, output folder, resume, processes."""

@@ -1,0 +1,1 @@
+"""The embedded membrane solver with exact sensitivities."""
