@@ -1,0 +1,248 @@
+"""The law at one integration point, compiled: kinematics, stress update, tangent.
+
+Everything here works on scalars and short arrays and is called from compiled loops, both by the
+vectorised law (`law.py`) and by the membrane solver, so that there is one implementation.
+
+The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 in the material
+(warp, fill) frame, through  m = (C11 + C22)/2,  q = (C11 - C22)/2,  c = C12.  Strain vectors are
+(eps1, eps2, gamma12) with the engineering shear; Green-Lagrange strain E = ((C11-1)/2,
+(C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Entries of the vector that `stress_update` leaves for the sensitivities.
+SLOPES = 13
+(D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, SLOPE1, SLOPE2, SLOPE3, D11_NU, D22_NU) = (
+    range(SLOPES)
+)
+# NaN must stay visible (a failed iterate is recognised by it), so no "nnan"/"ninf".
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+
+
+@njit(cache=True)
+def _atanh_ratio(z: float) -> tuple[float, float]:
+    """f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
+    if z < 0.01:
+        f = 1.0 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z / 13)))))
+        slope = 1 / 3 + z * (
+            2 / 5 + z * (3 / 7 + z * (4 / 9 + z * (5 / 11 + z * (6 / 13 + z * 7 / 15))))
+        )
+        return f + z**7 / 15, slope
+    s = math.sqrt(z)
+    f = math.atanh(s) / s
+    return f, (1.0 / (1.0 - z) - f) / (2.0 * z)
+
+
+@njit(cache=True)
+def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
+    """Logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
+
+    Returns False when C is not positive definite (a degenerate iterate).
+    """
+    r = q * q + c * c
+    det = m * m - r
+    if not (m > 0.0 and det > 1e-9 * m * m):
+        return False
+    f, f1 = _atanh_ratio(r / (m * m))
+    b = f / m
+    b_r = f1 / m**3
+    b_m = -f / m**2 - 2.0 * r * f1 / m**4
+    a = 0.5 * math.log(det)
+    h[0] = 0.5 * (a + b * q)
+    h[1] = 0.5 * (a - b * q)
+    h[2] = b * c
+    a_m, a_q, a_c = m / det, -q / det, -c / det
+    b_q, b_c = 2.0 * q * b_r, 2.0 * c * b_r
+    u_m, u_q, u_c = b_m * q, b + q * b_q, q * b_c
+    p[0, 0] = 0.5 * (a_m + u_m + a_q + u_q)
+    p[0, 1] = 0.5 * (a_m + u_m - a_q - u_q)
+    p[0, 2] = 0.5 * (a_c + u_c)
+    p[1, 0] = 0.5 * (a_m - u_m + a_q - u_q)
+    p[1, 1] = 0.5 * (a_m - u_m - a_q + u_q)
+    p[1, 2] = 0.5 * (a_c - u_c)
+    p[2, 0] = c * (b_m + b_q)
+    p[2, 1] = c * (b_m - b_q)
+    p[2, 2] = b + c * b_c
+    return True
+
+
+@njit(cache=True)
+def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Array) -> None:
+    """Second Piola-Kirchhoff stress s = U^-1 t U^-1 from the corotated stress t (times J).
+
+    Also w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3). U^-1 in closed form for 2 x 2:
+    k [[C22 + J, -C12], [-C12, C11 + J]] with k = 1/(J sqrt(tr C + 2 J)).
+    """
+    j = math.sqrt(m * m - q * q - c * c)
+    root = math.sqrt(2.0 * (m + j))
+    k = 1.0 / (root * j)
+    a, b = m - q + j, m + q + j
+    w1, w2, w3 = k * a, k * b, -k * c
+    w[0, 0], w[0, 1], w[0, 2] = w1 * w1, w3 * w3, 2.0 * w1 * w3
+    w[1, 0], w[1, 1], w[1, 2] = w3 * w3, w2 * w2, 2.0 * w3 * w2
+    w[2, 0], w[2, 1], w[2, 2] = w1 * w3, w3 * w2, w1 * w2 + w3 * w3
+    for i in range(3):
+        s[i] = w[i, 0] * t[0] + w[i, 1] * t[1] + w[i, 2] * t[2]
+    for i in range(3):
+        dm = 0.0 if i == 2 else 1.0
+        dq = 1.0 if i == 0 else (-1.0 if i == 1 else 0.0)
+        dc = 1.0 if i == 2 else 0.0
+        dj = (m * dm - q * dq - c * dc) / j
+        dk = -k * ((dm + dj) / (root * root) + dj / j)
+        d1 = k * (dm - dq + dj) + a * dk
+        d2 = k * (dm + dq + dj) + b * dk
+        d3 = -k * dc - c * dk
+        g[0, i] = 2.0 * (w1 * d1 * t[0] + (d1 * w3 + w1 * d3) * t[2] + w3 * d3 * t[1])
+        g[1, i] = 2.0 * (w3 * d3 * t[0] + (d3 * w2 + w3 * d2) * t[2] + w2 * d2 * t[1])
+        g[2, i] = (
+            (d1 * w3 + w1 * d3) * t[0]
+            + (d1 * w2 + w1 * d2 + 2.0 * w3 * d3) * t[2]
+            + (d3 * w2 + w3 * d2) * t[1]
+        )
+
+
+@njit(cache=True)
+def _cubic(beta: Array, first: int, x: float) -> float:
+    return ((beta[first] * x + beta[first + 1]) * x + beta[first + 2]) * x + beta[first + 3]
+
+
+@njit(cache=True)
+def _cubic_slope(beta: Array, first: int, x: float) -> float:
+    return (3.0 * beta[first] * x + 2.0 * beta[first + 1]) * x + beta[first + 2]
+
+
+@njit(cache=True)
+def stress_update(
+    beta: Array,
+    nu: float,
+    end: Array,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    s_new: Array,
+    tangent: Array,
+    slopes: Array,
+    held: Array,
+) -> bool:
+    """One increment of d sigma = D(eps) d eps with the moduli at the midpoint strain.
+
+    beta (12,) MPa, end (3,) the ends of the valid strain range; h, h_old (3,) strain, s_old (3,)
+    stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3), slopes (SLOPES,) and
+    held (3,) = the strains at which the moduli were taken. False when a modulus, or
+    1 - nu12 nu21, is not positive.
+    """
+    x1 = 0.5 * (h[0] + h_old[0])
+    x2 = 0.5 * (h[1] + h_old[1])
+    x3 = 0.5 * (h[2] + h_old[2])
+    # Outside the range the coefficients were fitted for, the modulus keeps its end value.
+    e1 = min(max(x1, 0.0), end[0])
+    e2 = min(max(x2, 0.0), end[1])
+    size = abs(x3)
+    e3 = min(size, end[2])
+    shear = _cubic(beta, 0, e3)
+    fill = _cubic(beta, 4, e2)
+    warp = _cubic(beta, 8, e1)
+    if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
+        return False
+    nu_nu = nu * nu * fill / warp
+    den = 1.0 - nu_nu
+    if not den > 1e-3:
+        return False
+    warp_slope = _cubic_slope(beta, 8, e1) if e1 == x1 else 0.0
+    fill_slope = _cubic_slope(beta, 4, e2) if e2 == x2 else 0.0
+    shear_slope = 0.0
+    if e3 == size:
+        shear_slope = _cubic_slope(beta, 0, e3) * (1.0 if x3 >= 0.0 else -1.0)
+    inv = 1.0 / den
+    d11, d22 = warp * inv, fill * inv
+    d12 = nu * d22
+    inv2 = inv * inv
+    den_warp, den_fill = nu_nu / warp, -nu * nu / warp
+    d11_e1 = inv - warp * den_warp * inv2
+    d11_e2 = -warp * den_fill * inv2
+    d22_e1 = -fill * den_warp * inv2
+    d22_e2 = inv - fill * den_fill * inv2
+    dh0, dh1, dh2 = h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]
+    s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
+    s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
+    s_new[2] = s_old[2] + shear * dh2
+    tangent[0, 0] = d11 + 0.5 * warp_slope * (d11_e1 * dh0 + nu * d22_e1 * dh1)
+    tangent[0, 1] = d12 + 0.5 * fill_slope * (d11_e2 * dh0 + nu * d22_e2 * dh1)
+    tangent[1, 0] = d12 + 0.5 * warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
+    tangent[1, 1] = d22 + 0.5 * fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
+    tangent[2, 2] = shear + 0.5 * shear_slope * dh2
+    tangent[0, 2] = tangent[1, 2] = tangent[2, 0] = tangent[2, 1] = 0.0
+    slopes[D11], slopes[D12], slopes[D22], slopes[G12] = d11, d12, d22, shear
+    slopes[D11_E1], slopes[D11_E2] = d11_e1, d11_e2
+    slopes[D22_E1], slopes[D22_E2] = d22_e1, d22_e2
+    slopes[SLOPE1], slopes[SLOPE2], slopes[SLOPE3] = warp_slope, fill_slope, shear_slope
+    den_nu = 2.0 * nu * fill / warp * inv2
+    slopes[D11_NU], slopes[D22_NU] = warp * den_nu, fill * den_nu
+    held[0], held[1], held[2] = e1, e2, e3
+    return True
+
+
+@njit(cache=True)
+def membrane_stress(
+    m: float,
+    q: float,
+    c: float,
+    beta: Array,
+    nu: float,
+    end: Array,
+    area_power: float,
+    h_old: Array,
+    s_old: Array,
+    h: Array,
+    s_new: Array,
+    pk2: Array,
+    stiffness: Array,
+    p: Array,
+    law_tangent: Array,
+    slopes: Array,
+    held: Array,
+    pull: Array,
+    work: Array,
+) -> bool:
+    """From Cauchy-Green components to 2nd Piola-Kirchhoff stress and d(pk2)/dE.
+
+    `area_power` is 1 for constant thickness and 0 for incompressible thickness (the resultant is
+    sigma t0/J2 then, J2 the area ratio). `pull` (3, 3) becomes d(pk2)/d(sigma), area ratio
+    included. `work` is (3, 3) scratch. False as in `log_strain` and `stress_update`.
+    """
+    if not log_strain(m, q, c, h, p):
+        return False
+    if not stress_update(beta, nu, end, h, h_old, s_old, s_new, law_tangent, slopes, held):
+        return False
+    ratio = math.exp(area_power * (h[0] + h[1]))
+    t0, t1, t2 = s_new[0], s_new[1], s_new[2]
+    s_new[0] *= ratio
+    s_new[1] *= ratio
+    s_new[2] *= ratio
+    pull_back(m, q, c, s_new, pk2, pull, stiffness)
+    s_new[0], s_new[1], s_new[2] = t0, t1, t2
+    for i in range(3):
+        for j in range(3):
+            pull[i, j] *= ratio
+    for i in range(3):
+        grow = area_power * s_new[i]
+        a0 = law_tangent[i, 0] + grow
+        a1 = law_tangent[i, 1] + grow
+        a2 = law_tangent[i, 2]
+        for j in range(3):
+            work[i, j] = a0 * p[0, j] + a1 * p[1, j] + a2 * p[2, j]
+    for i in range(3):
+        for j in range(3):
+            stiffness[i, j] += (
+                pull[i, 0] * work[0, j] + pull[i, 1] * work[1, j] + pull[i, 2] * work[2, j]
+            )
+    return True
