@@ -1,0 +1,90 @@
+"""What every solver takes and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.law import HypoelasticLaw
+
+Array = NDArray[np.float64]
+
+#: Parameters that a differentiating solver may be asked for, beside "beta_0" ... "beta_11".
+PARAMETERS = (*(f"beta_{i}" for i in range(12)), "nu12", "pressure_offset")
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What an analysis that ended well reports, frame by frame.
+
+    load (frames,) MPa; displacement (frames, nodes, 3) mm; reactions by named set (frames, 3) N;
+    strain_min, strain_max (3,) extremes of (eps1, eps2, gamma12) log strain; cavity pressure
+    (MPa) and volume (mm^3), (frames,), where there is a cavity; path: displacement at every
+    increment (increments, nodes, 3), where the solver keeps it (a start for the next run); iterations: what the solver
+    counts as its work; remarks: what a reader of the result should know.
+    """
+
+    load: Array
+    displacement: Array
+    strain_min: Array
+    strain_max: Array
+    reactions: Mapping[str, Array] = field(default_factory=dict)
+    cavity_pressure: Array | None = None
+    cavity_volume: Array | None = None
+    iterations: int = 0
+    path: Array | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SolverCheck:
+    """Whether a solver is there and carries the law: what `check` found."""
+
+    name: str
+    available: bool
+    version: str
+    carries_law: bool
+    advice: str = ""
+
+
+@runtime_checkable
+class Solver(Protocol):
+    """A way to run a model; picked by name in `registry`."""
+
+    name: str
+    external: bool
+
+    def run(
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+    ) -> History:
+        """Run the model; SolverFailure when it does not end well."""
+        ...
+
+    def check(self) -> SolverCheck:
+        """Is it installed, which version, does it carry the law?"""
+        ...
+
+
+@runtime_checkable
+class DifferentiatingSolver(Solver, Protocol):
+    """A solver that also differentiates its displacements."""
+
+    def run_with_sensitivity(
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        parameters: Sequence[str] = PARAMETERS[:12],
+        pressure_offset: float = 0.0,
+        guess: Array | None = None,
+    ) -> tuple[History, Array]:
+        """History and d displacement / d parameters, (frames, nodes, 3, len(parameters))."""
+        ...

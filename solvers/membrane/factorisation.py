@@ -1,0 +1,126 @@
+"""The tangent matrix and its factorisation, by a library.
+
+Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into
+band storage (measured at 200 quads: half of SuperLU's time). Large ones: SuperLU. Both are
+unsymmetric, because the hypoelastic tangent is (1 to 5 % of it), and exact sensitivities want it
+whole.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+Array = NDArray[np.float64]
+# Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
+LARGEST_BAND = 4_000_000
+
+
+class SingularTangent(Exception):
+    """The tangent cannot be factorised at this iterate."""
+
+
+class Tangent(Protocol):
+    """Storage to assemble into, and the solve."""
+
+    data: Array
+    slot: NDArray[np.int64]
+
+    def factor(self) -> None:
+        """Factorise what `data` holds; it may be overwritten. SingularTangent on failure."""
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve for free degrees of freedom, rhs (free,) or (free, k)."""
+
+
+def tangent_for(quads: NDArray[np.intp], size: int, free: NDArray[np.intp]) -> Tangent:
+    """Storage for the tangent of `quads` restricted to the `free` of `size` unknowns."""
+    dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
+    place = np.full(size, -1, dtype=np.int64)
+    place[free] = np.arange(len(free))
+    rows = place[np.repeat(dofs, 12, axis=1)]
+    columns = place[np.tile(dofs, (1, 12))]
+    inside = (rows >= 0) & (columns >= 0)
+    pattern = sp.csr_matrix(
+        (np.ones(int(inside.sum())), (rows[inside], columns[inside])), shape=(len(free),) * 2
+    )
+    order = reverse_cuthill_mckee(pattern, symmetric_mode=True)
+    rank = np.empty(len(free), dtype=np.int64)
+    rank[order] = np.arange(len(free))
+    width = int(np.abs(rank[rows[inside]] - rank[columns[inside]]).max())
+    if (3 * width + 1) * len(free) <= LARGEST_BAND:
+        return BandedTangent(rank, rows, columns, inside, width)
+    return SparseTangent(rows, columns, inside, len(free))
+
+
+class BandedTangent:
+    """LAPACK gbtrf/gbtrs on a renumbered band."""
+
+    def __init__(
+        self,
+        rank: NDArray[np.int64],
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        inside: NDArray[np.bool_],
+        width: int,
+    ) -> None:
+        self.width, self.size = width, len(rank)
+        self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
+        self.data = np.zeros(self.depth * self.size)
+        self.slot = np.full(rows.shape, -1, dtype=np.int64)
+        i, j = rank[rows[inside]], rank[columns[inside]]
+        self.slot[inside] = j * self.depth + 2 * width + i - j
+        self.rank, self.order = rank, np.argsort(rank)
+
+    def factor(self) -> None:
+        band = self.data.reshape((self.depth, self.size), order="F")
+        self.lu, self.pivots, info = lapack.dgbtrf(band, self.width, self.width, overwrite_ab=1)
+        if info != 0:
+            raise SingularTangent
+
+    def solve(self, rhs: Array) -> Array:
+        ordered = np.asfortranarray(rhs[self.order])
+        x, _ = lapack.dgbtrs(
+            self.lu, self.width, self.width, ordered, self.pivots, overwrite_b=1
+        )
+        return np.asarray(x[self.rank])
+
+
+class SparseTangent:
+    """SuperLU with a symmetric-pattern ordering."""
+
+    def __init__(
+        self,
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        inside: NDArray[np.bool_],
+        size: int,
+    ) -> None:
+        keys, position = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
+        self.slot = np.full(rows.shape, -1, dtype=np.int64)
+        self.slot[inside] = position
+        pointer = np.searchsorted(keys // size, np.arange(size + 1)).astype(np.int32)
+        index = (keys % size).astype(np.int32)
+        self.data = np.zeros(len(keys))
+        self.matrix = sp.csc_matrix((self.data, index, pointer), shape=(size, size))
+
+    def factor(self) -> None:
+        self.matrix.data[:] = self.data
+        try:
+            self.lu = splu(
+                self.matrix,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.001,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularTangent from error
+
+    def solve(self, rhs: Array) -> Array:
+        return np.asarray(self.lu.solve(rhs))

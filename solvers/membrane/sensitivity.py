@@ -1,0 +1,166 @@
+"""Direct differentiation of the membrane through its strain path, compiled.
+
+For every parameter b:  K du/db = -dR/db at fixed displacement, where dR/db carries the explicit
+dependence on b and the derivatives of the strain and stress at the start of the increment. After
+the solve, strain and stress derivatives are advanced to the end of the increment.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ...materials.point_law import (
+    D11,
+    D11_E1,
+    D11_E2,
+    D11_NU,
+    D12,
+    D22,
+    D22_E1,
+    D22_E2,
+    D22_NU,
+    FAST,
+    G12,
+    SLOPE1,
+    SLOPE2,
+    SLOPE3,
+    SLOPES,
+    membrane_stress,
+)
+from .kernel import base_vectors, metric
+
+#: Column numbers of solvers.base.PARAMETERS.
+NU12, PRESSURE_OFFSET = 12, 13
+#: What `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), law tangent (9).
+POINT = 24
+
+
+@njit(cache=True, fastmath=FAST)
+def explicit(  # type: ignore[no-untyped-def]
+    position, quads, values, slopes, area, thickness, beta, nu, end, power,
+    h_old, s_old, which, dh_old, ds_old, ds_new, point, rate,
+):  # fmt: skip
+    """Derivative of the residual at fixed displacement.
+
+    which (np,) parameter numbers; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of
+    the increment; writes ds_new (same shape; the part at fixed displacement), point
+    (elements, 4, POINT) and rate (3 n, np).
+    """
+    count = len(which)
+    rate[:] = 0.0
+    h, s_new, pk2, held, steep = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(SLOPES)
+    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    work, stiff = np.empty((3, 3)), np.empty((3, 3))
+    x, f = np.empty((4, 3)), np.empty((2, 3))
+    # Explicit derivatives of (E1, E2, G12) by each parameter; only these entries ever change.
+    own = np.zeros((3, count))
+    by_nu = np.zeros(count)
+    push = -1
+    for j in range(count):
+        if which[j] == NU12:
+            by_nu[j] = 1.0
+        elif which[j] == PRESSURE_OFFSET:
+            push = j
+    t0, t1, t2 = np.empty(count), np.empty(count), np.empty(count)
+    local = np.empty((12, count))
+    for e in range(quads.shape[0]):
+        for n in range(4):
+            for k in range(3):
+                x[n, k] = position[quads[e, n], k]
+        local[:] = 0.0
+        for g in range(4):
+            dn = slopes[e, g]
+            base_vectors(x, dn, f)
+            m, q, c = metric(f)
+            membrane_stress(
+                m, q, c, beta, nu, end, power, h_old[e, g], s_old[e, g], h, s_new,
+                pk2, stiff, p, law, steep, held, pull, work,
+            )  # fmt: skip
+            for j in range(count):
+                b = which[j]
+                if b < 4:
+                    own[2, j] = held[2] ** (3 - b)
+                elif b < 8:
+                    own[1, j] = held[1] ** (7 - b)
+                elif b < 12:
+                    own[0, j] = held[0] ** (11 - b)
+            dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
+            wt = area[e, g] * thickness
+            for i in range(3):
+                for k in range(3):
+                    pull[i, k] *= wt
+            old, before = dh_old[e, g], ds_old[e, g]
+            after = ds_new[e, g]
+            for j in range(count):
+                o0, o1, o2 = old[0, j], old[1, j], old[2, j]
+                warp = own[0, j] + 0.5 * o0 * steep[SLOPE1]
+                fill = own[1, j] + 0.5 * o1 * steep[SLOPE2]
+                shear = own[2, j] + 0.5 * o2 * steep[SLOPE3]
+                d11 = steep[D11_E1] * warp + steep[D11_E2] * fill + by_nu[j] * steep[D11_NU]
+                d22 = steep[D22_E1] * warp + steep[D22_E2] * fill + by_nu[j] * steep[D22_NU]
+                d12 = nu * d22 + by_nu[j] * steep[D22]
+                a0 = before[0, j] + d11 * dh0 + d12 * dh1 - steep[D11] * o0 - steep[D12] * o1
+                a1 = before[1, j] + d12 * dh0 + d22 * dh1 - steep[D12] * o0 - steep[D22] * o1
+                a2 = before[2, j] + shear * dh2 - steep[G12] * o2
+                after[0, j], after[1, j], after[2, j] = a0, a1, a2
+                t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
+                t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2
+                t2[j] = pull[2, 0] * a0 + pull[2, 1] * a1 + pull[2, 2] * a2
+            for n in range(4):
+                for k in range(3):
+                    b0 = dn[0, n] * f[0, k]
+                    b1 = dn[1, n] * f[1, k]
+                    b2 = dn[0, n] * f[1, k] + dn[1, n] * f[0, k]
+                    for j in range(count):
+                        local[3 * n + k, j] += b0 * t0[j] + b1 * t1[j] + b2 * t2[j]
+            if push >= 0:
+                nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+                ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
+                nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+                for n in range(4):
+                    share = area[e, g] * values[g, n]
+                    local[3 * n, push] -= share * nx
+                    local[3 * n + 1, push] -= share * ny
+                    local[3 * n + 2, push] -= share * nz
+            kept = point[e, g]
+            for k in range(3):
+                kept[k], kept[3 + k] = f[0, k], f[1, k]
+                for i in range(3):
+                    kept[6 + 3 * i + k], kept[15 + 3 * i + k] = p[i, k], law[i, k]
+        for n in range(4):
+            for k in range(3):
+                for j in range(count):
+                    rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
+
+
+@njit(cache=True, fastmath=FAST)
+def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
+    """Add what the displacement derivatives du (3 n, np) bring to dh and ds (in place)."""
+    count = du.shape[1]
+    e0, e1, e2 = np.empty(count), np.empty(count), np.empty(count)
+    for e in range(quads.shape[0]):
+        for g in range(4):
+            kept, dn = point[e, g], slopes[e, g]
+            e0[:] = 0.0
+            e1[:] = 0.0
+            e2[:] = 0.0
+            for n in range(4):
+                for k in range(3):
+                    b0 = dn[0, n] * kept[k]
+                    b1 = dn[1, n] * kept[3 + k]
+                    b2 = dn[0, n] * kept[3 + k] + dn[1, n] * kept[k]
+                    row = du[3 * quads[e, n] + k]
+                    for j in range(count):
+                        e0[j] += b0 * row[j]
+                        e1[j] += b1 * row[j]
+                        e2[j] += b2 * row[j]
+            strain, stress = dh[e, g], ds[e, g]
+            for j in range(count):
+                a0 = kept[6] * e0[j] + kept[7] * e1[j] + kept[8] * e2[j]
+                a1 = kept[9] * e0[j] + kept[10] * e1[j] + kept[11] * e2[j]
+                a2 = kept[12] * e0[j] + kept[13] * e1[j] + kept[14] * e2[j]
+                strain[0, j], strain[1, j], strain[2, j] = a0, a1, a2
+                stress[0, j] += kept[15] * a0 + kept[16] * a1 + kept[17] * a2
+                stress[1, j] += kept[18] * a0 + kept[19] * a1 + kept[20] * a2
+                stress[2, j] += kept[21] * a0 + kept[22] * a1 + kept[23] * a2
