@@ -1,0 +1,69 @@
+"""From pydantic's findings to one line that names the file, the key and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import InputError
+from .project_schema import ProjectFile
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def first_error(path: Path, found: ValidationError) -> InputError:
+    """The first finding as an InputError; unknown keys first, as they explain missing ones."""
+    errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    problem = _problem(errors[0])
+    if len(errors) > 1:
+        problem += f" ({len(errors) - 1} more)"
+    return InputError(path, dotted(errors[0]["loc"]), problem)
+
+
+def _problem(error: Mapping[str, Any]) -> str:
+    kind, location, given = error["type"], error["loc"], error.get("input")
+    if kind == "missing":
+        sort = "section" if len(location) == 1 else "key"
+        return f"this {sort} is missing; add it"
+    if kind == "extra_forbidden":
+        return _unknown(location)
+    if kind == "finite_number":
+        return f"expected a finite number, got {given!r}"
+    expected = error["msg"].removeprefix("Input should be ").rstrip(".")
+    return f"expected {expected}, got {_short(given)}"
+
+
+def _unknown(location: Sequence[str | int]) -> str:
+    known = _keys_beside(location)
+    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
+    meant = f"did you mean {near[0]!r}? " if near else ""
+    return f"unknown key; {meant}allowed here: {', '.join(known)}"
+
+
+def _keys_beside(location: Sequence[str | int]) -> list[str]:
+    """Allowed keys of the table that holds `location`."""
+    table: type[BaseModel] = ProjectFile
+    for part in location[:-1]:
+        table = _table(table.model_fields[str(part)].annotation)
+    return list(table.model_fields)
+
+
+def _table(annotation: Any) -> type[BaseModel]:
+    """The section class of an annotation such as `PointsSection | None`."""
+    options = getattr(annotation, "__args__", (annotation,))
+    return next(o for o in options if isinstance(o, type) and issubclass(o, BaseModel))
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,128 @@
+"""The project file as it is written: sections, keys, allowed values, in the file's own units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+#: MPa per unit, MPa per unit, mm per unit.
+MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
+PRESSURE_UNITS = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
+LENGTH_UNITS = {"mm": 1.0, "m": 1000.0}
+
+Positive = Annotated[float, Field(gt=0)]
+Symmetry = Literal["full", "quarter"]
+LengthUnit = Literal["mm", "m"]
+
+
+class Section(BaseModel):
+    """A table of the project file: no unknown keys, no text for numbers, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class ProjectSection(Section):
+    kind: Literal["bubble"]
+    title: str = ""
+
+
+class UnitsSection(Section):
+    modulus: Literal["GPa", "MPa", "Pa"] = "GPa"
+    pressure: Literal["kPa", "MPa", "bar", "Pa"] = "kPa"
+    length: LengthUnit = "mm"
+
+
+class BubbleSection(Section):
+    radius: Positive
+    thickness: Positive
+    pressures: Annotated[list[Positive], Field(min_length=1)]
+    increments: list[Positive] | None = None
+    elements: Annotated[int, Field(ge=8)] = 800
+    symmetry: Symmetry = "full"
+    generator: Literal["blocks", "gmsh"] = "blocks"
+
+
+class MaterialSection(Section):
+    nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
+    thickness_change: Literal["constant", "incompressible"] = "constant"
+    degree: Annotated[int, Field(ge=0, le=3)] = 3
+    strain_range: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+
+
+class BoundsSection(Section):
+    lower: list[float]
+    upper: list[float]
+
+
+class KnownSolutionSection(Section):
+    beta: list[float]
+    elements: Annotated[int, Field(ge=8)] | None = None
+    increments: list[Positive] | None = None
+    symmetry: Symmetry | None = None
+
+
+class ColumnsSection(Section):
+    x: str = "x"
+    y: str = "y"
+    dx: str = "dx"
+    dy: str = "dy"
+    dz: str = "dz"
+
+
+class PointsSection(Section):
+    files: list[str] | None = None
+    pattern: str | None = None
+    indices: list[int] | None = None
+    folder: str = ""
+    columns: ColumnsSection = ColumnsSection()
+    flag_column: str | None = None
+    comment: str = "#"
+    length_unit: LengthUnit | None = None
+
+
+class DataSection(Section):
+    known_solution: KnownSolutionSection | None = None
+    points: PointsSection | None = None
+
+
+class MatchSection(Section):
+    by: Literal["surfaces", "points"] = "points"
+    degree: Annotated[int, Field(ge=1, le=12)] = 4
+
+
+class MarginSection(Section):
+    E: Positive
+    G12: Positive
+
+
+class NuisanceSection(Section):
+    displacement_offset: bool = False
+    pressure_offset: bool = False
+
+
+class FitSection(Section):
+    starts: Annotated[int, Field(ge=1)] = 50
+    seed: Annotated[int, Field(ge=0)] = 1
+    method: Literal["lm", "slsqp", "cobyla"] = "lm"
+    gradient: Literal["exact", "differences"] = "exact"
+    constraints: Literal["margin", "boolean"] = "margin"
+    margin: MarginSection | None = None
+    solver: str = "membrane"
+    objective: Literal["e", "mm"] = "e"
+    max_analyses: Annotated[int, Field(ge=1)] | None = None
+    tolerance: Positive = 1e-7
+    nuisance: NuisanceSection = NuisanceSection()
+
+
+class ProjectFile(Section):
+    """The whole file."""
+
+    project: ProjectSection
+    units: UnitsSection = UnitsSection()
+    bubble: BubbleSection
+    material: MaterialSection = MaterialSection()
+    bounds: BoundsSection
+    data: DataSection
+    match: MatchSection = MatchSection()
+    fit: FitSection = FitSection()
