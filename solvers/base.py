@@ -25,7 +25,8 @@ class History:
     load (frames,) MPa; displacement (frames, nodes, 3) mm; reactions by named set (frames, 3) N;
     strain_min, strain_max (3,) extremes of (eps1, eps2, gamma12) log strain; cavity pressure
     (MPa) and volume (mm^3), (frames,), where there is a cavity; path: displacement at every
-    increment (increments, nodes, 3), where the solver keeps it (a start for the next run); iterations: what the solver
+    increment (increments, nodes, 3) and its derivatives path_slope (..., parameters), where the
+    solver keeps them (a start for the next run); iterations: what the solver
     counts as its work; remarks: what a reader of the result should know.
     """
 
@@ -38,6 +39,7 @@ class History:
     cavity_volume: Array | None = None
     iterations: int = 0
     path: Array | None = None
+    path_slope: Array | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -76,7 +78,19 @@ class Solver(Protocol):
 
 @runtime_checkable
 class DifferentiatingSolver(Solver, Protocol):
-    """A solver that also differentiates its displacements."""
+    """A solver that also differentiates its displacements, and takes a start for its path."""
+
+    def run(
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+        pressure_offset: float = 0.0,
+        guess: Array | None = None,
+    ) -> History:
+        """Run with `pressure_offset` (MPa) added to every load, from `guess` where given."""
+        ...
 
     def run_with_sensitivity(
         self,

@@ -155,6 +155,7 @@ class MembraneSolver:
             reactions,
             iterations=membrane.iterations,
             path=path,
+            path_slope=rates if parameters else None,
         )
         return history, rates[keep]
 

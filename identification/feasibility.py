@@ -1,0 +1,47 @@
+"""Random feasible starts (thesis section 4.3.2): inside the bounds, positive, and analysable."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoFeasibleStart
+from .problem import FieldProblem
+
+Array = NDArray[np.float64]
+
+MOST_DRAWS = 200_000
+MOST_ANALYSES = 50
+BATCH = 500
+
+
+def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
+    """Unknowns of random start `number` of the study `seed`: the same on any machine.
+
+    Coefficients are drawn evenly between their bounds until the moduli are positive over the
+    strain range and the analysis ends well.
+
+    Raises
+    ------
+    NoFeasibleStart : nothing found in 200,000 draws or 50 analyses.
+    """
+    p = problem.parameters
+    random = np.random.default_rng([seed, number])
+    grid, margin = p.positivity
+    tried = 0
+    for _ in range(MOST_DRAWS // BATCH):
+        draws = p.lower + (p.upper - p.lower) * random.random((BATCH, p.size))
+        for coefficients in draws[(draws @ grid.T >= margin).all(axis=1)]:
+            tried += 1
+            y = p.unknowns(coefficients)
+            if problem.evaluate(y, False, warm=False) is not None:
+                return y
+            if tried >= MOST_ANALYSES:
+                raise NoFeasibleStart(
+                    f"start {number}: the analysis failed at all of {tried} random points with "
+                    "positive moduli; raise the lower bounds or add increments"
+                )
+    raise NoFeasibleStart(
+        f"start {number}: none of {MOST_DRAWS} random points inside the bounds has positive "
+        "moduli over the strain range; check [bounds] and material.strain_range"
+    )

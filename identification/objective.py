@@ -1,0 +1,123 @@
+"""Residuals and objective of a bubble fit (Eqs 4.5-4.8).
+
+A residual block is one displacement direction at one pressure: (model - measured) / (largest
+measured |value| * sqrt(n)). The norm of a block is e_x/max(P_x) of Eq. 4.8, e is the sum of the
+block norms. With plain millimetres the scale is one and e is a sum of RMS errors in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FieldTarget:
+    """What the displacement field should be at one pressure.
+
+    displacement (n, 3) mm at n places; `sample` (n, nodes) takes model nodes to these places
+    (None: the places are the nodes).
+    """
+
+    pressure: float
+    displacement: Array
+    sample: sp.csr_matrix | None = None
+
+    def at(self, nodal: Array) -> Array:
+        """Model displacement (nodes, ...) at the places, (n, ...)."""
+        if self.sample is None:
+            return nodal
+        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(
+            -1, *nodal.shape[1:]
+        )
+
+
+class FieldObjective:
+    """Residual blocks, objective e and its slope, for displacement fields at several pressures.
+
+    Parameters
+    ----------
+    targets : one a reported pressure, in the order of the model's frames.
+    normalise : "e" (Eq. 4.8) or "mm".
+
+    Raises
+    ------
+    InputError : a direction without any displacement cannot be normalised by it.
+    """
+
+    def __init__(
+        self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e"
+    ) -> None:
+        self.targets = tuple(targets)
+        self.scales = []
+        for target in self.targets:
+            largest = np.abs(target.displacement).max(axis=0)
+            if normalise == "e" and not (largest > 0).all():
+                axis = "xyz"[int(np.argmin(largest))]
+                raise InputError(
+                    None,
+                    f"data at {target.pressure * 1e3:g} kPa",
+                    f"d{axis} is zero everywhere: nothing to match (is a column mapped wrongly?)",
+                )
+            count = np.sqrt(len(target.displacement))
+            self.scales.append(count * (largest if normalise == "e" else np.ones(3)))
+        sizes = np.repeat([len(t.displacement) for t in self.targets], 3)
+        self.starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        self.block = np.repeat(np.arange(len(sizes)), sizes)
+
+    def residual(self, displacement: Array, offset: Array | None = None) -> Array:
+        """Blocks laid end to end, (m,), from model displacement (frames, nodes, 3)."""
+        shift = np.zeros(3) if offset is None else offset
+        parts = [
+            ((target.at(nodal) + shift - target.displacement) / scale).T.reshape(-1)
+            for target, nodal, scale in zip(self.targets, displacement, self.scales, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def jacobian(self, slope: Array) -> Array:
+        """(m, parameters) from d displacement (frames, nodes, 3, parameters)."""
+        count = slope.shape[-1]
+        parts = [
+            (target.at(nodal) / scale[:, None]).transpose(1, 0, 2).reshape(-1, count)
+            for target, nodal, scale in zip(self.targets, slope, self.scales, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def offset_columns(self) -> Array:
+        """(m, 3): slope of the residual by a displacement offset in x, y, z (mm)."""
+        columns = [
+            np.kron(np.diag(1.0 / scale), np.ones((len(target.displacement), 1)))
+            for target, scale in zip(self.targets, self.scales, strict=True)
+        ]
+        return np.concatenate(columns)
+
+    def block_norms(self, residual: Array) -> Array:
+        """(3 frames,): e_x/max(P_x), e_y/max(P_y), e_z/max(P_z), pressure by pressure."""
+        return np.sqrt(np.add.reduceat(residual**2, self.starts))
+
+    def value(self, residual: Array) -> float:
+        """e of Eq. 4.8."""
+        return float(self.block_norms(residual).sum())
+
+    def gradient(self, residual: Array, jacobian: Array) -> Array:
+        """Slope of e; a block that fits exactly contributes nothing."""
+        norms = np.maximum(self.block_norms(residual), 1e-14)
+        return np.asarray((residual / norms[self.block]) @ jacobian)
+
+    def mean_absolute(self, displacement: Array, offset: Array | None = None) -> float:
+        """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""
+        shift = np.zeros(3) if offset is None else offset
+        total = [
+            np.abs(target.at(nodal) + shift - target.displacement).sum(axis=1)
+            for target, nodal in zip(self.targets, displacement, strict=True)
+        ]
+        return float(np.concatenate(total).mean())

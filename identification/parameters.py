@@ -1,0 +1,135 @@
+"""The unknowns of a fit: modulus values at Chebyshev points, and nuisance parameters.
+
+Monomial coefficients are badly scaled (condition 1e8 against 6e3 in modulus values), so the fit
+works in values of the moduli at Chebyshev points of the strain range; bounds on the coefficients
+and positivity of the moduli are linear in either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.positivity import margins, modulus_grid
+
+Array = NDArray[np.float64]
+
+#: Order of the moduli in beta, and the place of their strain in (eps1, eps2, gamma12).
+STRAIN_OF_BLOCK = (2, 1, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class ModuliParameters:
+    """Coefficients of degree-`degree` moduli between bounds, and how the fit sees them.
+
+    Parameters
+    ----------
+    degree : 0 (linear orthotropic constants) to 3 (Eqs 4.1-4.3).
+    lower, upper : (3 (degree + 1),) MPa bounds on the coefficients, G12, E2, E1, highest first.
+    strain_range : ends (eps1, eps2, gamma12) over which the moduli must be positive.
+    margin_E, margin_G : MPa, the least modulus allowed there.
+    displacement_offset, pressure_offset : nuisance parameters switched on.
+    """
+
+    degree: int
+    lower: Array
+    upper: Array
+    strain_range: Sequence[float]
+    margin_E: float
+    margin_G: float
+    displacement_offset: bool = False
+    pressure_offset: bool = False
+    least_pressure: float = 1.0
+
+    @property
+    def places(self) -> NDArray[np.intp]:
+        """Place of each free coefficient in beta (12,)."""
+        return np.array([4 * b + k for b in range(3) for k in range(3 - self.degree, 4)])
+
+    @property
+    def size(self) -> int:
+        """Number of free coefficients."""
+        return 3 * (self.degree + 1)
+
+    @property
+    def nuisance(self) -> tuple[str, ...]:
+        """Names of the nuisance parameters that are on, in the order of the unknowns."""
+        names = ("offset_x", "offset_y", "offset_z") if self.displacement_offset else ()
+        return (*names, "pressure_offset") if self.pressure_offset else names
+
+    @cached_property
+    def to_coefficients(self) -> Array:
+        """(size, size): free coefficients = this @ values at the Chebyshev points."""
+        n = self.degree + 1
+        whole = np.zeros((self.size, self.size))
+        for block, strain in enumerate(STRAIN_OF_BLOCK):
+            points = 0.5 * self.strain_range[strain] * (
+                1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n))
+            )
+            part = slice(n * block, n * block + n)
+            # Values in units of the modulus' own size: G12 is a tenth of E.
+            size = np.sqrt(max(self.lower[part][-1], 1e-3) * max(self.upper[part][-1], 1e-3))
+            whole[part, part] = np.linalg.inv(np.vander(points, n)) * size
+        return whole
+
+    def beta(self, y: Array) -> Array:
+        """Full beta (12,) MPa of the unknowns y (size + nuisance,)."""
+        full = np.zeros(12)
+        full[self.places] = self.to_coefficients @ y[: self.size]
+        return full
+
+    def unknowns(self, coefficients: Array) -> Array:
+        """Unknowns of free coefficients (size,) MPa, nuisance parameters zero."""
+        values = np.linalg.solve(self.to_coefficients, coefficients)
+        return np.concatenate([values, np.zeros(len(self.nuisance))])
+
+    @cached_property
+    def positivity(self) -> tuple[Array, Array]:
+        """A, margin of `A @ coefficients >= margin`: moduli on a strain grid."""
+        grid = modulus_grid(self.strain_range)
+        return grid[:, self.places], margins(self.margin_E, self.margin_G)
+
+    @cached_property
+    def inequalities(self) -> tuple[Array, Array]:
+        """A, c of `A @ y >= c`: positivity, coefficient bounds, nuisance bounds; rows scaled."""
+        grid, margin = self.positivity
+        t = self.to_coefficients
+        width = self.upper - self.lower
+        moduli = grid @ t
+        size = 1.0 / np.abs(moduli).max(axis=1)
+        a = np.vstack([moduli * size[:, None], t / width[:, None], -t / width[:, None]])
+        c = np.concatenate([margin * size, self.lower / width, -self.upper / width])
+        extra = len(self.nuisance)
+        if extra:
+            wide = np.zeros((len(a) + 2 * extra, self.size + extra))
+            wide[: len(a), : self.size] = a
+            low, high = self._nuisance_bounds()
+            wide[len(a) : len(a) + extra, self.size :] = np.eye(extra)
+            wide[len(a) + extra :, self.size :] = -np.eye(extra)
+            a, c = wide, np.concatenate([c, low, -high])
+        return a, c
+
+    def _nuisance_bounds(self) -> tuple[Array, Array]:
+        """Offsets within 20 mm; pressures (kPa) stay positive and below 50 kPa of offset."""
+        low, high = [-20.0] * 3, [20.0] * 3
+        pressure_low, pressure_high = -0.9 * 1e3 * self.least_pressure, 50.0
+        if not self.displacement_offset:
+            return np.array([pressure_low]), np.array([pressure_high])
+        if self.pressure_offset:
+            low, high = [*low, pressure_low], [*high, pressure_high]
+        return np.array(low), np.array(high)
+
+    def offsets(self, y: Array) -> tuple[Array, float]:
+        """Displacement offset (3,) mm and pressure offset MPa of the unknowns."""
+        named = dict(zip(self.nuisance, y[self.size :], strict=True))
+        shift = np.array([named.get(f"offset_{axis}", 0.0) for axis in "xyz"])
+        return shift, 1e-3 * named.get("pressure_offset", 0.0)
+
+    def is_positive(self, coefficients: Array) -> bool:
+        """The thesis' boolean flag (Eq. 4.9): every modulus above its margin on the grid."""
+        grid, margin = self.positivity
+        return bool((grid @ coefficients >= margin).all())

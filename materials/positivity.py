@@ -1,0 +1,30 @@
+"""Positive moduli as linear inequalities: A @ beta >= margin on a strain grid (Eqs 3.8, 4.9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Strains a modulus. A cubic can dip between two of them by no more than a thousandth of itself.
+GRID = 31
+
+
+def modulus_grid(strain_range: Sequence[float]) -> Array:
+    """(3 * GRID, 12): rows times beta are G12, E2, E1 on their strain grids.
+
+    strain_range : ends (eps1, eps2, gamma12); every grid starts at zero strain.
+    """
+    rows = np.zeros((3 * GRID, 12))
+    for block, end in enumerate(reversed(list(strain_range))):
+        strain = np.linspace(0.0, end, GRID)
+        rows[GRID * block : GRID * (block + 1), 4 * block : 4 * block + 4] = np.vander(strain, 4)
+    return rows
+
+
+def margins(margin_e: float, margin_g: float) -> Array:
+    """(3 * GRID,) least moduli in the order of `modulus_grid`, in the units of the arguments."""
+    return np.concatenate([np.full(GRID, margin_g), np.full(2 * GRID, margin_e)])
