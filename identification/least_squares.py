@@ -36,6 +36,11 @@ def levenberg_marquardt(
         return None
     best, status = _descend(problem, point, tolerance, max_analyses, reweighted=False)
     if status == "settled":
+        # Settled above the tolerance: make sure that it is not the warm start's own branch.
+        cold = problem.evaluate(best.unknowns, True, warm=False)
+        if cold is not None and abs(cold.value - best.value) > 1e-6 * best.value:
+            best, status = _descend(problem, cold, tolerance, max_analyses, reweighted=False)
+    if status == "settled":
         limit = min(max_analyses, problem.analyses + MOST_REWEIGHTED)
         best, status = _descend(problem, best, tolerance, limit, reweighted=True)
     return Optimum(best, status, problem.analyses)

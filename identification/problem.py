@@ -37,6 +37,10 @@ class Evaluation:
 Watch = Callable[[Array, float | None, str], None]
 
 
+#: Largest predicted change of displacement, relative, for a warm start.
+NEAR = 0.02
+
+
 @dataclass(eq=False)
 class FieldProblem:
     """Model, solver, measured fields and unknowns of one fit.
@@ -99,7 +103,12 @@ class FieldProblem:
         if not warm or self._last is None:
             return None
         before, path, slope = self._last
-        return path + slope @ self._solver_steps(y - before)
+        change = slope @ self._solver_steps(y - before)
+        # A far guess can lead to another equilibrium branch (a soft membrane may fold), on which
+        # a fit then settles; only near by is the warm start both safe and worth something.
+        if np.abs(change).max() > NEAR * np.abs(path).max():
+            return None
+        return np.asarray(path + change)
 
     def _solver_steps(self, dy: Array) -> Array:
         """Step in the solver's parameters (coefficients MPa, pressure offset MPa)."""
