@@ -107,21 +107,22 @@ class ModuliParameters:
         if extra:
             wide = np.zeros((len(a) + 2 * extra, self.size + extra))
             wide[: len(a), : self.size] = a
-            low, high = self._nuisance_bounds()
+            low, high = self.nuisance_bounds
             wide[len(a) : len(a) + extra, self.size :] = np.eye(extra)
             wide[len(a) + extra :, self.size :] = -np.eye(extra)
             a, c = wide, np.concatenate([c, low, -high])
         return a, c
 
-    def _nuisance_bounds(self) -> tuple[Array, Array]:
-        """Offsets within 20 mm; pressures (kPa) stay positive and below 50 kPa of offset."""
-        low, high = [-20.0] * 3, [20.0] * 3
-        pressure_low, pressure_high = -0.9 * 1e3 * self.least_pressure, 50.0
-        if not self.displacement_offset:
-            return np.array([pressure_low]), np.array([pressure_high])
-        if self.pressure_offset:
-            low, high = [*low, pressure_low], [*high, pressure_high]
-        return np.array(low), np.array(high)
+    @property
+    def nuisance_bounds(self) -> tuple[Array, Array]:
+        """Offsets within 20 mm; a pressure offset (kPa) leaves the first pressure positive."""
+        low = {"pressure_offset": -0.9 * 1e3 * self.least_pressure}
+        high = {"pressure_offset": 50.0}
+        names = self.nuisance
+        return (
+            np.array([low.get(name, -20.0) for name in names]),
+            np.array([high.get(name, 20.0) for name in names]),
+        )
 
     def offsets(self, y: Array) -> tuple[Array, float]:
         """Displacement offset (3,) mm and pressure offset MPa of the unknowns."""
