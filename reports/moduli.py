@@ -5,9 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullLocator
+from numpy.typing import ArrayLike, NDArray
 
-from .style import BLACK, BLUE, SKY, VERMILION, new_figure, quiet, save
+from .style import BLACK, SKY, VERMILION, new_figure, quiet, save
+
+Array = NDArray[np.float64]
 
 PANELS = (
     ("$E_1$ (warp)", r"warp strain $\varepsilon_1$"),
@@ -53,9 +57,8 @@ def plot_moduli(
         top.plot(x[m], fits[0, m], color=BLACK, linewidth=1.4, label="best")
         drawn = fits[:, m] if truth is None else np.vstack([fits[:, m], truth[m : m + 1]])
         top.set_ylim(min(0.0, float(drawn.min())), 1.08 * float(drawn.max()))
-        quiet(top, strain if rows == 1 else "", f"{name}, MPa" if m else f"tangent {name}, MPa")
-        top.set_ylabel("tangent modulus, MPa" if m == 0 else "")
-        top.set_title(name, loc="left", fontsize=10.5)
+        label = "tangent modulus, MPa" if m == 0 else ""
+        quiet(top, strain if rows == 1 else "", label, name)
         if truth is not None:
             _deviation(axes[1, m], x[m], fits[:, m], truth[m], strain, first=m == 0)
     lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
@@ -66,15 +69,20 @@ def plot_moduli(
     return save(figure, path)
 
 
-def _deviation(axes, x, fits, truth, strain, first):  # type: ignore[no-untyped-def]
+def _deviation(axes: Axes, x: Array, fits: Array, truth: Array, strain: str, first: bool) -> None:
     percent = np.maximum(100 * np.abs(fits / truth - 1), SMALLEST)
-    axes.set_yscale("log")
     for line in percent[:0:-1]:
         axes.plot(x, line, color=SKY, linewidth=1.0)
-    axes.plot(x, percent[0], color=BLUE, linewidth=1.4)
+    axes.plot(x, percent[0], color=BLACK, linewidth=1.4)
+    # Whole decades with room for the text above; dips where curves cross say nothing.
+    high = np.ceil(np.log10(percent.max())) + 1
+    low = np.floor(max(np.log10(percent.min()), high - 7))
+    axes.set_yscale("log")
+    axes.set_ylim(10.0**low, 10.0**high)
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_locator(NullLocator())
     quiet(axes, strain, "deviation from known, %" if first else "")
     axes.text(
-        0.98, 0.95, f"largest {percent[0].max():.2g} %", transform=axes.transAxes,
-        ha="right", va="top", fontsize=8.5, color=BLUE,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
+        0.98, 0.97, f"best: at most {percent[0].max():.2g} %", transform=axes.transAxes,
+        ha="right", va="top", fontsize=8.5, color=BLACK,
     )  # fmt: skip

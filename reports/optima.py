@@ -24,7 +24,9 @@ def plot_optima(
     label: str = "objective e (Eq. 4.8)",
     references: Mapping[str, float] | None = None,
 ) -> Path:
-    """Draw the optimum of every start, sorted from worst to best, on a logarithmic axis.
+    """Draw the optimum of every start, sorted from worst to best.
+
+    The axis is logarithmic where the values span more than a decade.
 
     Parameters
     ----------
@@ -40,9 +42,8 @@ def plot_optima(
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     ended = np.sort(values[np.isfinite(values)])[::-1]
     drawn = np.maximum(ended, SMALLEST)
-    figure = new_figure(7.2, 4.2)
+    figure = new_figure(10.0, 4.2)
     axes = figure.subplots()
-    axes.set_yscale("log")
     axes.plot(np.arange(1, len(drawn) + 1), drawn, "o", color=BLUE, markersize=5, clip_on=False)
     right = max(len(values), 2) + 0.5
     for name, value in (references or {}).items():
@@ -59,13 +60,20 @@ def plot_optima(
         )
     levels = [*drawn, *(references or {}).values()] or [1.0]
     low, high = np.log10(min(levels)), np.log10(max(levels))
-    room = max(0.06 * (high - low), 0.3)
-    axes.set_ylim(10 ** (low - room), 10 ** (high + room))
+    if high - low > 1.0:
+        axes.set_yscale("log")
+        room = max(0.06 * (high - low), 0.3)
+        axes.set_ylim(10 ** (low - room), 10 ** (high + room))
+    else:  # a logarithmic axis without a full decade on it cannot be read
+        axes.set_ylim(0.0, 1.15 * max(levels))
     axes.set_xlim(0.5, right)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     failed = len(values) - len(ended)
-    title = f"Optima of {len(values)} starts" + (f", {failed} without a result" if failed else "")
+    plural = "s" if len(values) > 1 else ""
+    title = f"Optima of {len(values)} start{plural}" + (
+        f", {failed} without a result" if failed else ""
+    )
     if len(ended):
-        title += f": best {ended[-1]:.2g}, median {np.median(ended):.2g}, worst {ended[0]:.2g}"
+        title += f": best {ended[-1]:.3g}, median {np.median(ended):.3g}, worst {ended[0]:.3g}"
     quiet(axes, "start, sorted from worst to best", label, title)
     return save(figure, path)

@@ -65,9 +65,5 @@ def plot_heights(
 
 
 def _below_one(value: float) -> str:
-    """Digits enough to tell the value from 1, up to 8."""
-    for digits in range(3, 9):
-        text = f"{value:.{digits}f}"
-        if float(text) < 1.0:
-            break
-    return text
+    """Three decimals, or the distance from 1 where those would hide it."""
+    return f"{value:.3f}" if not value > 0.999 else f"1 $-$ {1.0 - value:.1e}"
