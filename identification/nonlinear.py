@@ -90,8 +90,10 @@ class _Record:
     def at(self, x: Array, with_gradient: bool) -> tuple[float, Array, bool, bool]:
         """e, slope by x, whether positive, whether analysed; the same point is run only once."""
         key = x.tobytes()
-        if self.last is not None and self.last[0] == key and (
-            not with_gradient or len(self.last[2])
+        if (
+            self.last is not None
+            and self.last[0] == key
+            and (not with_gradient or len(self.last[2]))
         ):
             return self.last[1:]
         y = self.unknowns(x)

@@ -36,9 +36,7 @@ class FieldTarget:
         """Model displacement (nodes, ...) at the places, (n, ...)."""
         if self.sample is None:
             return nodal
-        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(
-            -1, *nodal.shape[1:]
-        )
+        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
 
 
 class FieldObjective:
@@ -54,9 +52,7 @@ class FieldObjective:
     InputError : a direction without any displacement cannot be normalised by it.
     """
 
-    def __init__(
-        self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e"
-    ) -> None:
+    def __init__(self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e") -> None:
         self.targets = tuple(targets)
         self.scales = []
         for target in self.targets:

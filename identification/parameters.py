@@ -67,8 +67,10 @@ class ModuliParameters:
         n = self.degree + 1
         whole = np.zeros((self.size, self.size))
         for block, strain in enumerate(STRAIN_OF_BLOCK):
-            points = 0.5 * self.strain_range[strain] * (
-                1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n))
+            points = (
+                0.5
+                * self.strain_range[strain]
+                * (1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
             )
             part = slice(n * block, n * block + n)
             # Values in units of the modulus' own size: G12 is a tenth of E.
@@ -98,7 +100,9 @@ class ModuliParameters:
         """A, c of `A @ y >= c`: positivity, coefficient bounds, nuisance bounds; rows scaled."""
         grid, margin = self.positivity
         t = self.to_coefficients
+        # A coefficient held by equal bounds is scaled by itself.
         width = self.upper - self.lower
+        width = np.where(width > 0, width, np.maximum(np.abs(self.upper), 1.0))
         moduli = grid @ t
         size = 1.0 / np.abs(moduli).max(axis=1)
         a = np.vstack([moduli * size[:, None], t / width[:, None], -t / width[:, None]])

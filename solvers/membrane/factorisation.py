@@ -86,9 +86,7 @@ class BandedTangent:
 
     def solve(self, rhs: Array) -> Array:
         ordered = np.asfortranarray(rhs[self.order])
-        x, _ = lapack.dgbtrs(
-            self.lu, self.width, self.width, ordered, self.pivots, overwrite_b=1
-        )
+        x, _ = lapack.dgbtrs(self.lu, self.width, self.width, ordered, self.pivots, overwrite_b=1)
         return np.asarray(x[self.rank])
 
 

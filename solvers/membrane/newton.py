@@ -62,8 +62,10 @@ class Membrane:
             self.tangent.data, self.residual, with_tangent,
         )  # fmt: skip
         self.iterations += 1
-        if force <= 0:
+        if force < 0:
             return np.inf
+        if force == 0.0:  # no pressure: the reactions of what is prescribed are the measure
+            force = float(np.abs(self.residual).max()) or 1.0
         ratio = float(np.abs(self.residual[self.free]).max()) / force
         return ratio if np.isfinite(ratio) else np.inf
 

@@ -49,7 +49,8 @@ def explicit(  # type: ignore[no-untyped-def]
     """
     count = len(which)
     rate[:] = 0.0
-    h, s_new, pk2, held, steep = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(SLOPES)
+    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    held, steep = np.empty(3), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))
     x, f = np.empty((4, 3)), np.empty((2, 3))

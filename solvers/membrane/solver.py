@@ -172,9 +172,7 @@ class MembraneSolver:
         start = _extrapolate(path[:i], levels[:i], level)
         # Cut-back is continuation in load inside the increment: strain history is not committed
         # in between, so that the path integral, and with it the result, does not depend on it.
-        found = _reach(
-            membrane, float(levels[i - 1]), path[i - 1], level, start, MOST_CUTS
-        )
+        found = _reach(membrane, float(levels[i - 1]), path[i - 1], level, start, MOST_CUTS)
         if found is None:
             raise SolverFailure(
                 f"no equilibrium at {level * 1e3:.4g} kPa (increment {i + 1} of {len(levels)}); "

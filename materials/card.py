@@ -1,0 +1,113 @@
+"""The material card `material.toml`: read, write."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from ..errors import InputError
+from .law import UNLIMITED, HypoelasticLaw
+
+#: MPa per unit.
+UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialCard:
+    """A law with the thickness it was fitted for (mm), a name, and where it came from."""
+
+    law: HypoelasticLaw
+    thickness: float
+    name: str = ""
+    source: str = ""
+
+
+def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
+    """Write a card with its coefficients in `unit` ("GPa", "MPa" or "Pa")."""
+    law, scale = card.law, UNITS[unit]
+    ends = law.strain_range
+    named = zip(("warp", "fill", "shear"), ends, strict=True)
+    valid = {name: [0.0, float(end)] for name, end in named if end < UNLIMITED}
+    content: dict[str, Any] = {
+        "name": card.name,
+        "source": card.source,
+        "law": "hypoelastic orthotropic; tangent moduli of log strain; Cauchy stress",
+        "unit": unit,
+        "beta": [float(b) / scale for b in law.beta],
+        "nu12": law.nu12,
+        "thickness_mm": card.thickness,
+        "thickness_change": law.thickness_change,
+        "valid_strain": valid,
+    }
+    header = (
+        "# beta_0..3: G12 of |gamma12|, beta_4..7: E2 of eps2, beta_8..11: E1 of eps1, "
+        "highest power first.\n# Outside valid_strain a modulus keeps its end value.\n"
+    )
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def read_card(path: Path) -> MaterialCard:
+    """Read a card.
+
+    Raises
+    ------
+    InputError : naming the file and the field: not TOML, a missing key, a unit that is not one
+        of GPa, MPa, Pa, not twelve finite coefficients, a range that is not [0, end].
+    """
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(path, "TOML syntax", str(error)) from None
+    unit = _get(path, content, "unit", str)
+    if unit not in UNITS:
+        raise InputError(path, "unit", f"expected one of {', '.join(UNITS)}, got {unit!r}")
+    beta = _get(path, content, "beta", list)
+    if len(beta) != 12:
+        raise InputError(path, "beta", f"expected 12 coefficients, got {len(beta)}")
+    if not all(_is_number(b) for b in beta):
+        raise InputError(path, "beta", "expected finite numbers only")
+    valid = _get(path, content, "valid_strain", dict, {})
+    ends = []
+    for name in ("warp", "fill", "shear"):
+        limits = valid.get(name, [0.0, UNLIMITED])
+        good = isinstance(limits, list) and len(limits) == 2 and all(map(_is_number, limits))
+        if not good or limits[0] != 0 or not limits[1] > 0:
+            raise InputError(path, f"valid_strain.{name}", f"expected [0, end], got {limits}")
+        ends.append(float(limits[1]))
+    thickness = _get(path, content, "thickness_mm", (int, float))
+    if not _is_number(thickness) or not thickness > 0:
+        raise InputError(path, "thickness_mm", f"expected > 0, got {thickness}")
+    try:
+        law = HypoelasticLaw(
+            np.array(beta, dtype=float) * UNITS[unit],
+            _get(path, content, "nu12", (int, float)),
+            np.array(ends),
+            _get(path, content, "thickness_change", str, "constant"),
+        )
+    except InputError as error:
+        raise InputError(path, error.field, error.problem) from None
+    name = _get(path, content, "name", str, "")
+    return MaterialCard(law, float(thickness), name, _get(path, content, "source", str, ""))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+
+
+def _get(path: Path, content: dict[str, Any], key: str, kind: Any, default: Any = None) -> Any:
+    value = content.get(key, default)
+    if value is None:
+        raise InputError(path, key, "this key is missing")
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise InputError(path, key, f"has the wrong type, got {value!r}")
+    return value

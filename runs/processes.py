@@ -1,0 +1,118 @@
+"""Starts side by side on this machine's cores."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import queue
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from ..errors import BubblefitError
+from ..identification.methods import FitOptions
+from ..identification.problem import FieldProblem
+from .start import EvaluationRecord, StartRecord, run_start
+
+Record = EvaluationRecord | StartRecord
+WAIT_S = 0.5
+
+
+def run_starts(
+    build: Callable[[], FieldProblem],
+    options: FitOptions,
+    seed: int,
+    numbers: Sequence[int],
+    jobs: int,
+) -> Iterator[Record | None]:
+    """Fit every start; yield records as they come, None now and then while nothing does.
+
+    Parameters
+    ----------
+    build : makes the problem; called once in every process.
+    jobs : processes; 1 runs here.
+
+    Raises
+    ------
+    BubblefitError : a process died (exit code 4: nothing is lost but its current start).
+    """
+    if jobs <= 1 or len(numbers) <= 1:
+        with threadpool_limits(1):
+            problem = build()
+            for number in numbers:
+                told: list[Record] = []
+                told.append(run_start(problem, options, seed, number, told.append))
+                yield from told
+        return
+    # fork: the compiled kernels and the project are there already; elsewhere spawn works too.
+    methods = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("fork" if "fork" in methods else "spawn")
+    tasks: Any = context.Queue()
+    records: Any = context.Queue()
+    count = min(jobs, len(numbers))
+    for number in [*numbers, *([None] * count)]:
+        tasks.put(number)
+    workers = [
+        context.Process(
+            target=_work, args=(build, options, seed, tasks, records, os.getpid()), daemon=True
+        )
+        for _ in range(count)
+    ]
+    for worker in workers:
+        worker.start()
+    try:
+        left = len(numbers)
+        while left:
+            try:
+                record = records.get(timeout=WAIT_S)
+            except queue.Empty:
+                _check(workers)
+                yield None
+                continue
+            if isinstance(record, BaseException):
+                raise record
+            left -= isinstance(record, StartRecord)
+            yield record
+    finally:
+        for worker in workers:
+            worker.terminate()
+        for worker in workers:
+            worker.join()
+
+
+def _check(workers: Sequence[Any]) -> None:
+    for worker in workers:
+        if worker.exitcode not in (None, 0):
+            error = BubblefitError(
+                f"a worker process died (exit code {worker.exitcode}; out of memory?); "
+                "finished starts are kept: go on with --resume, perhaps with fewer --jobs"
+            )
+            error.exit_code = 4
+            raise error
+
+
+def _work(
+    build: Callable[[], FieldProblem],
+    options: FitOptions,
+    seed: int,
+    tasks: Any,
+    records: Any,
+    parent: int,
+) -> None:
+    # Ctrl-C reaches the whole group; the parent decides and terminates us.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def tell(record: Record | BaseException) -> None:
+        if os.getppid() != parent:  # killed without a chance to end us
+            os._exit(1)
+        records.put(record)
+
+    try:
+        with threadpool_limits(1):
+            problem = build()
+            while (number := tasks.get()) is not None:
+                tell(run_start(problem, options, seed, number, tell))
+    except Exception as error:
+        tell(error)
