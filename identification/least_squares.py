@@ -83,7 +83,7 @@ def _descend(
             damping, growth = damping * growth, min(2.0 * growth, 64.0)
         else:
             return point, "settled" if not reweighted else "converged"
-        ratio = gained / max(predicted, 1e-300)
+        ratio = float(gained / max(float(predicted), 1e-300))
         damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
         growth = 2.0
         idle = idle + 1 if gained < SETTLED * merit else 0

@@ -13,7 +13,8 @@ from .nonlinear import NloptOptions, nlopt_minimise
 from .optimum import Optimum
 from .problem import FieldProblem
 
-METHODS = ("lm", "slsqp", "cobyla")
+ALGORITHMS: dict[str, Literal["slsqp", "cobyla"]] = {"slsqp": "slsqp", "cobyla": "cobyla"}
+METHODS = ("lm", *ALGORITHMS)
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,10 @@ def fit_from(problem: FieldProblem, start: NDArray, options: FitOptions) -> Opti
     """
     if options.method == "lm":
         return levenberg_marquardt(problem, start, options.tolerance, options.max_analyses)
-    if options.method == "slsqp" or options.method == "cobyla":
-        nlopt_options = NloptOptions(options.method, options.gradient, options.constraints)
+    if options.method in ALGORITHMS:
+        nlopt_options = NloptOptions(
+            ALGORITHMS[options.method], options.gradient, options.constraints
+        )
         return nlopt_minimise(
             problem, start, options.tolerance, options.max_analyses, nlopt_options
         )

@@ -81,7 +81,7 @@ class _Record:
         return np.asarray(self.origin + self.basis @ x)
 
     def variables(self, y: Array) -> Array:
-        return np.linalg.solve(self.basis, y - self.origin)
+        return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
     def feasible(self, y: Array) -> bool:
         a, c = self.problem.parameters.inequalities

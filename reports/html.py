@@ -9,7 +9,7 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from .writing import replacing
+from ..writing import replacing
 
 TEMPLATES = Path(__file__).parent.parent / "templates" / "report"
 

@@ -10,7 +10,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .writing import replacing
+from ..writing import replacing
 
 # Okabe and Ito's palette.
 BLUE, VERMILION, GREEN, SKY, GREY, BLACK = (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..meshes.mesh import Mesh
-from .writing import replacing
+from ..writing import replacing
 
 
 def write_vtu(

@@ -48,12 +48,12 @@ def run_starts(
         return
     # fork: the compiled kernels and the project are there already; elsewhere spawn works too.
     methods = multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("fork" if "fork" in methods else "spawn")
+    context: Any = multiprocessing.get_context("fork" if "fork" in methods else "spawn")
     tasks: Any = context.Queue()
     records: Any = context.Queue()
     count = min(jobs, len(numbers))
-    for number in [*numbers, *([None] * count)]:
-        tasks.put(number)
+    for task in [*numbers, *([None] * count)]:
+        tasks.put(task)
     workers = [
         context.Process(
             target=_work, args=(build, options, seed, tasks, records, os.getpid()), daemon=True

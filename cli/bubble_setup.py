@@ -1,0 +1,203 @@
+"""From a project to a fit: model, targets, parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CloughTocher2DInterpolator
+
+from ..errors import InputError, SolverFailure
+from ..experiments.fields import DisplacementField, read_fields
+from ..experiments.surfaces import DisplacementSurface, fit_surface
+from ..identification.objective import FieldObjective, FieldTarget
+from ..identification.parameters import ModuliParameters
+from ..identification.problem import FieldProblem
+from ..materials.law import HypoelasticLaw
+from ..meshes.disk import disk_mesh
+from ..meshes.location import sampling_matrix
+from ..meshes.mesh import Mesh
+from ..models.bubble import BubbleModel
+from ..solvers.base import Solver
+from ..solvers.registry import solver_named
+from .project import BubbleProject
+from .project_data import KnownSolution, PointFiles
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BubbleSetup:
+    """A fit ready to run, and what its report wants to know about the data.
+
+    fields : what was measured (or computed), as read; known : the law behind computed data;
+    surfaces : where matching is by surfaces; dropped : doubtful cells left out; outside : points
+    beyond the rim of the model.
+    """
+
+    problem: FieldProblem
+    fields: tuple[DisplacementField, ...]
+    known: HypoelasticLaw | None
+    surfaces: tuple[DisplacementSurface, ...]
+    dropped: int
+    outside: int
+
+
+def bubble_model(project: BubbleProject) -> BubbleModel:
+    """The model of a project."""
+    mesh = disk_mesh(project.radius, project.elements, project.symmetry, project.generator)
+    return BubbleModel(mesh, project.thickness, project.pressures, project.increments)
+
+
+def bubble_setup(project: BubbleProject) -> BubbleSetup:
+    """Read or compute the data and set up the fit.
+
+    Raises
+    ------
+    InputError : in the project or its data. SolverFailure : the known solution cannot be run.
+    """
+    solver = solver_named(project.solver)
+    model = bubble_model(project)
+    law = HypoelasticLaw(
+        np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change
+    )
+    known = None
+    if isinstance(project.data, KnownSolution):
+        known = law.with_beta(project.data.beta)
+        fields = _computed(project, project.data, model, known, solver)
+    else:
+        fields = _measured(project, project.data)
+    folded = tuple(_folded(f) for f in fields) if project.symmetry == "quarter" else fields
+    surfaces: tuple[DisplacementSurface, ...] = ()
+    if project.match_by == "surfaces":
+        whole = known is not None and project.symmetry == "quarter"
+        surfaces = tuple(
+            fit_surface(_mirrored(f) if whole else f, project.match_degree) for f in fields
+        )
+        nodes = model.mesh.points[:, :2]
+        targets = [FieldTarget(s.pressure, s.evaluate(nodes)) for s in surfaces]
+        outside = 0
+    elif known is not None:
+        targets = [FieldTarget(f.pressure, _at_nodes(f, model.mesh)) for f in folded]
+        outside = 0
+    else:
+        targets, outside = _at_points(project, folded, model.mesh)
+    parameters = ModuliParameters(
+        project.degree,
+        project.lower,
+        project.upper,
+        project.strain_range,
+        project.margin_E,
+        project.margin_G,
+        project.displacement_offset,
+        project.pressure_offset,
+        min(project.increments),
+    )
+    try:
+        objective = FieldObjective(targets, project.objective)
+    except InputError as error:
+        raise InputError(project.path, error.field, error.problem) from None
+    problem = FieldProblem(model, solver, law, objective, parameters)
+    dropped = sum(f.dropped for f in fields)
+    return BubbleSetup(problem, fields, known, surfaces, dropped, outside)
+
+
+def bubble_problem(project: BubbleProject) -> FieldProblem:
+    """Only the fit: what each worker process builds for itself."""
+    return bubble_setup(project).problem
+
+
+def _computed(
+    project: BubbleProject,
+    data: KnownSolution,
+    model: BubbleModel,
+    known: HypoelasticLaw,
+    solver: Solver,
+) -> tuple[DisplacementField, ...]:
+    """Displacements of the known solution by the solver that fits, on the data's own mesh."""
+    if data.symmetry == "quarter" and project.symmetry == "full":
+        problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
+        raise InputError(project.path, "data.known_solution.symmetry", problem)
+    same = (data.elements, data.symmetry, data.increments) == (
+        project.elements,
+        project.symmetry,
+        project.increments,
+    )
+    source = model
+    if not same:
+        mesh = disk_mesh(project.radius, data.elements, data.symmetry, project.generator)
+        source = BubbleModel(mesh, project.thickness, project.pressures, data.increments)
+    try:
+        history = solver.run(source, known)
+    except SolverFailure as failure:
+        raise SolverFailure(f"the known solution cannot be run: {failure.reason}") from None
+    return tuple(
+        DisplacementField(p, source.mesh.points[:, :2], u, 0)
+        for p, u in zip(project.pressures, history.displacement, strict=True)
+    )
+
+
+def _measured(project: BubbleProject, data: PointFiles) -> tuple[DisplacementField, ...]:
+    return read_fields(
+        data.files,
+        project.pressures,
+        columns=data.columns,
+        flag_column=data.flag_column,
+        comment=data.comment,
+        length_scale=data.length_scale,
+    )
+
+
+def _folded(field: DisplacementField) -> DisplacementField:
+    """A full field folded onto the quarter x, y >= 0."""
+    sign = np.where(field.points < 0, -1.0, 1.0)
+    moved = field.displacement.copy()
+    moved[:, :2] *= sign
+    return replace(field, points=np.abs(field.points), displacement=moved)
+
+
+def _mirrored(field: DisplacementField) -> DisplacementField:
+    """A quarter's field mirrored to the full disk: surfaces are fitted to full fields."""
+    if (field.points < -1e-9).any():
+        return field
+    points, moved = [], []
+    for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        points.append(field.points * (sx, sy))
+        moved.append(field.displacement * (sx, sy, 1))
+    xy, u = np.concatenate(points), np.concatenate(moved)
+    _, once = np.unique(np.round(xy, 6), axis=0, return_index=True)
+    return replace(field, points=xy[once], displacement=u[once])
+
+
+def _at_nodes(field: DisplacementField, mesh: Mesh) -> Array:
+    """Computed displacements at the model's nodes; exact when the meshes are the same."""
+    nodes = mesh.points[:, :2]
+    if nodes.shape == field.points.shape and np.allclose(nodes, field.points, atol=1e-9):
+        return field.displacement
+    # C1 interpolation: the data mesh is curved between its nodes, linear would cut corners.
+    mirrored = _mirrored(field)
+    between = CloughTocher2DInterpolator(mirrored.points, mirrored.displacement)(nodes)
+    # Chords of the data's rim can leave a rim node of ours outside: it does not move anyway.
+    outside = ~np.isfinite(between).all(axis=1)
+    between[outside] = 0.0
+    between[mesh.node_sets["rim"]] = 0.0
+    return np.asarray(between)
+
+
+def _at_points(
+    project: BubbleProject, fields: tuple[DisplacementField, ...], mesh: Mesh
+) -> tuple[list[FieldTarget], int]:
+    targets, outside = [], 0
+    for field in fields:
+        sample, inside = sampling_matrix(mesh, field.points)
+        outside += int((~inside).sum())
+        if not inside.any():
+            raise InputError(
+                project.path,
+                f"data at {field.pressure * 1e3:g} kPa",
+                f"no point lies within {project.radius:g} mm of the centre: are the length unit "
+                "and the columns x and y right?",
+            )
+        targets.append(FieldTarget(field.pressure, field.displacement[inside], sample))
+    return targets, outside

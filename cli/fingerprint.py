@@ -1,0 +1,30 @@
+"""Whose study an output folder holds: settings, data and version, in one number."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields
+
+import numpy as np
+
+from .. import __version__
+from .bubble_setup import BubbleSetup
+from .project import BubbleProject
+
+# Where the files lie, how many starts there are and what they are called changes no result.
+FREE = {"path", "title", "starts", "data"}
+
+
+def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
+    """SHA-256 over everything that a start's result depends on."""
+    digest = hashlib.sha256(__version__.encode())
+    for field in fields(project):
+        if field.name not in FREE:
+            digest.update(f"{field.name}={_plain(getattr(project, field.name))};".encode())
+    for target in setup.problem.objective.targets:
+        digest.update(np.ascontiguousarray(target.displacement).tobytes())
+    return digest.hexdigest()
+
+
+def _plain(value: object) -> str:
+    return repr(value.tolist()) if isinstance(value, np.ndarray) else repr(value)

@@ -1,0 +1,41 @@
+"""`bubblefit init DIR`: a commented example project to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..errors import InputError, OutputError
+from .options import exits
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+KINDS = {"known": "bubble-known-solution", "measured": "bubble-valmex7318"}
+
+
+@click.command("init")
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--example",
+    type=click.Choice(list(KINDS)),
+    default="known",
+    show_default=True,
+    help="known: data made from a known solution; measured: files of DIC displacements.",
+)
+@exits
+def command(folder: Path, example: str) -> None:
+    """Write a commented example project into FOLDER (nothing there is written over)."""
+    source = EXAMPLES / KINDS[example]
+    files = sorted(f for f in source.iterdir() if f.is_file())
+    for file in files:
+        if (folder / file.name).exists():
+            raise InputError(folder / file.name, "", "is already there; name another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in files:
+            (folder / file.name).write_bytes(file.read_bytes())
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror}") from None
+    project = folder / ("project.toml" if example == "known" else "test1-linear.toml")
+    click.echo(f"wrote {', '.join(f.name for f in files)} to {folder}")
+    click.echo(f"next: bubblefit bubble {project}" + (" --data DIR" if example != "known" else ""))

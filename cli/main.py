@@ -1,0 +1,46 @@
+"""The `bubblefit` command: one file a subcommand, imported only when called."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+
+import click
+
+from .. import __version__
+
+COMMANDS = {
+    "bubble": ("bubble", "Fit a material to a bubble inflation test."),
+    "simulate": ("simulate", "One forward analysis with a material card."),
+    "init": ("init", "Write a commented example project."),
+}
+
+
+class LazyGroup(click.Group):
+    """Imports a subcommand only when it runs: `bubblefit --help` stays quick."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="bubblefit")
+@click.option("--verbose", is_flag=True, help="Log what the library does, on stderr.")
+def main(verbose: bool) -> None:
+    """Test data in, validated material card of a coated fabric out.
+
+    Exit codes: 0 fine, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
+    4 the solver failed, 130 interrupted.
+    """
+    logging.basicConfig(level=logging.INFO if verbose else logging.WARNING)

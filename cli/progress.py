@@ -1,0 +1,74 @@
+"""Progress of a study: a live line on a terminal, a plain line a minute elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ..runs.start import EvaluationRecord, StartRecord
+
+PLAIN_EVERY_S = 60.0
+
+
+class StudyProgress:
+    """Starts done, best objective, time left; on stderr, so that stdout stays for results."""
+
+    def __init__(self, total: int, done: int, quiet: bool, best: float | None = None) -> None:
+        self.total, self.done, self.best = total, done, best
+        self.already, self.analyses = done, 0
+        self.begun = self.said = time.monotonic()
+        self.quiet = quiet
+        self.bar: Progress | None = None
+        if not quiet and sys.stderr.isatty():
+            self.bar = Progress(
+                TextColumn("starts"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[note]}"),
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self.task = self.bar.add_task("starts", total=total, completed=done, note="")
+
+    def __enter__(self) -> StudyProgress:
+        if self.bar is not None:
+            self.bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def saw(self, record: EvaluationRecord | StartRecord | None) -> None:
+        """Take note of a record, or of time passing."""
+        if isinstance(record, EvaluationRecord):
+            self.analyses += 1
+        elif isinstance(record, StartRecord):
+            self.done += 1
+            if record.objective is not None:
+                self.best = min(self.best or record.objective, record.objective)
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done, note=self.note())
+        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            print(f"{self.done} of {self.total} starts, {self.note()}", file=sys.stderr, flush=True)
+
+    def note(self) -> str:
+        """Best objective so far, analyses, time left."""
+        best = "none yet" if self.best is None else f"{self.best:.3g}"
+        fresh = self.done - self.already
+        left = "?"
+        if fresh:
+            per_start = (time.monotonic() - self.begun) / fresh
+            left = f"{per_start * (self.total - self.done):.0f} s"
+        return f"best e {best}, {self.analyses} analyses, {left} left"
