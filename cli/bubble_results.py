@@ -165,8 +165,7 @@ def write_numbers(
         f"bubblefit {__version__} bubble, {project.path.name}, objective {found.best.value:.4g}, "
         f"mean |dx|+|dy|+|dz| {found.mean_absolute:.4g} mm",
     )
-    with replacing(folder.path / "material.toml") as path:
-        write_card(card, path, project.modulus_unit)
+    write_card(card, folder.path / "material.toml", project.modulus_unit)
     if setup.surfaces:
         with replacing(folder.path / "surfaces.csv") as path:
             write_surfaces(setup.surfaces, path)

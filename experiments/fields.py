@@ -120,11 +120,8 @@ def _where(
     """Field and problem of a bad number: the line as an editor counts it."""
     found = table[column].iloc[row]
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    data = [
-        i
-        for i, line in enumerate(lines, 1)
-        if (line.split(comment)[0] if comment else line).strip()
-    ]
+    text = [line.split(comment)[0] if comment else line for line in lines]
+    data = [i for i, line in enumerate(text, 1) if line.strip()]
     line = data[row + 1] if row + 1 < len(data) else row + 2
     more = f" ({count} such values in all)" if count > 1 else ""
     shown = "nothing" if pd.isna(found) else repr(found)

@@ -68,7 +68,9 @@ def fit_surface(field: DisplacementField, degree: int = 4) -> DisplacementSurfac
     left = ((terms @ solution - field.displacement) ** 2).sum(axis=0)
     spread = ((field.displacement - field.displacement.mean(axis=0)) ** 2).sum(axis=0)
     r_squared = 1.0 - left / np.where(spread > 0, spread, 1.0)
-    return DisplacementSurface(field.pressure, degree, solution.T.copy(), scale, r_squared)
+    return DisplacementSurface(
+        field.pressure, degree, np.asarray(solution.T, dtype=float), scale, r_squared
+    )
 
 
 def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path) -> None:

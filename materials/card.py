@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 import tomli_w
 
 from ..errors import InputError
+from ..writing import replacing
 from .law import UNLIMITED, HypoelasticLaw
 
 #: MPa per unit.
@@ -49,9 +49,8 @@ def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
         "# beta_0..3: G12 of |gamma12|, beta_4..7: E2 of eps2, beta_8..11: E1 of eps1, "
         "highest power first.\n# Outside valid_strain a modulus keeps its end value.\n"
     )
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
-    os.replace(temporary, path)
+    with replacing(path) as temporary:
+        temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
 
 
 def read_card(path: Path) -> MaterialCard:
