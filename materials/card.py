@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +66,7 @@ def read_card(path: Path) -> MaterialCard:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
         raise InputError(path, "TOML syntax", str(error)) from None
     unit = _get(path, content, "unit", str)
     if unit not in UNITS:
@@ -100,7 +101,9 @@ def read_card(path: Path) -> MaterialCard:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+    # TOML integers have no largest; beyond a double they are no numbers to us.
+    real = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return real and abs(value) <= sys.float_info.max
 
 
 def _get(path: Path, content: dict[str, Any], key: str, kind: Any, default: Any = None) -> Any:

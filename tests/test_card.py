@@ -1,0 +1,217 @@
+"""material.toml: round trips, and every way in which a card can be wrong."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from bubblefit.errors import InputError
+from bubblefit.materials.card import UNITS, MaterialCard, read_card, write_card
+from bubblefit.materials.law import UNLIMITED, HypoelasticLaw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+GOOD: dict[str, Any] = {
+    "name": "Valmex 7318",
+    "source": "a test",
+    "unit": "GPa",
+    "beta": [0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.8],
+    "nu12": 0.24,
+    "thickness_mm": 0.81,
+    "thickness_change": "constant",
+    "valid_strain": {"warp": [0.0, 0.13], "fill": [0.0, 0.12], "shear": [0.0, 0.11]},
+}
+
+# Not so near to zero that the change of unit itself would lose digits.
+finite = st.floats(-1e9, 1e9).filter(lambda x: x == 0 or abs(x) > 1e-290)
+words = st.text(st.characters(codec="utf-8"), max_size=30)
+
+
+@given(
+    beta=arrays(float, 12, elements=finite),
+    nu12=st.floats(0.0, 0.999),
+    ends=arrays(float, 3, elements=st.floats(1e-3, 10.0)),
+    thickness=st.floats(1e-3, 1e3),
+    change=st.sampled_from(["constant", "incompressible"]),
+    unit=st.sampled_from(sorted(UNITS)),
+    name=words,
+    source=words,
+)
+@settings(max_examples=60, deadline=None)
+def test_round_trip_in_every_unit(
+    beta: np.ndarray,
+    nu12: float,
+    ends: np.ndarray,
+    thickness: float,
+    change: Any,
+    unit: str,
+    name: str,
+    source: str,
+) -> None:
+    card = MaterialCard(HypoelasticLaw(beta, nu12, ends, change), thickness, name, source)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "material.toml"
+        write_card(card, path, unit)
+        assert os.listdir(folder) == ["material.toml"]
+        again = read_card(path)
+    assert again.law.beta == pytest.approx(beta, rel=1e-14, abs=0.0)
+    assert (again.law.strain_range == ends).all()
+    assert (again.law.nu12, again.law.thickness_change) == (nu12, change)
+    assert (again.thickness, again.name, again.source) == (thickness, name, source)
+
+
+def test_an_unlimited_range_stays_unlimited(tmp_path: Path) -> None:
+    write_card(MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.81), tmp_path / "m.toml")
+    assert (read_card(tmp_path / "m.toml").law.strain_range == UNLIMITED).all()
+
+
+def test_units_name_the_same_material(tmp_path: Path) -> None:
+    for unit, scale in (("GPa", 1.0), ("MPa", 1e3), ("Pa", 1e9)):
+        card = {**GOOD, "unit": unit, "beta": [scale * b for b in GOOD["beta"]]}
+        (tmp_path / "m.toml").write_text(tomli_w.dumps(card))
+        assert read_card(tmp_path / "m.toml").law.E1(0.05) == pytest.approx(800.0)
+
+
+def test_the_good_card_is_good(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(tomli_w.dumps(GOOD))
+    card = read_card(tmp_path / "m.toml")
+    assert card.law.strain_range == pytest.approx([0.13, 0.12, 0.11])
+    assert card.law.beta[11] == pytest.approx(800.0)
+
+
+def without(key: str) -> dict[str, Any]:
+    return {k: v for k, v in GOOD.items() if k != key}
+
+
+def with_coefficient(value: Any) -> dict[str, Any]:
+    return {**GOOD, "beta": [*GOOD["beta"][:11], value]}
+
+
+BAD = [
+    (without("unit"), "unit"),
+    (without("beta"), "beta"),
+    (without("nu12"), "nu12"),
+    (without("thickness_mm"), "thickness_mm"),
+    ({**GOOD, "unit": "psi"}, "unit"),
+    ({**GOOD, "unit": 3}, "unit"),
+    ({**GOOD, "beta": GOOD["beta"][:11]}, "beta"),
+    ({**GOOD, "beta": [*GOOD["beta"], 1.0]}, "beta"),
+    ({**GOOD, "beta": "0.1"}, "beta"),
+    ({**GOOD, "beta": []}, "beta"),
+    (with_coefficient(float("nan")), "beta"),
+    (with_coefficient(float("inf")), "beta"),
+    (with_coefficient(1e308), "beta"),
+    (with_coefficient(10**400), "beta"),
+    (with_coefficient("0.8"), "beta"),
+    (with_coefficient(True), "beta"),
+    (with_coefficient([0.8]), "beta"),
+    ({**GOOD, "nu12": 1.2}, "nu12"),
+    ({**GOOD, "nu12": -0.1}, "nu12"),
+    ({**GOOD, "nu12": "0.24"}, "nu12"),
+    ({**GOOD, "nu12": float("nan")}, "nu12"),
+    ({**GOOD, "nu12": True}, "nu12"),
+    ({**GOOD, "thickness_mm": 0.0}, "thickness_mm"),
+    ({**GOOD, "thickness_mm": -0.81}, "thickness_mm"),
+    ({**GOOD, "thickness_mm": float("inf")}, "thickness_mm"),
+    ({**GOOD, "thickness_mm": 10**400}, "thickness_mm"),
+    ({**GOOD, "thickness_mm": "thin"}, "thickness_mm"),
+    ({**GOOD, "thickness_change": "some"}, "thickness_change"),
+    ({**GOOD, "thickness_change": 1}, "thickness_change"),
+    ({**GOOD, "name": 7}, "name"),
+    ({**GOOD, "source": [1]}, "source"),
+    ({**GOOD, "valid_strain": 0.1}, "valid_strain"),
+    ({**GOOD, "valid_strain": {"warp": [0.0]}}, "valid_strain.warp"),
+    ({**GOOD, "valid_strain": {"fill": [0.0, -0.1]}}, "valid_strain.fill"),
+    ({**GOOD, "valid_strain": {"fill": [0.02, 0.1]}}, "valid_strain.fill"),
+    ({**GOOD, "valid_strain": {"shear": [0.0, float("nan")]}}, "valid_strain.shear"),
+    ({**GOOD, "valid_strain": {"shear": 0.1}}, "valid_strain.shear"),
+]
+
+
+@pytest.mark.parametrize(("content", "field"), BAD)
+def test_a_bad_card_names_file_and_field(
+    tmp_path: Path, content: dict[str, Any], field: str
+) -> None:
+    path = tmp_path / "material.toml"
+    path.write_text(tomli_w.dumps(content))
+    with pytest.raises(InputError) as caught:
+        read_card(path)
+    message = str(caught.value)
+    assert str(path) in message and field in message and "\n" not in message
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"unit = ",
+        b"\xff\xfe\x00",
+        b"beta = [1, 2",
+        b"a = 1\na = 2",
+        b"x = " + b"[" * 100_000,
+        b"nu12 = " + b"9" * 5000,
+        b"when = 2000-13-45",
+    ],
+)
+def test_what_is_not_a_card_is_said_in_one_line(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "material.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        read_card(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_no_file_and_a_folder(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.toml", tmp_path):
+        with pytest.raises(InputError, match="cannot be read"):
+            read_card(path)
+
+
+def read_bytes(content: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "material.toml"
+        path.write_bytes(content)
+        try:
+            read_card(path)
+        except InputError as error:
+            assert str(path) in str(error)
+
+
+@given(st.binary(max_size=200))
+@settings(max_examples=200, deadline=None)
+def test_garbage_gives_no_other_exception(content: bytes) -> None:
+    read_bytes(content)
+
+
+values = st.recursive(
+    st.one_of(
+        st.booleans(), st.integers(), st.floats(), st.text(st.characters(codec="utf-8")),
+        st.dates(), st.integers(10**300, 10**310),
+    ),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=13),
+        st.dictionaries(st.sampled_from(["warp", "fill", "shear", "x"]), inner, max_size=3),
+    ),
+    max_leaves=14,
+)  # fmt: skip
+
+
+@given(st.sampled_from(sorted(GOOD)), values)
+@settings(max_examples=200, deadline=None)
+def test_any_value_at_any_key_is_read_or_refused(key: str, value: Any) -> None:
+    read_bytes(tomli_w.dumps({**GOOD, key: value}).encode())
+
+
+@given(st.integers(0, 2000), st.binary(min_size=1, max_size=4))
+@settings(max_examples=200, deadline=None)
+def test_a_damaged_good_card_is_read_or_refused(where: int, damage: bytes) -> None:
+    content = tomli_w.dumps(GOOD).encode()
+    where %= len(content)
+    read_bytes(content[:where] + damage + content[where + len(damage) :])
