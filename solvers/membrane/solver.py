@@ -214,7 +214,13 @@ def _from_flat(membrane: Membrane, level: float, cuts: int) -> Array:
     law = membrane.law
     radius = np.hypot(membrane.reference[:, 0], membrane.reference[:, 1])
     size = float(radius.max())
-    stiffness = 0.5 * membrane.thickness * float(law.E1(0.0) + law.E2(0.0))
+    moduli = [float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12)]
+    if not min(moduli) > 0:
+        raise SolverFailure(
+            "no equilibrium at all: E1, E2, G12 at zero strain are "
+            f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
+        )
+    stiffness = 0.5 * membrane.thickness * (moduli[0] + moduli[1])
     # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
     height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)
     dome = np.zeros_like(membrane.reference)
