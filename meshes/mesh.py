@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """points (n, 3) mm, quads (m, 4) node numbers, node_sets by name."""
+    """A surface of four-node quadrilaterals.
+
+    Parameters
+    ----------
+    points : (n, 3) mm; warp is x, fill is y.
+    quads : (m, 4) node numbers, counter-clockwise seen from the side that pressure inflates to.
+    node_sets : node numbers by name, each sorted and without repeats.
+    """
 
     points: NDArray[np.float64]
     quads: NDArray[np.intp]
