@@ -1,128 +1,99 @@
-"""Measured displacement fields, one file a pressure (stereo DIC exports)."""
+"""Displacement fields of a bubble, as a stereo image correlation (DIC) exports them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .tables import read_table
 
-Array = NDArray[np.float64]
-
-COLUMNS = ("x", "y", "dx", "dy", "dz")
+#: What a file must hold: reference place and displacement; the names in the file may differ.
+QUANTITIES = ("x", "y", "dx", "dy", "dz")
+PLAIN_COLUMNS: Mapping[str, str] = {name: name for name in QUANTITIES}
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacements at points of the flat membrane, at one pressure.
+    """Displacements measured (or computed) at one pressure.
 
-    pressure MPa; points (n, 2) and displacement (n, 3) mm; dropped: doubtful points left out.
+    Parameters
+    ----------
+    pressure : MPa.
+    points : (n, 2) mm, places in the flat reference state; x is warp, y is fill.
+    displacement : (n, 3) mm.
+    dropped : doubtful points that were left out.
     """
 
     pressure: float
-    points: Array
-    displacement: Array
-    dropped: int = 0
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    dropped: int
 
 
 def read_fields(
-    files: Sequence[Path],
+    files: Sequence[Path | str],
     pressures: Sequence[float],
-    columns: Mapping[str, str] | None = None,
+    columns: Mapping[str, str] = PLAIN_COLUMNS,
     flag_column: str | None = None,
     comment: str = "#",
     length_scale: float = 1.0,
 ) -> tuple[DisplacementField, ...]:
-    """Read CSV files of x, y, dx, dy, dz.
+    """Read one comma-separated file a pressure.
 
     Parameters
     ----------
-    files : one a pressure. pressures : MPa.
-    columns : names in the files of x, y, dx, dy, dz (the same names unless given).
-    flag_column : rows where it is not zero are doubtful, dropped and counted.
-    comment : what a comment line starts with. length_scale : mm per unit of the files.
+    files : each with a header line; columns that are not asked for are ignored.
+    pressures : MPa, one a file.
+    columns : for each of `x`, `y`, `dx`, `dy`, `dz` its name in the files.
+    flag_column : rows where this column is not zero are doubtful and left out, whatever they
+        hold; None keeps every row.
+    comment : lines that start so are skipped.
+    length_scale : mm in one unit of length of the files.
 
     Raises
     ------
-    InputError : naming the file and the column or line: missing, empty, a column that is not
-        there, what is not a finite number, every row doubtful.
+    InputError : naming file, line and column: no such file, missing columns, an empty table,
+        cells that are not finite numbers, nothing left without the doubtful rows.
     """
-    names = {name: name for name in COLUMNS} | dict(columns or {})
+    if len(files) != len(pressures):
+        problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
+        raise InputError(None, "files", problem)
+    if not 0 < length_scale < math.inf:
+        raise InputError(None, "length_scale", f"expected mm per unit, above 0, got {length_scale}")
+    unnamed = [name for name in QUANTITIES if name not in columns]
+    if unnamed:
+        raise InputError(None, "columns", f"expected a name for each of {', '.join(unnamed)}")
     return tuple(
-        _read(Path(file), pressure, names, flag_column, comment, length_scale)
+        _field(Path(file), float(pressure), columns, flag_column, comment, length_scale)
         for file, pressure in zip(files, pressures, strict=True)
     )
 
 
-def _read(
+def _field(
     path: Path,
     pressure: float,
-    names: Mapping[str, str],
+    columns: Mapping[str, str],
     flag_column: str | None,
     comment: str,
-    scale: float,
+    length_scale: float,
 ) -> DisplacementField:
-    table = _table(path, comment)
-    wanted = [names[name] for name in COLUMNS] + ([flag_column] if flag_column else [])
-    for name in wanted:
-        if name not in table.columns:
-            there = ", ".join(map(str, table.columns))
-            problem = f"no such column; the file has: {there}. Map columns in the project file"
-            raise InputError(path, f"column {name!r}", problem)
-    numbers = table[wanted].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    keep = np.ones(len(numbers), dtype=bool)
-    if flag_column:
-        keep = numbers[:, -1] == 0
-        unknown = np.flatnonzero(~np.isfinite(numbers[:, -1]))
-        if len(unknown):
-            raise InputError(path, *_where(table, unknown[0], flag_column, path, comment))
-    bad = np.argwhere(~np.isfinite(numbers[:, :5]) & keep[:, None])
-    if len(bad):
-        row, column = bad[0]
-        raise InputError(path, *_where(table, row, wanted[column], path, comment, len(bad)))
-    if not keep.any():
-        raise InputError(path, f"column {flag_column!r}", "every row is flagged doubtful")
-    kept = numbers[keep]
-    return DisplacementField(
-        pressure, kept[:, :2] * scale, kept[:, 2:5] * scale, int((~keep).sum())
-    )
-
-
-def _table(path: Path, comment: str) -> pd.DataFrame:
-    try:
-        table = pd.read_csv(
-            path, comment=comment or None, dtype=str, skipinitialspace=True, encoding="utf-8"
-        )
-    except pd.errors.EmptyDataError:
-        raise InputError(path, "", "is empty; expected a header and rows of numbers") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except (pd.errors.ParserError, UnicodeDecodeError, ValueError) as error:
-        raise InputError(path, "", f"is not a CSV table: {str(error).strip()}") from None
-    table.columns = [str(name).strip() for name in table.columns]
-    if not len(table):
-        raise InputError(path, "", "has a header but no rows")
-    if not table.columns.is_unique:
-        raise InputError(path, "header", "has the same column twice")
-    if not isinstance(table.index, pd.RangeIndex):
-        raise InputError(path, "header", "the rows have more fields than the header has names")
-    return table
-
-
-def _where(
-    table: pd.DataFrame, row: int, column: str, path: Path, comment: str, count: int = 1
-) -> tuple[str, str]:
-    """Field and problem of a bad number: the line as an editor counts it."""
-    found = table[column].iloc[row]
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    text = [line.split(comment)[0] if comment else line for line in lines]
-    data = [i for i, line in enumerate(text, 1) if line.strip()]
-    line = data[row + 1] if row + 1 < len(data) else row + 2
-    more = f" ({count} such values in all)" if count > 1 else ""
-    shown = "nothing" if pd.isna(found) else repr(found)
-    return f"line {line}, column {column!r}", f"expected a finite number, got {shown}{more}"
+    table = read_table(path, comment)
+    total = len(table.lines)
+    if flag_column is not None:
+        # Flags first: a doubtful row may hold anything.
+        table = table.rows(table.numbers(flag_column) == 0)
+    if not len(table.lines):
+        problem = f"all {total} rows are doubtful ({flag_column!r} is not 0); none is left to use"
+        raise InputError(path, "", problem)
+    values = np.stack([table.numbers(columns[name]) for name in QUANTITIES], axis=1)
+    with np.errstate(over="ignore"):
+        values = values * length_scale
+    if not np.isfinite(values).all():
+        raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
+    return DisplacementField(pressure, values[:, :2], values[:, 2:], total - len(values))

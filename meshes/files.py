@@ -1,71 +1,122 @@
-"""Meshes to and from files by meshio."""
+"""Meshes to and from files, through meshio, with their node sets.
+
+Two formats carry named node sets through meshio without further packages: `.vtu` (ParaView), where
+a set is a column of 0 and 1 at the points, and `.inp` (Abaqus, CalculiX), where it is an NSET.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..writing import replacing
 from .mesh import Mesh
 
-PREFIX = "set:"  # point data that holds a node set, one where a node belongs to it
+if TYPE_CHECKING:
+    import meshio
+
+#: What the columns of a .vtu that are node sets are called: this, then the set's name.
+SET_COLUMN = "set_"
+FORMATS = (".vtu", ".inp")
 
 
-def write_mesh(mesh: Mesh, path: Path) -> None:
-    """Write points, quads and node sets; the format follows the suffix (.vtu, .vtk, .inp ...).
-
-    Node sets become point sets in .inp and point data elsewhere.
+def write_mesh(mesh: Mesh, path: Path | str) -> None:
+    """Write a mesh; the suffix, `.vtu` or `.inp`, names the format.
 
     Raises
     ------
-    InputError : a suffix that meshio does not know. OutputError : the file cannot be written.
+    InputError : another suffix, or (`.inp`) a set without nodes or whose name is not plain.
+    OSError : the file cannot be written; what was there may be lost.
     """
     import meshio
 
-    sets = {name: np.asarray(nodes) for name, nodes in mesh.node_sets.items()}
-    written = meshio.Mesh(mesh.points, [("quad", mesh.quads)])
-    if path.suffix == ".inp":
-        written.point_sets = sets
-    else:
-        for name, nodes in sets.items():
-            member = np.zeros(len(mesh.points))
-            member[nodes] = 1.0
-            written.point_data[PREFIX + name] = member
-    try:
-        with replacing(path) as temporary:
-            meshio.write(temporary, written)
-    except (meshio.WriteError, KeyError) as error:
-        raise InputError(path, "", f"meshio cannot write this format: {error}") from None
+    path = Path(path)
+    quads = [("quad", mesh.quads)]
+    if _suffix(path) == ".vtu":
+        member = {
+            f"{SET_COLUMN}{name}": _members(nodes, len(mesh.points))
+            for name, nodes in mesh.node_sets.items()
+        }
+        meshio.vtu.write(path, meshio.Mesh(mesh.points, quads, point_data=member))
+        return
+    for name, nodes in mesh.node_sets.items():
+        # Abaqus separates by commas, ends a name at a blank, and knows no empty set.
+        if not len(nodes) or not name.isidentifier():
+            problem = "expected a name of letters, digits and _, and at least one node; use .vtu"
+            raise InputError(path, f"node set {name!r}", problem)
+    meshio.abaqus.write(path, meshio.Mesh(mesh.points, quads, point_sets=dict(mesh.node_sets)))
 
 
-def read_mesh(path: Path) -> Mesh:
-    """Read quads and node sets.
+def read_mesh(path: Path | str) -> Mesh:
+    """Read a mesh of four-node quadrilaterals, written here or by another program.
+
+    Lengths are taken to be mm. Lines and points among the elements are left out.
 
     Raises
     ------
-    InputError : not a mesh that meshio reads, or one without quads.
+    InputError : no such file, another suffix, not a mesh, triangles or other faces, node numbers
+        or coordinates that make no sense.
     """
     import meshio
 
-    if not Path(path).is_file():
-        raise InputError(path, "", "no such file")
+    path = Path(path)
+    reader = meshio.vtu.read if _suffix(path) == ".vtu" else meshio.abaqus.read
     try:
-        found = meshio.read(path)
-        blocks = [block.data for block in found.cells if block.type == "quad"]
-    # meshio's readers answer a damaged file with whatever their parsing stumbles over, and some
-    # end the process: both become one clear error here.
-    except (Exception, SystemExit) as error:
-        problem = f"meshio cannot read it: {error or type(error).__name__}"
-        raise InputError(path, "", problem) from None
-    if not blocks:
-        raise InputError(path, "cells", "has no 4-node quads")
-    sets = {name: np.asarray(nodes) for name, nodes in (found.point_sets or {}).items()}
-    for name, member in found.point_data.items():
-        if name.startswith(PREFIX):
-            sets[name.removeprefix(PREFIX)] = np.flatnonzero(np.asarray(member) > 0.5)
-    points = np.array(found.points, dtype=float)
-    if points.shape[1] == 2:
-        points = np.column_stack([points, np.zeros(len(points))])
-    return Mesh(points, np.concatenate(blocks).astype(np.int64), sets)
+        # The format's own reader: meshio.read ends the process on a bad file.
+        content = reader(path)
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    except Exception as error:
+        # Garbage makes meshio's readers raise nearly anything, an UnboundLocalError included.
+        problem = f"expected a mesh in the format of its suffix ({_one_line(error)})"
+        raise InputError(path, "", problem) from error
+    return _checked(path, content)
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        problem = f"expected a name that ends in {' or '.join(FORMATS)}, which keep node sets"
+        raise InputError(path, "format", problem)
+    return suffix
+
+
+def _members(nodes: NDArray[np.intp], count: int) -> NDArray[np.int8]:
+    member = np.zeros(count, dtype=np.int8)
+    member[nodes] = 1
+    return member
+
+
+def _checked(path: Path, content: meshio.Mesh) -> Mesh:
+    points = np.asarray(content.points, dtype=float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
+        raise InputError(path, "nodes", "expected two or three finite coordinates a node")
+    points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+    faces = {block.type for block in content.cells} - {"vertex", "line", "line3"}
+    if faces != {"quad"}:
+        found = ", ".join(sorted(faces)) or "none"
+        raise InputError(path, "elements", f"expected four-node quads only, found {found}")
+    blocks = [np.asarray(b.data) for b in content.cells if b.type == "quad"]
+    quads = np.concatenate(blocks).astype(np.intp)
+    sets = {
+        str(name): np.unique(np.asarray(nodes, dtype=np.intp))
+        for name, nodes in (content.point_sets or {}).items()
+    }
+    for name, member in content.point_data.items():
+        if name.startswith(SET_COLUMN):
+            sets[name.removeprefix(SET_COLUMN)] = np.flatnonzero(member)
+    for what, nodes in (("elements", quads), *((f"node set {n}", s) for n, s in sets.items())):
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
+            problem = f"a node number that is not one of the {len(points)} nodes"
+            raise InputError(path, what, problem)
+    if not len(quads):
+        raise InputError(path, "elements", "expected at least one quad, found none")
+    return Mesh(points, quads, sets)
+
+
+def _one_line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text[:200]}" if text else type(error).__name__

@@ -1,4 +1,4 @@
-"""Element shapes."""
+"""How good the elements of a mesh are."""
 
 from __future__ import annotations
 
@@ -7,22 +7,29 @@ from numpy.typing import NDArray
 
 from .mesh import Mesh
 
-Array = NDArray[np.float64]
 
+def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
+    """Scaled Jacobian of each quadrilateral, as Verdict and ParaView define it.
 
-def scaled_jacobian(mesh: Mesh) -> Array:
-    """Smallest corner Jacobian of each quad over its edge lengths, (m,).
+    The smallest, over the four corners, of the sine of the angle between the two edges, counted
+    against the element's own normal: 1 is a rectangle, 0 a collapsed corner or edge, negative a
+    corner that turns in. Warped quads are judged by the normal in their middle.
 
-    1 for a rectangle, the sine of the worst corner angle otherwise, negative inside out.
+    Returns
+    -------
+    (m,), between -1 and 1.
     """
     corner = mesh.points[mesh.quads]
-    ahead = np.roll(corner, -1, axis=1) - corner
-    behind = np.roll(corner, 1, axis=1) - corner
-    normal = np.cross(ahead, behind)
-    mean = normal.sum(axis=1, keepdims=True)
-    mean /= np.maximum(np.linalg.norm(mean, axis=2, keepdims=True), 1e-300)
-    # The sign is that of the quad's own turning about +z where it is flat.
-    mean = np.where((np.abs(corner[..., 2]).max() == 0.0), np.array([0.0, 0.0, 1.0]), mean)
-    lengths = np.linalg.norm(ahead, axis=2) * np.linalg.norm(behind, axis=2)
-    signed = (normal * mean).sum(axis=2)
-    return np.asarray((signed / np.maximum(lengths, 1e-300)).min(axis=1))
+    onward = np.roll(corner, -1, axis=1) - corner
+    back = np.roll(corner, 1, axis=1) - corner
+    # The normal at the centre is half the cross product of the diagonals.
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    normal = _over(normal, np.linalg.norm(normal, axis=1)[:, None])
+    area = np.einsum("mcx,mx->mc", np.cross(onward, back), normal)
+    edges = np.linalg.norm(onward, axis=2) * np.linalg.norm(back, axis=2)
+    return np.asarray(_over(area, edges).min(axis=1))
+
+
+def _over(value: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quotient, zero where the divisor is: collapsed edges are bad elements, not NaN."""
+    return np.divide(value, by, out=np.zeros_like(value), where=by > 0)

@@ -1,0 +1,167 @@
+"""Comma-separated tables whose every complaint names the file, the column and the line."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Cells as text, and where each row stood.
+
+    path : the file. cells : one column a name of the header. lines : (rows,) line numbers in the
+    file, from 1.
+    """
+
+    path: Path
+    cells: pd.DataFrame
+    lines: NDArray[np.intp]
+
+    def numbers(self, column: str) -> NDArray[np.float64]:
+        """One column as finite numbers, (rows,).
+
+        Raises
+        ------
+        InputError : no such column, or two; a cell that is not a finite number.
+        """
+        import pandas as pd
+
+        text = self.text(column)
+        value = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float)
+        bad = ~np.isfinite(value)
+        if bad.any():
+            first = int(np.argmax(bad))
+            cell = text.iloc[first].strip()
+            more = int(bad.sum()) - 1
+            problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
+            if more:
+                problem += f"; so in {more} more row{'s' * (more > 1)}"
+            raise InputError(self.path, f"line {self.lines[first]}, column {column!r}", problem)
+        return value
+
+    def constant(self, column: str) -> float:
+        """One column that holds the same number in each row.
+
+        Raises
+        ------
+        InputError : as for `numbers`, or numbers that differ.
+        """
+        value = self.numbers(column)
+        if (value != value[0]).any():
+            line = self.lines[int(np.argmax(value != value[0]))]
+            problem = f"expected the same number as in line {self.lines[0]}"
+            raise InputError(self.path, f"line {line}, column {column!r}", problem)
+        return float(value[0])
+
+    def text(self, column: str) -> pd.Series:
+        """One column as it stands in the file.
+
+        Raises
+        ------
+        InputError : no such column, or two.
+        """
+        names = [str(name) for name in self.cells.columns]
+        if names.count(column) != 1:
+            what = "appears twice" if column in names else "is missing"
+            problem = f"this column {what}; the file has: {', '.join(names)[:300]}"
+            raise InputError(self.path, f"column {column!r}", problem)
+        return self.cells[column]
+
+    def rows(self, keep: NDArray[np.bool_]) -> Table:
+        """The table with only the rows where `keep` (rows,) is true."""
+        return Table(self.path, self.cells[keep], self.lines[keep])
+
+
+def read_table(path: Path | str, comment: str = "#") -> Table:
+    """Read a table with a header line; blank lines and those that start with `comment` are skipped.
+
+    Raises
+    ------
+    InputError : no such file, not text, empty, a row with too many cells.
+    """
+    import pandas as pd
+
+    path = Path(path)
+    numbered = _content(path, comment)
+    if len(numbered) < 2:
+        found = "only a header line" if numbered else "nothing"
+        problem = f"expected a header line and rows of numbers, found {found}"
+        raise InputError(path, "", problem)
+    lines = np.array([number for number, _ in numbered])
+    body = StringIO("\n".join(text for _, text in numbered))
+    try:
+        # Everything as text: what is not a number is then found with its line. header=None:
+        # with a header, pandas takes surplus first cells for row names and shifts the rest.
+        # C engine, and no quoting across lines, so that rows and lines stay in step.
+        cells = pd.read_csv(
+            body, header=None, dtype=str, keep_default_na=False, skip_blank_lines=False
+        )
+    except (ValueError, OverflowError) as error:
+        raise InputError(path, _where(error, lines), _what(error)) from None
+    if len(cells) != len(lines):
+        raise InputError(path, "", "a quotation mark that is opened and not closed on its line")
+    cells = cells.fillna("")
+    header = [str(name).strip() for name in cells.iloc[0]]
+    return Table(path, cells.iloc[1:].set_axis(header, axis=1), lines[1:])
+
+
+def _content(path: Path, comment: str) -> list[tuple[int, str]]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(path, "", "no such file") from None
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        problem = "is not text in UTF-8; save it as a comma-separated table"
+        raise InputError(path, "", problem) from None
+    if "\0" in text:
+        raise InputError(path, "", "is not a text file; save it as a comma-separated table")
+    kept = enumerate(re.split("\r\n|\r|\n", text), start=1)
+    return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
+
+
+def _where(error: Exception, lines: NDArray[np.intp]) -> str:
+    """pandas counts the lines that it was given; say the file's own number."""
+    found = re.search(r"(line|row) (\d+)", str(error))
+    if not found:
+        return ""
+    # "row" counts from 0, "line" from 1.
+    index = int(found[2]) - (found[1] == "line")
+    return f"line {lines[min(max(index, 0), len(lines) - 1)]}"
+
+
+def _what(error: Exception) -> str:
+    found = re.search(r"Expected (\d+) fields in line \d+, saw (\d+)", str(error))
+    if found:
+        return f"expected {found[1]} cells as in the header, found {found[2]}"
+    if "EOF inside string" in str(error):
+        return "a quotation mark that is opened and not closed"
+    return f"is not a comma-separated table ({' '.join(str(error).split())[:200]})"
+
+
+def write_table(path: Path | str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Write a comma-separated table; floats so that they read back exactly.
+
+    Raises
+    ------
+    OSError : the file cannot be written; what was there may be lost.
+    """
+    with open(path, "w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows([repr(c) if isinstance(c, float) else c for c in row] for row in rows)
