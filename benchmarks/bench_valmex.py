@@ -14,7 +14,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-
 from bubblefit.cli.bubble_results import assess
 from bubblefit.cli.bubble_setup import bubble_problem, bubble_setup
 from bubblefit.cli.options import cores

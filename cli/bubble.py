@@ -17,7 +17,8 @@ from ..identification.methods import METHODS, FitOptions
 from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
 from ..runs.start import StartRecord
-from .bubble_results import assess, report, summary, write_numbers
+from .bubble_figures import report
+from .bubble_results import assess, summary, write_numbers
 from .bubble_setup import bubble_problem, bubble_setup
 from .fingerprint import fingerprint
 from .options import cores, default_folder, exits

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .bubble_results import Assessment
 
 Array = NDArray[np.float64]
+NOT_MATCHED = "for the record: the fit matched the points themselves"
 BEST = 5  # fits drawn beside the known solution, as in Figs 4.9 to 4.11
 FILES = (
     ("result.json", "all numbers of this page, for programs"),
@@ -156,7 +157,9 @@ def _tables(project: BubbleProject, setup: BubbleSetup, found: Assessment) -> li
             for p, s in zip(kilo, setup.surfaces, strict=True)
         ]
         title = f"R² of the surfaces of degree {project.match_degree} (Table 4.1)"
-        tables.append(Table(title, header, text))
+        tables.append(
+            Table(title, header, text, "" if project.match_by == "surfaces" else NOT_MATCHED)
+        )
     if found.certainty is not None:
         sure = found.certainty
         body: list[list[object]] = [

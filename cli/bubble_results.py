@@ -23,7 +23,6 @@ from ..materials.law import HypoelasticLaw
 from ..runs.folder import RESULT, OutputFolder
 from ..runs.start import StartRecord
 from ..writing import replacing
-from .bubble_figures import report as report
 from .bubble_setup import BubbleSetup
 from .project import BubbleProject
 

@@ -32,8 +32,8 @@ class BubbleSetup:
     """A fit ready to run, and what its report wants to know about the data.
 
     fields : what was measured (or computed), as read; known : the law behind computed data;
-    surfaces : where matching is by surfaces; dropped : doubtful cells left out; outside : points
-    beyond the rim of the model.
+    surfaces : polynomials of them, for the match or the report; dropped : doubtful cells left
+    out; outside : points beyond the rim of the model.
     """
 
     problem: FieldProblem
@@ -69,12 +69,8 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     else:
         fields = _measured(project, project.data)
     folded = tuple(_folded(f) for f in fields) if project.symmetry == "quarter" else fields
-    surfaces: tuple[DisplacementSurface, ...] = ()
+    surfaces = _surfaces(project, fields, known is not None)
     if project.match_by == "surfaces":
-        whole = known is not None and project.symmetry == "quarter"
-        surfaces = tuple(
-            fit_surface(_mirrored(f) if whole else f, project.match_degree) for f in fields
-        )
         nodes = model.mesh.points[:, :2]
         targets = [FieldTarget(s.pressure, s.evaluate(nodes)) for s in surfaces]
         outside = 0
@@ -101,6 +97,19 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     problem = FieldProblem(model, solver, law, objective, parameters)
     dropped = sum(f.dropped for f in fields)
     return BubbleSetup(problem, fields, known, surfaces, dropped, outside)
+
+
+def _surfaces(
+    project: BubbleProject, fields: tuple[DisplacementField, ...], computed: bool
+) -> tuple[DisplacementSurface, ...]:
+    """Surfaces of every field; where they are only reported, too few points leave them out."""
+    # A computed quarter is mirrored: the thesis' surfaces are those of the full disk.
+    whole = [_mirrored(f) if computed else f for f in fields]
+    if project.match_by == "points":
+        count = min(len(f.points) for f in whole)
+        if count < (project.match_degree + 1) ** 2:
+            return ()
+    return tuple(fit_surface(f, project.match_degree) for f in whole)
 
 
 def bubble_problem(project: BubbleProject) -> FieldProblem:
