@@ -1,0 +1,126 @@
+"""Exact derivatives of the displacements against central differences of tight analyses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.base import PARAMETERS, DifferentiatingSolver
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+# Thesis Table 4.2, "solution", GPa.
+TABLE_4_2 = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
+    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+BETA = 1e3 * np.array(TABLE_4_2)
+PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
+MODEL = BubbleModel(
+    disk_mesh(100.0, 192, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
+)
+LAW = HypoelasticLaw(BETA, 0.24, [0.13, 0.13, 0.13])
+TIGHT = 1e-10
+
+
+def changed(law: HypoelasticLaw, name: str, step: float) -> tuple[HypoelasticLaw, float]:
+    """Law and pressure offset with one parameter moved."""
+    if name == "nu12":
+        return replace(law, nu12=law.nu12 + step), 0.0
+    if name == "pressure_offset":
+        return law, step
+    beta = law.beta.copy()
+    beta[int(name.removeprefix("beta_"))] += step
+    return law.with_beta(beta), 0.0
+
+
+def differences(
+    law: HypoelasticLaw, name: str, slope: np.ndarray, move: float = 0.01
+) -> np.ndarray:
+    """Central differences, extrapolated, with the step that moves the bubble by `move` mm."""
+
+    def central(step: float) -> np.ndarray:
+        ahead, behind = (
+            MembraneSolver(TIGHT).run(MODEL, moved, pressure_offset=offset).displacement
+            for moved, offset in (changed(law, name, step), changed(law, name, -step))
+        )
+        return (ahead - behind) / (2 * step)
+
+    step = move / np.abs(slope).max()
+    return (4 * central(step / 2) - central(step)) / 3
+
+
+@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_each_parameter(name: str, thickness_change: str) -> None:
+    law = replace(LAW, thickness_change=thickness_change)
+    history, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
+    assert slope.shape == (*history.displacement.shape, 1)
+    expected = differences(law, name, slope)
+    assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
+    # Not only the largest: the first frame, too, is right to 1e-5 of its own largest.
+    first = np.abs(slope[0, ..., 0] - expected[0]).max()
+    assert first < 2e-5 * np.abs(expected[0]).max()
+
+
+def test_where_the_moduli_are_held() -> None:
+    """Strains beyond a short range: held moduli still depend on the coefficients.
+
+    A small move, so that next to no point passes from one side of the kink to the other.
+    """
+    law = HypoelasticLaw(BETA, 0.24, [0.02, 0.03, 0.02])
+    for name in ("beta_4", "beta_9", "beta_1"):
+        _, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
+        expected = differences(law, name, slope, 1e-4)
+        assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_all_at_once_equals_one_by_one() -> None:
+    solver = MembraneSolver(TIGHT)
+    assert isinstance(solver, DifferentiatingSolver)
+    together = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS)[1]
+    for j, name in enumerate(PARAMETERS):
+        alone = solver.run_with_sensitivity(MODEL, LAW, [name])[1]
+        assert alone[..., 0] == pytest.approx(
+            together[..., j], rel=1e-9, abs=1e-9 * np.abs(alone).max()
+        )
+
+
+def test_a_warm_start_changes_no_derivative() -> None:
+    solver = MembraneSolver(TIGHT)
+    history, cold = solver.run_with_sensitivity(MODEL, LAW)
+    _, warm = solver.run_with_sensitivity(MODEL, LAW, guess=history.path)
+    assert warm == pytest.approx(cold, rel=1e-6, abs=1e-8 * np.abs(cold).max())
+
+
+def test_the_history_is_that_of_a_plain_run() -> None:
+    history, slope = MembraneSolver().run_with_sensitivity(MODEL, LAW)
+    plain = MembraneSolver().run(MODEL, LAW)
+    assert history.displacement == pytest.approx(plain.displacement, abs=1e-9)
+    for name in plain.reactions:
+        assert history.reactions[name] == pytest.approx(plain.reactions[name], rel=1e-6, abs=1e-4)
+    assert history.path_slope is not None
+    assert (history.path_slope[MODEL.reported] == slope).all()
+    assert (slope[:, MODEL.mesh.node_sets["rim"]] == 0).all()
+
+
+def test_fine_meshes_take_the_other_factorisation() -> None:
+    """SuperLU and the band give the same derivatives."""
+    from bubblefit.solvers.membrane import factorisation
+
+    solver = MembraneSolver(TIGHT)
+    band = solver.run_with_sensitivity(MODEL, LAW)[1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(factorisation, "LARGEST_BAND", 0)
+        sparse = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, LAW)[1]
+    assert sparse == pytest.approx(band, rel=1e-5, abs=1e-8 * np.abs(band).max())
+
+
+def test_an_unknown_parameter_is_named() -> None:
+    with pytest.raises(InputError, match="beta_12"):
+        MembraneSolver().run_with_sensitivity(MODEL, LAW, ["beta_12"])
