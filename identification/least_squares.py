@@ -21,6 +21,7 @@ FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
 SETTLED = 1e-4  # relative decrease that counts as no progress ...
 PATIENCE = 3  # ... when it happens so often in a row
+SAME = 1e-5  # e of the same equilibrium, found twice
 MOST_REWEIGHTED = 40  # analyses of the second stage
 
 
@@ -34,16 +35,31 @@ def levenberg_marquardt(
     point = problem.evaluate(start, True)
     if point is None:
         return None
+    best, status = _both_stages(problem, point, tolerance, max_analyses)
+    if best.value < tolerance:
+        return Optimum(best, status, problem.analyses)
+    # A soft membrane can fold: make sure that the fit did not settle on a branch that only its
+    # own warm starts reach. What a card promises has to be found from the flat state.
+    cold = problem.evaluate(best.unknowns, True, warm=False)
+    if cold is not None and abs(cold.value - best.value) <= SAME * best.value:
+        return Optimum(cold, status, problem.analyses)
+    problem.warm_starts = False
+    again = cold if cold is not None else problem.evaluate(start, True)
+    if again is None:
+        return None
+    limit = max_analyses + problem.analyses
+    best, status = _both_stages(problem, again, tolerance, limit)
+    return Optimum(best, status, problem.analyses)
+
+
+def _both_stages(
+    problem: FieldProblem, point: Evaluation, tolerance: float, max_analyses: int
+) -> tuple[Evaluation, str]:
     best, status = _descend(problem, point, tolerance, max_analyses, reweighted=False)
-    if status == "settled":
-        # Settled above the tolerance: make sure that it is not the warm start's own branch.
-        cold = problem.evaluate(best.unknowns, True, warm=False)
-        if cold is not None and abs(cold.value - best.value) > 1e-6 * best.value:
-            best, status = _descend(problem, cold, tolerance, max_analyses, reweighted=False)
     if status == "settled":
         limit = min(max_analyses, problem.analyses + MOST_REWEIGHTED)
         best, status = _descend(problem, best, tolerance, limit, reweighted=True)
-    return Optimum(best, status, problem.analyses)
+    return best, status
 
 
 def _descend(

@@ -143,6 +143,7 @@ def nlopt_minimise(
 
     The returned point is the best feasible one seen, whatever NLopt itself says.
     """
+    problem.warm_starts = False  # e has to be a function of the point alone
     first = problem.evaluate(start, False)
     if first is None:
         return None

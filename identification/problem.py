@@ -55,11 +55,12 @@ class FieldProblem:
     parameters: ModuliParameters
     watch: Watch | None = None
     analyses: int = 0
+    warm_starts: bool = True
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
 
     def reset(self) -> None:
         """Forget the warm start and the count: every start of a study begins alike."""
-        self.analyses, self._last = 0, None
+        self.analyses, self._last, self.warm_starts = 0, None, True
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run the model at unknowns y; None when the analysis did not end well (Eq. 4.9).
@@ -100,7 +101,7 @@ class FieldProblem:
         return [*names, "pressure_offset"] if self.parameters.pressure_offset else names
 
     def _guess(self, y: Array, warm: bool) -> Array | None:
-        if not warm or self._last is None:
+        if not (warm and self.warm_starts) or self._last is None:
             return None
         before, path, slope = self._last
         change = slope @ self._solver_steps(y - before)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import os
 from collections.abc import Iterable, Sequence
+from io import FileIO
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from ..errors import InputError, OutputError
 from .start import EvaluationRecord, StartRecord
@@ -26,9 +28,8 @@ class OutputFolder:
     def __init__(self, path: Path, modulus_unit: str, modulus_scale: float) -> None:
         self.path = path
         self.modulus_unit, self.modulus_scale = modulus_unit, modulus_scale
-        self._history: IO[str] | None = None
-        self._starts: IO[str] | None = None
-        self._rows = 0
+        self._history: FileIO | None = None
+        self._starts: FileIO | None = None
 
     def begin(
         self, fingerprint: str, columns: Sequence[str], resume: bool, overwrite: bool
@@ -63,8 +64,9 @@ class OutputFolder:
             lines = [json.dumps(record.to_json()) + "\n" for record in done.values()]
             self.write(STARTS, "".join(lines))
             self.write(HISTORY, _table([self.header(columns), *kept]))
-            self._starts = open(self.path / STARTS, "a", encoding="utf-8")
-            self._history = open(self.path / HISTORY, "a", encoding="utf-8", newline="")
+            # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
+            self._starts = open(self.path / STARTS, "ab", buffering=0)
+            self._history = open(self.path / HISTORY, "ab", buffering=0)
         return done
 
     def header(self, columns: Sequence[str]) -> list[str]:
@@ -77,15 +79,13 @@ class OutputFolder:
         assert self._history is not None and self._starts is not None
         with _telling(self.path):
             if isinstance(record, StartRecord):
-                self._starts.write(json.dumps(record.to_json()) + "\n")
-                self._starts.flush()
+                _append(self._starts, json.dumps(record.to_json()) + "\n")
                 os.fsync(self._starts.fileno())
                 return
             coefficients = [repr(c / self.modulus_scale) for c in record.coefficients]
             value = "" if record.objective is None else repr(record.objective)
             row = [record.start, record.analysis, value, record.status, *coefficients]
-            self._history.write(_table([[*row, *map(repr, record.nuisance)]]))
-            self._history.flush()
+            _append(self._history, _table([[*row, *map(repr, record.nuisance)]]))
 
     def finish(self) -> None:
         """Close the running files and put history.csv in order of start and analysis."""
@@ -154,6 +154,13 @@ class OutputFolder:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
         return [row for row in csv.reader(io.StringIO(whole)) if row]
+
+
+def _append(stream: FileIO, text: str) -> None:
+    content = text.encode()
+    if stream.write(content) != len(content):
+        # The rest would not fit; a last line without its end is left out when it is read.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _table(rows: Iterable[Sequence[Any]]) -> str:

@@ -72,7 +72,7 @@ def test_a_study_writes_everything_it_promises(study):
     history = pd.read_csv(out / "history.csv")
     assert len(history) == result["analyses"]
     surfaces = pd.read_csv(out / "surfaces.csv")
-    assert len(surfaces) == 21 and surfaces["r_squared"].min() > 0.99
+    assert len(surfaces) == 21 and surfaces["R2"].min() > 0.99
     for name in ("optima.png", "moduli.png", "profiles.png", "heights.png", "report.html"):
         assert (out / name).stat().st_size > 1000, name
     assert (out / "bubble.vtu").read_bytes().startswith(b"<?xml")
@@ -218,8 +218,8 @@ def test_bad_data_names_file_and_line(tmp_path):
         (grid / f"test1_{i:02d}.csv").write_text(rows)
     run = ("bubble", "m/test1-linear.toml", "--data", "data", "--out", "out")
     for content, words in (
-        ("", "is empty"),
-        ("x,y,dx,dy,dz,flag\n", "no rows"),
+        ("", "header"),
+        ("x,y,dx,dy,dz,flag\n", "only a header"),
         (rows.replace("15,30,", "15,nan,", 1), "line"),
         (rows.replace("dz", "w", 1), "column 'dz'"),
         ("\x00\x01binary", "test1_07.csv"),
