@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 #: Layers of the ring for each division of the core, at least and at most: beyond, elements are
 #: drawn out.
-THINNEST, THICKEST = 1 / 3, 3 / 4
+THINNEST, THICKEST = 1 / 3, 1.0
 #: Radial size of the ring's elements over the size of the core's; 1.2 keeps the largest element
 #: of the thesis' mesh within 2.3 times the smallest.
 RING_TO_CORE = 1.2

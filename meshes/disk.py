@@ -30,7 +30,8 @@ def disk_mesh(
     ----------
     radius : mm.
     elements : quads wanted on the FULL disk, 8 or more (the thesis: 800). The mesh has the
-        nearest number with well-shaped elements, four times that of a quarter; 800 gives 800.
+        nearest number that well-shaped elements allow, four times that of a quarter: 800 gives
+        800, and the gap is at most 16 quads below 200 and 7 % above.
     symmetry : the whole disk, or the quarter x, y >= 0 with a fourth of the elements. The whole
         is the quarter mirrored.
     generator : `blocks` is our own and needs nothing; `gmsh` loads that program's library.
