@@ -28,6 +28,10 @@ class InputError(BubblefitError):
         where = ": ".join(str(part) for part in (path, field) if part)
         super().__init__(f"{where}: {problem}" if where else problem)
 
+    def __reduce__(self) -> tuple:
+        """As for SolverFailure: rebuilt from the fields on the other side of a process border."""
+        return type(self), (self.path, self.field, self.problem)
+
 
 class OutputError(BubblefitError):
     """The output folder cannot be written (read-only, full, in use)."""

@@ -137,7 +137,9 @@ class OutputFolder:
     def _finished(self) -> dict[int, StartRecord]:
         path = self.path / STARTS
         done: dict[int, StartRecord] = {}
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        # A crash can leave bytes that are no text where the last line should be.
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        lines = text.splitlines()
         for i, line in enumerate(lines):
             try:
                 record = StartRecord.from_json(json.loads(line))
@@ -151,7 +153,7 @@ class OutputFolder:
 
     def _rows_read(self) -> list[list[str]]:
         path = self.path / HISTORY
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
         return [row for row in csv.reader(io.StringIO(whole)) if row]
 

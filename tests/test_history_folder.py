@@ -1,0 +1,331 @@
+"""The output folder and the processes: what survives a kill, and what resume makes of it."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bubblefit.errors import BubblefitError, InputError, OutputError, SolverFailure
+from bubblefit.identification.methods import FitOptions
+from bubblefit.identification.objective import FieldObjective, FieldTarget
+from bubblefit.identification.parameters import ModuliParameters
+from bubblefit.identification.problem import FieldProblem
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel
+from bubblefit.runs.folder import HISTORY, RESULT, RUN, STARTS, OutputFolder
+from bubblefit.runs.processes import run_starts
+from bubblefit.runs.start import EvaluationRecord, StartRecord
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+COLUMNS = ["beta_3", "beta_7", "beta_11"]
+
+
+def evaluation(start: int, analysis: int, value: float | None = 0.5) -> EvaluationRecord:
+    return EvaluationRecord(start, analysis, value, "ok", (12.0, 250.0, 1e3 / 3), ())
+
+
+def finished(number: int, value: float | None = 0.1) -> StartRecord:
+    return StartRecord(
+        number, (1, number), value, "converged", 7, (0.1, 1 / 3), (12.0, 250.0, 400.0), 1.5
+    )
+
+
+def folder_at(path: Path) -> OutputFolder:
+    return OutputFolder(path, "GPa", 1000.0)
+
+
+def begin(folder: OutputFolder, fingerprint: str = "a", **how: bool) -> dict[int, StartRecord]:
+    return folder.begin(fingerprint, COLUMNS, how.get("resume", False), how.get("overwrite", False))
+
+
+def study(path: Path) -> OutputFolder:
+    """Starts 0 and 1 finished, start 2 under way: then the process is killed."""
+    folder = folder_at(path)
+    assert begin(folder) == {}
+    for start in (1, 0, 2):
+        for analysis in (1, 2):
+            folder.add(evaluation(start, analysis))
+        if start < 2:
+            folder.add(finished(start))
+    return folder
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with open(path / HISTORY, encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+# Written while running
+
+
+def test_rows_are_on_disk_before_anything_is_closed(tmp_path: Path) -> None:
+    study(tmp_path)
+    assert [(r["start"], r["analysis"]) for r in rows(tmp_path)] == [
+        ("1", "1"), ("1", "2"), ("0", "1"), ("0", "2"), ("2", "1"), ("2", "2"),
+    ]  # fmt: skip
+    first = rows(tmp_path)[0]
+    assert float(first["beta_11_GPa"]) == 1 / 3  # to the last bit
+    assert float(first["objective"]) == 0.5 and first["status"] == "ok"
+    lines = (tmp_path / STARTS).read_text().splitlines()
+    assert [StartRecord.from_json(json.loads(line)) for line in lines] == [
+        finished(1),
+        finished(0),
+    ]
+    assert not (tmp_path / RESULT).exists()
+
+
+def test_failed_analyses_have_an_empty_objective(tmp_path: Path) -> None:
+    folder = folder_at(tmp_path)
+    begin(folder)
+    folder.add(EvaluationRecord(0, 1, None, 'said, "no"', (1.0, 2.0, 3.0), ()))
+    assert rows(tmp_path)[0]["objective"] == ""
+    assert rows(tmp_path)[0]["status"] == 'said, "no"'
+
+
+def test_finish_puts_history_in_order(tmp_path: Path) -> None:
+    folder = study(tmp_path)
+    folder.finish()
+    order = [(int(r["start"]), int(r["analysis"])) for r in rows(tmp_path)]
+    assert order == sorted(order) and len(order) == 6
+    folder.close()  # harmless
+
+
+@given(
+    st.one_of(st.none(), st.floats(0, 1e9)),
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=12),
+    st.text(max_size=20),
+)
+def test_start_records_survive_json(value: Any, unknowns: list[float], status: str) -> None:
+    record = StartRecord(3, (1, 3), value, status, 9, tuple(unknowns), tuple(unknowns), 0.1)
+    assert StartRecord.from_json(json.loads(json.dumps(record.to_json()))) == record
+
+
+# Resume
+
+
+def test_resume_keeps_finished_starts_and_drops_the_unfinished(tmp_path: Path) -> None:
+    study(tmp_path)
+    folder = folder_at(tmp_path)
+    done = begin(folder, resume=True)
+    assert done == {0: finished(0), 1: finished(1)}
+    assert {r["start"] for r in rows(tmp_path)} == {"0", "1"}
+    folder.add(evaluation(2, 1))
+    folder.add(finished(2))
+    folder.finish()
+    assert [r["start"] for r in rows(tmp_path)] == ["0", "0", "1", "1", "2"]
+    assert begin(folder_at(tmp_path), resume=True).keys() == {0, 1, 2}
+
+
+@pytest.mark.parametrize("cut", range(1, 60, 7))
+def test_a_truncated_last_line_is_run_again(tmp_path: Path, cut: int) -> None:
+    study(tmp_path)
+    for name in (STARTS, HISTORY):
+        content = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(content[:-cut])
+    done = begin(folder_at(tmp_path), resume=True)
+    assert done.keys() <= {0, 1} and done[1] == finished(1)
+    # Without its end of line a record is still whole.
+    assert (0 in done) == (cut == 1)
+    for row in rows(tmp_path):
+        assert None not in row and None not in row.values()
+        assert np.isfinite(float(row["beta_11_GPa"]))
+
+
+@given(st.integers(0, 10_000), st.integers(0, 10_000))
+@settings(max_examples=60, deadline=None)
+def test_cut_anywhere_resume_works_or_says_why(first: int, second: int) -> None:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name)
+        study(path).close()
+        for file, cut in ((STARTS, first), (HISTORY, second)):
+            content = (path / file).read_bytes()
+            (path / file).write_bytes(content[: cut % (len(content) + 1)])
+        folder = folder_at(path)
+        done = begin(folder, resume=True)
+        folder.close()
+        assert all(record == finished(number) for number, record in done.items())
+        assert {r["start"] for r in rows(path)} <= {str(number) for number in done}
+
+
+def test_a_damaged_middle_line_is_an_error(tmp_path: Path) -> None:
+    study(tmp_path)
+    lines = (tmp_path / STARTS).read_text().splitlines()
+    (tmp_path / STARTS).write_text(lines[0][:20] + "\n" + lines[1] + "\n")
+    with pytest.raises(InputError, match=r"starts.jsonl: line 1: .*--overwrite"):
+        begin(folder_at(tmp_path), resume=True)
+
+
+def test_another_study_is_not_resumed(tmp_path: Path) -> None:
+    study(tmp_path)
+    with pytest.raises(InputError, match=r"fingerprint: .*another project"):
+        begin(folder_at(tmp_path), "b", resume=True)
+    assert len(rows(tmp_path)) == 6
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b"3", b"\xff\xfe", b'{"x": 1}'])
+def test_a_damaged_fingerprint_is_said(tmp_path: Path, content: bytes) -> None:
+    study(tmp_path)
+    (tmp_path / RUN).write_bytes(content)
+    with pytest.raises(InputError, match=r"run.json"):
+        begin(folder_at(tmp_path), resume=True)
+
+
+def test_bytes_that_are_no_text_do_not_end_in_a_traceback(tmp_path: Path) -> None:
+    """A disk that filled up or a crash can leave blocks of anything at the end of a file."""
+    for name in (STARTS, HISTORY):
+        study(tmp_path / name).close()
+        with open(tmp_path / name / name, "ab") as stream:
+            stream.write(b"\x00\xff\xfe")
+        done = begin(folder_at(tmp_path / name), resume=True)
+        assert done.keys() == {0, 1}
+
+
+def test_resume_removes_an_old_result(tmp_path: Path) -> None:
+    folder = study(tmp_path)
+    folder.write(RESULT, "{}")
+    begin(folder_at(tmp_path), resume=True)
+    assert not (tmp_path / RESULT).exists()
+
+
+def test_resume_in_an_empty_folder_begins(tmp_path: Path) -> None:
+    assert begin(folder_at(tmp_path / "new"), resume=True) == {}
+    assert (tmp_path / "new" / RUN).exists()
+
+
+def test_a_folder_in_use_is_not_written_over(tmp_path: Path) -> None:
+    study(tmp_path)
+    with pytest.raises(OutputError, match=r"--resume.*--overwrite"):
+        begin(folder_at(tmp_path))
+    assert len(rows(tmp_path)) == 6
+    assert begin(folder_at(tmp_path), "b", overwrite=True) == {}
+    assert rows(tmp_path) == []
+
+
+# Disks that cannot be written
+
+
+def test_a_path_under_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"cannot write the output folder.*--out"):
+        begin(folder_at(tmp_path / "file" / "out"))
+    with pytest.raises(OutputError, match="--out"):
+        begin(folder_at(tmp_path / "file"))
+
+
+def test_a_folder_that_takes_no_files() -> None:
+    if not Path("/proc/self").is_dir():
+        pytest.skip("no /proc here: nothing that is read-only even to root")
+    with pytest.raises(OutputError, match="--out") as caught:
+        begin(folder_at(Path("/proc/self/out")))
+    assert caught.value.exit_code == 2 and "\n" not in str(caught.value)
+
+
+def test_a_full_disk_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = study(tmp_path)
+    folder.write(RESULT, "before")
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError, match="No space left"):
+        folder.write(RESULT, "after")
+    with pytest.raises(OutputError, match="No space left"):
+        folder.add(finished(2))
+    monkeypatch.undo()
+    assert (tmp_path / RESULT).read_text() == "before"
+    assert not list(tmp_path.glob("*.part"))
+
+
+# Processes
+
+
+MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
+KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
+LINEAR = ModuliParameters(
+    0, np.array([1.0, 50.0, 50.0]), np.array([100.0, 1000.0, 1500.0]), [0.13] * 3, 5.0, 0.5
+)
+
+
+def build(solver: MembraneSolver | None = None) -> FieldProblem:
+    fields = MembraneSolver().run(MODEL, KNOWN).displacement
+    data = [FieldTarget(p, u) for p, u in zip(MODEL.pressures, fields, strict=True)]
+    return FieldProblem(MODEL, solver or MembraneSolver(), KNOWN, FieldObjective(data), LINEAR)
+
+
+def study_with(jobs: int, numbers: list[int]) -> dict[int, tuple]:
+    ends: dict[int, tuple] = {}
+    analyses: dict[int, list[int]] = {n: [] for n in numbers}
+    for record in run_starts(build, FitOptions(max_analyses=60), 5, numbers, jobs):
+        if isinstance(record, StartRecord):
+            assert len(analyses[record.number]) == record.analyses
+            ends[record.number] = (record.objective, record.unknowns, record.analyses)
+        elif record is not None:
+            analyses[record.start].append(record.analysis)
+    for told in analyses.values():
+        assert told == list(range(1, len(told) + 1))
+    return ends
+
+
+def test_jobs_and_order_do_not_change_a_start() -> None:
+    alone = study_with(1, [0, 1, 2, 3])
+    assert all(value < 1e-6 for value, _, _ in alone.values())
+    assert study_with(2, [3, 0, 1, 2]) == alone
+    assert study_with(1, [2])[2] == alone[2]
+
+
+class Dying(MembraneSolver):
+    def _inflate(self, *arguments: Any) -> Any:
+        os._exit(9)
+
+
+class Broken(MembraneSolver):
+    def _inflate(self, *arguments: Any) -> Any:
+        raise InputError("mesh.vtu", "quads", "made to fail")
+
+
+def build_dying() -> FieldProblem:
+    return build(Dying())
+
+
+def build_broken() -> FieldProblem:
+    return build(Broken())
+
+
+def build_failing() -> FieldProblem:
+    raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
+
+
+def test_a_process_that_dies_is_noticed() -> None:
+    with pytest.raises(BubblefitError, match="--resume") as caught:
+        list(run_starts(build_dying, FitOptions(), 1, [0, 1], 2))
+    assert caught.value.exit_code == 4
+
+
+def test_errors_cross_the_process_border_whole() -> None:
+    with pytest.raises(SolverFailure, match="no licence") as failure:
+        list(run_starts(build_failing, FitOptions(), 1, [0, 1], 2))
+    assert failure.value.exit_number == 3004 and failure.value.scratch == Path("/tmp/scratch")
+    with pytest.raises(InputError, match=r"mesh.vtu: quads: made to fail") as caught:
+        list(run_starts(build_broken, FitOptions(), 1, [0, 1], 2))
+    assert caught.value.field == "quads"
+
+
+def test_the_processes_end_when_the_reader_stops() -> None:
+    import multiprocessing
+
+    running = run_starts(build, FitOptions(max_analyses=60), 5, [0, 1, 2, 3], 2)
+    next(running)
+    running.close()
+    assert not multiprocessing.active_children()
