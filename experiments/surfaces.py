@@ -132,7 +132,10 @@ def _read(table: Table) -> DisplacementSurface:
         raise InputError(table.path, at, f"expected a scale above 0 mm, got {scale:g}")
     falling = total_power(int(degree))
     physical = np.stack([table.numbers(f"C{i}") for i in range(len(falling))], axis=1)
-    coefficients = physical * scale**falling
+    with np.errstate(over="ignore"):
+        coefficients = physical * scale**falling
+    if not np.isfinite(coefficients).all():
+        raise InputError(table.path, at, f"coefficients too large for a scale of {scale:g} mm")
     return DisplacementSurface(pressure, int(degree), coefficients, scale, table.numbers("R2"))
 
 
