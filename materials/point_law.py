@@ -50,7 +50,8 @@ def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
     """
     r = q * q + c * c
     det = m * m - r
-    if not (m > 0.0 and det > 1e-9 * m * m):
+    # Below 1e-20 the powers of m in the derivatives underflow.
+    if not (m > 1e-20 and det > 1e-9 * m * m):
         return False
     f, f1 = _atanh_ratio(r / (m * m))
     b = f / m
