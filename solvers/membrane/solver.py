@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 MOST_CUTS = 6
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
-# each other made an analysis 290 times slower (benchmarks/bench_analysis.py).
+# each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
 BLAS = ThreadpoolController()
 # Heights tried for the first increment, as multiples of the estimate.
 FIRST_HEIGHTS = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
