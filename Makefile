@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-# pip leaves room for a busy registry.
+# Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
 .PHONY: demo test lint bench clean
@@ -20,15 +20,17 @@ test: $(READY)
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy .
+	MYPYPATH=$(VENV)/typing $(BIN)/mypy -p bubblefit
 
 bench: $(READY)
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
-$(READY): pyproject.toml
+# The link tells mypy that this folder, whatever its name, is the package bubblefit.
+$(READY): pyproject.toml .ci/venv
 	@PYTHON="$(PYTHON)" VENV="$(VENV)" sh .ci/venv
 	$(PIP) --editable '.[dev]'
+	@mkdir -p $(VENV)/typing && ln -sfn ../.. $(VENV)/typing/bubblefit
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) out/demo build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
