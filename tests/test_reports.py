@@ -25,7 +25,7 @@ from bubblefit.reports import (
 )
 from bubblefit.reports.cuts import node_cut, point_cut
 from bubblefit.reports.html import number, percent
-from bubblefit.reports.writing import replacing
+from bubblefit.writing import replacing
 
 PRESSURES = np.array([0.022, 0.186, 0.3])
 
