@@ -19,7 +19,7 @@ def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
     """Unknowns of random start `number` of the study `seed`: the same on any machine.
 
     Coefficients are drawn evenly between their bounds until the moduli are positive over the
-    strain range and the analysis ends well.
+    strain range and the analysis ends well, in a stable equilibrium.
 
     Raises
     ------
@@ -34,7 +34,8 @@ def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
         for coefficients in draws[(draws @ grid.T >= margin).all(axis=1)]:
             tried += 1
             y = p.unknowns(coefficients)
-            if problem.evaluate(y, False, warm=False) is not None:
+            point = problem.evaluate(y, False, warm=False)
+            if point is not None and point.stable:
                 return y
             if tried >= MOST_ANALYSES:
                 raise NoFeasibleStart(

@@ -1,9 +1,9 @@
-"""Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
+"""One descent of Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
 
 Damping is scaled by diag(J'J) (Marquardt), modulus values at Chebyshev points are the unknowns,
-positivity and coefficient bounds the constraints, so every iterate is feasible. The merit is the
-sum of squared blocks while e is far from its least; once that has settled at a residual that is
-not zero, the blocks are reweighted so that e itself (a sum of norms, Eq. 4.8) is minimised.
+positivity and coefficient bounds the constraints, so every iterate is feasible; and every iterate
+is a stable equilibrium (Eq. 4.9's "analysis ends well"): a soft membrane can fold, and what no
+test under pressure can show must not lead the fit astray.
 """
 
 from __future__ import annotations
@@ -12,63 +12,30 @@ import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
-from .optimum import Optimum
 from .problem import Evaluation, FieldProblem
 
 Array = NDArray[np.float64]
 
 FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
+NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
 SETTLED = 1e-4  # relative decrease that counts as no progress ...
 PATIENCE = 3  # ... when it happens so often in a row
-SAME = 1e-5  # e of the same equilibrium, found twice
-MOST_REWEIGHTED = 40  # analyses of the second stage
 
 
-def levenberg_marquardt(
-    problem: FieldProblem, start: Array, tolerance: float, max_analyses: int
-) -> Optimum | None:
-    """Fit from the unknowns `start`; None when the analysis at the start fails.
-
-    Stops when e is below `tolerance`, on no progress, or after `max_analyses`.
-    """
-    point = problem.evaluate(start, True)
-    if point is None:
-        return None
-    best, status = _both_stages(problem, point, tolerance, max_analyses)
-    if best.value < tolerance:
-        return Optimum(best, status, problem.analyses)
-    # A soft membrane can fold: make sure that the fit did not settle on a branch that only its
-    # own warm starts reach. What a card promises has to be found from the flat state.
-    cold = problem.evaluate(best.unknowns, True, warm=False)
-    if cold is not None and abs(cold.value - best.value) <= SAME * best.value:
-        return Optimum(cold, status, problem.analyses)
-    problem.warm_starts = False
-    again = cold if cold is not None else problem.evaluate(start, True)
-    if again is None:
-        return None
-    limit = max_analyses + problem.analyses
-    best, status = _both_stages(problem, again, tolerance, limit)
-    return Optimum(best, status, problem.analyses)
-
-
-def _both_stages(
-    problem: FieldProblem, point: Evaluation, tolerance: float, max_analyses: int
-) -> tuple[Evaluation, str]:
-    best, status = _descend(problem, point, tolerance, max_analyses, reweighted=False)
-    if status == "settled":
-        limit = min(max_analyses, problem.analyses + MOST_REWEIGHTED)
-        best, status = _descend(problem, best, tolerance, limit, reweighted=True)
-    return best, status
-
-
-def _descend(
+def descend(
     problem: FieldProblem,
     point: Evaluation,
     tolerance: float,
     max_analyses: int,
-    reweighted: bool,
+    reweighted: bool = False,
+    held: slice | None = None,
 ) -> tuple[Evaluation, str]:
+    """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
+
+    `reweighted`: minimise e itself, not the sum of squared blocks; `held` unknowns stay.
+    Returns the last (best) point and "converged", "settled" or "analyses used up".
+    """
     a, c = problem.parameters.inequalities
     damping, growth, idle = FIRST_DAMPING, 2.0, 0
     scale: Array | None = None
@@ -77,22 +44,30 @@ def _descend(
             return point, "converged"
         root = _block_weights(problem, point, reweighted)
         r, j = point.residual * root, _jacobian(point) * root[:, None]
+        if held is not None:
+            j[:, held] = 0.0
         merit = float(r @ r)
         curvature = j.T @ j
         diagonal = np.diag(curvature) + 1e-14 * np.trace(curvature)
+        if held is not None:
+            diagonal[held] = 1e6 * np.trace(curvature)
         # Half-life of one iteration: directions that went flat keep some damping.
         scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
         gradient = j.T @ r
         for _ in range(MOST_TRIALS):
             if problem.analyses >= max_analyses:
                 return point, "analyses used up"
-            step = _step(curvature + damping * np.diag(scale), gradient, a, c, point.unknowns)
+            step = bounded_step(
+                curvature + damping * np.diag(scale), gradient, a, c, point.unknowns
+            )
             if step is None:
                 damping *= 10.0
                 continue
             predicted = -(2.0 * gradient @ step + step @ curvature @ step)
+            if predicted < NEGLIGIBLE * merit:
+                return point, "settled" if not reweighted else "converged"
             trial = problem.evaluate(point.unknowns + step, True)
-            if trial is not None:
+            if trial is not None and trial.stable:
                 gained = merit - float(np.sum((trial.residual * root) ** 2))
                 if gained > 0:
                     break
@@ -125,7 +100,7 @@ def _block_weights(problem: FieldProblem, point: Evaluation, reweighted: bool) -
     return np.asarray(1.0 / np.sqrt(norms))[problem.objective.block]
 
 
-def _step(hessian: Array, gradient: Array, a: Array, c: Array, y: Array) -> Array | None:
+def bounded_step(hessian: Array, gradient: Array, a: Array, c: Array, y: Array) -> Array | None:
     """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer."""
     unit = 1.0 / np.sqrt(np.diag(hessian))
     scaled = hessian * unit[:, None] * unit[None, :]

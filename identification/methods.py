@@ -8,7 +8,7 @@ from typing import Literal
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .least_squares import levenberg_marquardt
+from .fit import levenberg_marquardt
 from .nonlinear import NloptOptions, nlopt_minimise
 from .optimum import Optimum
 from .problem import FieldProblem

@@ -32,6 +32,11 @@ class Evaluation:
     jacobian: Array | None
     history: History
 
+    @property
+    def stable(self) -> bool:
+        """Not known to be an unstable equilibrium, which no test under pressure can show."""
+        return self.history.stable is not False
+
 
 #: Called after every analysis with unknowns, e (None when it failed), and what happened.
 Watch = Callable[[Array, float | None, str], None]
@@ -55,12 +60,14 @@ class FieldProblem:
     parameters: ModuliParameters
     watch: Watch | None = None
     analyses: int = 0
+    unstable: int = 0  # of them, ended in an equilibrium that no test can show
     warm_starts: bool = True
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
 
     def reset(self) -> None:
         """Forget the warm start and the count: every start of a study begins alike."""
-        self.analyses, self._last, self.warm_starts = 0, None, True
+        self.analyses, self.unstable, self.warm_starts = 0, 0, True
+        self._last = None
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run the model at unknowns y; None when the analysis did not end well (Eq. 4.9).
@@ -68,14 +75,15 @@ class FieldProblem:
         `warm`: start each increment from the last differentiated solution and its slope.
         """
         self.analyses += 1
+        guess = self._guess(y, warm)
         beta = self.parameters.beta(y)
         offset, pressure = self.parameters.offsets(y)
         law = self.law.with_beta(beta)
         try:
             if with_jacobian:
-                history, slope = self._differentiated(y, law, pressure, warm)
+                history, slope = self._differentiated(y, law, pressure, guess)
             else:
-                history, slope = self._plain(y, law, pressure, warm), None
+                history, slope = self._plain(law, pressure, guess), None
         except SolverFailure as failure:
             self._report(y, None, failure.reason)
             return None
@@ -88,9 +96,10 @@ class FieldProblem:
             jacobian = self._chain(slope)
         value = self.objective.value(residual)
         self._report(y, value, "ok")
-        return Evaluation(
-            y.copy(), beta[self.parameters.places], residual, value, jacobian, history
-        )
+        coefficients = beta[self.parameters.places]
+        point = Evaluation(y.copy(), coefficients, residual, value, jacobian, history)
+        self.unstable += not point.stable
+        return point
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:
@@ -119,20 +128,19 @@ class FieldProblem:
         return np.asarray(step)
 
     def _differentiated(
-        self, y: Array, law: HypoelasticLaw, pressure: float, warm: bool
+        self, y: Array, law: HypoelasticLaw, pressure: float, guess: Array | None
     ) -> tuple[History, Array]:
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
         history, slope = self.solver.run_with_sensitivity(
-            self.model, law, self._names(), pressure, self._guess(y, warm)
+            self.model, law, self._names(), pressure, guess
         )
         if history.path is not None and history.path_slope is not None:
             self._last = (y.copy(), history.path, history.path_slope)
         return history, slope
 
-    def _plain(self, y: Array, law: HypoelasticLaw, pressure: float, warm: bool) -> History:
+    def _plain(self, law: HypoelasticLaw, pressure: float, guess: Array | None) -> History:
         if isinstance(self.solver, DifferentiatingSolver):
-            guess = self._guess(y, warm)
             return self.solver.run(self.model, law, pressure_offset=pressure, guess=guess)
         return self.solver.run(self.model, law)
 

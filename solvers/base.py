@@ -26,8 +26,9 @@ class History:
     strain_min, strain_max (3,) extremes of (eps1, eps2, gamma12) log strain; cavity pressure
     (MPa) and volume (mm^3), (frames,), where there is a cavity; path: displacement at every
     increment (increments, nodes, 3) and its derivatives path_slope (..., parameters), where the
-    solver keeps them (a start for the next run); iterations: what the solver
-    counts as its work; remarks: what a reader of the result should know.
+    solver keeps them (a start for the next run); stable: whether the equilibrium at the last load
+    is, None where the solver did not look; iterations: what the solver counts as its work;
+    remarks: what a reader of the result should know.
     """
 
     load: Array
@@ -40,6 +41,7 @@ class History:
     iterations: int = 0
     path: Array | None = None
     path_slope: Array | None = None
+    stable: bool | None = None
     remarks: tuple[str, ...] = ()
 
 

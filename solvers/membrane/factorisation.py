@@ -32,8 +32,11 @@ class Tangent(Protocol):
     data: Array
     slot: NDArray[np.int64]
 
-    def factor(self) -> None:
-        """Factorise what `data` holds; it may be overwritten. SingularTangent on failure."""
+    def factor(self, judge: bool = False) -> bool:
+        """Factorise what `data` holds. SingularTangent on failure.
+
+        With `judge`: returns whether it is positive definite, else True.
+        """
 
     def solve(self, rhs: Array) -> Array:
         """Solve for free degrees of freedom, rhs (free,) or (free, k)."""
@@ -78,11 +81,16 @@ class BandedTangent:
         self.slot[inside] = j * self.depth + 2 * width + i - j
         self.rank, self.order = rank, np.argsort(rank)
 
-    def factor(self) -> None:
+    def factor(self, judge: bool = False) -> bool:
         band = self.data.reshape((self.depth, self.size), order="F")
-        self.lu, self.pivots, info = lapack.dgbtrf(band, self.width, self.width, overwrite_ab=1)
+        self.lu, self.pivots, info = lapack.dgbtrf(band, self.width, self.width)
         if info != 0:
             raise SingularTangent
+        if not judge:
+            return True
+        # The lower half stands for the symmetric part: the two differ by a few per cent.
+        lower = np.asfortranarray(band[2 * self.width :])
+        return bool(lapack.dpbtrf(lower, lower=1, overwrite_ab=1)[1] == 0)
 
     def solve(self, rhs: Array) -> Array:
         ordered = np.asfortranarray(rhs[self.order])
@@ -108,7 +116,7 @@ class SparseTangent:
         self.data = np.zeros(len(keys))
         self.matrix = sp.csc_matrix((self.data, index, pointer), shape=(size, size))
 
-    def factor(self) -> None:
+    def factor(self, judge: bool = False) -> bool:
         self.matrix.data[:] = self.data
         try:
             self.lu = splu(
@@ -119,6 +127,11 @@ class SparseTangent:
             )
         except RuntimeError as error:
             raise SingularTangent from error
+        if not judge:
+            return True
+        # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
+        straight = np.array_equal(self.lu.perm_r, self.lu.perm_c)
+        return bool(straight and (self.lu.U.diagonal() > 0).all())
 
     def solve(self, rhs: Array) -> Array:
         return np.asarray(self.lu.solve(rhs))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from .element import ReferenceElements
 from .factorisation import SingularTangent, Tangent
@@ -31,7 +32,8 @@ class Membrane:
     """Everything an equilibrium iteration needs; strain and stress at the start and the end.
 
     reference (n, 3) mm; strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal
-    correction of one iteration.
+    correction of one iteration; keep_tangent: end every increment with the tangent of its
+    equilibrium assembled (sensitivities want it; in a chord step it costs little more).
     """
 
     reference: Array
@@ -43,6 +45,7 @@ class Membrane:
     tangent: Tangent
     tolerance: float
     step_limit: float
+    keep_tangent: bool = False
     iterations: int = 0
     strain_old: Array = field(init=False)
     stress_old: Array = field(init=False)
@@ -78,6 +81,18 @@ class Membrane:
         self.strain_old[:] = self.strain_new
         self.stress_old[:] = self.stress_new
 
+    def factor(self, judge: bool) -> bool:
+        """Factorise the tangent that `keep_tangent` left; with `judge`: is the state stable?
+
+        Raises
+        ------
+        SolverFailure : the tangent is singular, so the state is a limit point.
+        """
+        try:
+            return self.tangent.factor(judge)
+        except SingularTangent:
+            raise SolverFailure("the tangent is singular: a limit point") from None
+
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
         """Displacement (n, 3) in equilibrium at `pressure`, starting from u; None if not found."""
         u = u.copy()
@@ -86,7 +101,7 @@ class Membrane:
         last, scale, backtracks, chord = np.inf, 1.0, 0, False
         least, idle = np.inf, 0
         for _ in range(MOST_ITERATIONS):
-            norm = self.unbalance(u, pressure, with_tangent=not chord)
+            norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             if norm < self.tolerance:
                 return u
             idle = idle + 1 if 0.5 * least < norm < ROUNDING_BELOW else 0
@@ -102,7 +117,8 @@ class Membrane:
                 return None
             if chord and norm > CHORD_GAIN * last:
                 chord = False
-                self.unbalance(u, pressure, with_tangent=True)
+                if not self.keep_tangent:
+                    self.unbalance(u, pressure, with_tangent=True)
             try:
                 if not chord:
                     self.tangent.factor()

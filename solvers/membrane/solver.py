@@ -113,7 +113,7 @@ class MembraneSolver:
             )
         membrane = self._prepared[1]
         membrane.law = law
-        membrane.iterations = 0
+        membrane.keep_tangent, membrane.iterations = False, 0
         membrane.strain_old[:] = 0.0
         membrane.stress_old[:] = 0.0
         return membrane
@@ -137,11 +137,16 @@ class MembraneSolver:
         low, high = np.zeros(3), np.zeros(3)
         derivatives = _Derivatives(membrane, parameters) if parameters else None
         rates = np.zeros((len(levels), *shape, len(parameters)))
-        for i, level in enumerate(levels):
+        last = len(levels) - 1
+        stable = True
+        for i in range(last + 1):
+            membrane.keep_tangent = derivatives is not None or i == last
             u = self._increment(membrane, path, levels, i, guess)
             path[i] = u
+            if membrane.keep_tangent:
+                stable = membrane.factor(judge=i == last)
             if derivatives is not None:
-                rates[i] = derivatives.increment(u, level).reshape(*shape, -1)
+                rates[i] = derivatives.increment(u).reshape(*shape, -1)
             membrane.accept()
             forces[i] = membrane.residual.reshape(shape)
             np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
@@ -161,6 +166,7 @@ class MembraneSolver:
             iterations=membrane.iterations,
             path=path,
             path_slope=rates if parameters else None,
+            stable=stable,
         )
         return history, rates[keep]
 
@@ -197,11 +203,9 @@ class _Derivatives:
         self.point = np.empty((len(membrane.quads), 4, POINT))
         self.rate = np.empty((membrane.reference.size, len(self.which)))
 
-    def increment(self, u: Array, pressure: float) -> Array:
-        """d u / d parameters (3 n, np) at the equilibrium u, before the membrane accepts it."""
+    def increment(self, u: Array) -> Array:
+        """d u / d parameters (3 n, np) at the equilibrium u, factorised and not yet accepted."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
-        m.unbalance(u, pressure, with_tangent=True)
-        m.tangent.factor()
         explicit(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.thickness, law.beta, law.nu12,
             law.strain_range, law.area_power, m.strain_old, m.stress_old, self.which,
@@ -261,10 +265,10 @@ def _reach(
 
 
 def _extrapolate(path: Array, levels: Array, level: float) -> Array:
-    """Lagrange extrapolation in p^(1/3), in which inflation is nearly linear, over three steps."""
+    """Lagrange extrapolation in p^(1/3), in which inflation is nearly linear, over four steps."""
     if len(path) == 1:
         return np.asarray(path[0] * math.cbrt(level / levels[0]))
-    count = min(len(path), 3)
+    count = min(len(path), 4)
     x = np.cbrt(levels[-count:])
     weights = [
         math.prod((math.cbrt(level) - x[b]) / (x[a] - x[b]) for b in range(count) if b != a)
