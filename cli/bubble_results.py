@@ -28,6 +28,7 @@ from .project import BubbleProject
 
 Array = NDArray[np.float64]
 
+UNSTABLE = "the equilibrium at the last pressure is unstable: no test could be held there"
 PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
 
 
@@ -110,7 +111,7 @@ def assess(
             "doubtful_dropped": setup.dropped,
             "outside_dropped": setup.outside,
         },
-        "warnings": _warnings(project, sure, reached),
+        "warnings": _warnings(project, best, sure, reached),
         "wall_s": wall_s,
         "versions": _versions(),
     }
@@ -129,8 +130,12 @@ def assess(
     )
 
 
-def _warnings(project: BubbleProject, sure: Certainty | None, reached: Array) -> list[str]:
+def _warnings(
+    project: BubbleProject, best: Evaluation, sure: Certainty | None, reached: Array
+) -> list[str]:
     words = list(sure.undetermined) if sure is not None else []
+    if not best.stable:
+        words.append(UNSTABLE)
     for name, strain, end in zip(
         ("warp", "fill", "shear"), reached, project.strain_range, strict=True
     ):

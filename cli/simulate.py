@@ -16,6 +16,7 @@ from ..materials.card import read_card
 from ..reports import plot_profiles, write_vtu
 from ..solvers.registry import solver_named
 from ..writing import replacing
+from .bubble_results import UNSTABLE
 from .bubble_setup import bubble_model
 from .options import default_folder, exits
 from .project import read_project
@@ -62,6 +63,7 @@ def simulate_bubble(
         )
         if s > end * (1 + 1e-6)
     ]
+    unstable = [UNSTABLE] if history.stable is False else []
     result = {
         "command": "simulate bubble",
         "solver": solver.name,
@@ -69,7 +71,7 @@ def simulate_bubble(
         "pressure_kPa": (1e3 * history.load).tolist(),
         "apex_mm": u[:, apex, 2].tolist(),
         "strain_reached": dict(zip(("warp", "fill", "shear"), reached.tolist(), strict=True)),
-        "warnings": [*history.remarks, *beyond],
+        "warnings": [*history.remarks, *beyond, *unstable],
     }
     with replacing(folder / "result.json") as path:
         path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

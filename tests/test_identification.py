@@ -425,7 +425,7 @@ def test_watch_hears_of_every_analysis() -> None:
 
 
 def test_unstable_equilibria_are_told_and_not_started_from() -> None:
-    """Shear stiffness below what keeps the equations elliptic: Newton converges, a test would not."""
+    """Shear stiffness too low for elliptic equations: Newton converges, a test would not."""
     soft = LAW.with_beta(np.concatenate([[0.0, 0.0, 0.0, 3.0], LAW.beta[4:]]))
     history = MembraneSolver().run(MODEL, soft)
     differentiated, _ = MembraneSolver().run_with_sensitivity(MODEL, soft)

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
 # Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
-LARGEST_BAND = 4_000_000
+LARGEST_BAND = 2_000_000
 
 
 class SingularTangent(Exception):
