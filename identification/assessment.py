@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.law import MODULI, HypoelasticLaw
+from ..materials.positivity import GRID
 from .problem import Evaluation, FieldProblem
 
 Array = NDArray[np.float64]
@@ -92,7 +93,7 @@ def _limited(problem: FieldProblem, best: Evaluation) -> list[str]:
     room = grid @ best.coefficients - margin
     words = []
     for block, name in enumerate(("G12", "E2", "E1")):
-        part = slice(31 * block, 31 * block + 31)
+        part = slice(GRID * block, GRID * block + GRID)
         if (room[part] <= ON_BOUND * np.maximum(margin[part], 1.0)).any():
             words.append(f"{name} touches its positivity margin: the data ask for less stiffness")
     width = p.upper - p.lower

@@ -12,6 +12,7 @@ import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
+from ..materials.positivity import GRID
 from .problem import Evaluation, FieldProblem
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
 NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
 SETTLED = 1e-4  # relative decrease that counts as no progress ...
+SMALLEST_DROP = 1e-3  # of G12, relative, that can explain a loss of stability
 PATIENCE = 3  # ... when it happens so often in a row
 
 
@@ -67,7 +69,12 @@ def descend(
             if predicted < NEGLIGIBLE * merit:
                 return point, "settled" if not reweighted else "converged"
             trial = problem.evaluate(point.unknowns + step, True)
-            if trial is not None and trial.stable:
+            if trial is not None and not trial.stable:
+                cut = _cut(problem, point.unknowns, trial.unknowns)
+                if cut is not None:
+                    a, c = np.vstack([a, cut[0]]), np.append(c, cut[1])
+                    continue
+            elif trial is not None:
                 gained = merit - float(np.sum((trial.residual * root) ** 2))
                 if gained > 0:
                     break
@@ -81,6 +88,22 @@ def descend(
         point = trial
         if idle >= PATIENCE:
             return point, "settled" if not reweighted else "converged"
+
+
+def _cut(problem: FieldProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
+    """An inequality that keeps the next step half as far from G12's largest drop.
+
+    A membrane loses its stability in shear: so a refused step says where G12 was too low, and
+    the fit can slide along that border instead of stopping at it. None when G12 did not drop.
+    """
+    a, _ = problem.parameters.inequalities
+    rows = a[:GRID]
+    before, after = rows @ stable, rows @ unstable
+    drop = (before - after) / before
+    k = int(np.argmax(drop))
+    if drop[k] < SMALLEST_DROP:
+        return None
+    return rows[k], float(0.5 * (before[k] + after[k]))
 
 
 def _jacobian(point: Evaluation) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import math
 import sys
 import tomllib
 from dataclasses import dataclass
@@ -17,6 +19,20 @@ from .law import UNLIMITED, HypoelasticLaw
 
 #: MPa per unit.
 UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
+DIRECTIONS = ("warp", "fill", "shear")
+
+
+KEYS = (
+    "name",
+    "source",
+    "law",
+    "unit",
+    "beta",
+    "nu12",
+    "thickness_mm",
+    "thickness_change",
+    "valid_strain",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +49,7 @@ def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
     """Write a card with its coefficients in `unit` ("GPa", "MPa" or "Pa")."""
     law, scale = card.law, UNITS[unit]
     ends = law.strain_range
-    named = zip(("warp", "fill", "shear"), ends, strict=True)
+    named = zip(DIRECTIONS, ends, strict=True)
     valid = {name: [0.0, float(end)] for name, end in named if end < UNLIMITED}
     content: dict[str, Any] = {
         "name": card.name,
@@ -68,6 +84,11 @@ def read_card(path: Path) -> MaterialCard:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
         raise InputError(path, "TOML syntax", str(error)) from None
+    for key in content:
+        if key not in KEYS:
+            near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.5)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            raise InputError(path, key, f"unknown key; {meant}allowed: {', '.join(KEYS)}")
     unit = _get(path, content, "unit", str)
     if unit not in UNITS:
         raise InputError(path, "unit", f"expected one of {', '.join(UNITS)}, got {unit!r}")
@@ -76,9 +97,16 @@ def read_card(path: Path) -> MaterialCard:
         raise InputError(path, "beta", f"expected 12 coefficients, got {len(beta)}")
     if not all(_is_number(b) for b in beta):
         raise InputError(path, "beta", "expected finite numbers only")
+    mpa = [b * UNITS[unit] for b in beta]
+    if not all(map(math.isfinite, mpa)):
+        raise InputError(path, "beta", f"{max(beta, key=abs):g} {unit} is too large a coefficient")
     valid = _get(path, content, "valid_strain", dict, {})
     ends = []
-    for name in ("warp", "fill", "shear"):
+    for name in valid:
+        if name not in DIRECTIONS:
+            problem = f"unknown direction; allowed: {', '.join(DIRECTIONS)}"
+            raise InputError(path, f"valid_strain.{name}", problem)
+    for name in DIRECTIONS:
         limits = valid.get(name, [0.0, UNLIMITED])
         good = isinstance(limits, list) and len(limits) == 2 and all(map(_is_number, limits))
         if not good or limits[0] != 0 or not limits[1] > 0:
@@ -89,7 +117,7 @@ def read_card(path: Path) -> MaterialCard:
         raise InputError(path, "thickness_mm", f"expected > 0, got {thickness}")
     try:
         law = HypoelasticLaw(
-            np.array(beta, dtype=float) * UNITS[unit],
+            np.array(mpa, dtype=float),
             _get(path, content, "nu12", (int, float)),
             np.array(ends),
             _get(path, content, "thickness_change", str, "constant"),

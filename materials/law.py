@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from ..caching import compiled
 from ..errors import InputError
 from .point_law import SLOPES, membrane_stress, stress_update
 
@@ -159,7 +159,7 @@ class HypoelasticLaw:
         )
 
 
-@njit(cache=True)
+@compiled()
 def _increments(beta, nu, end, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
     stress, tangent = np.empty((n, 3)), np.empty((n, 3, 3))
@@ -172,7 +172,7 @@ def _increments(beta, nu, end, old, new, stress_old):  # type: ignore[no-untyped
     return stress, tangent
 
 
-@njit(cache=True)
+@compiled()
 def _pull_backs(beta, nu, end, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))

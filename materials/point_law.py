@@ -14,8 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..caching import compiled
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ SLOPES = 13
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
-@njit(cache=True)
+@compiled()
 def _atanh_ratio(z: float) -> tuple[float, float]:
     """f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
     if z < 0.01:
@@ -42,7 +43,7 @@ def _atanh_ratio(z: float) -> tuple[float, float]:
     return f, (1.0 / (1.0 - z) - f) / (2.0 * z)
 
 
-@njit(cache=True)
+@compiled()
 def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
     """Logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
 
@@ -76,7 +77,7 @@ def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled()
 def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Array) -> None:
     """Second Piola-Kirchhoff stress s = U^-1 t U^-1 from the corotated stress t (times J).
 
@@ -111,17 +112,17 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
         )
 
 
-@njit(cache=True)
+@compiled()
 def _cubic(beta: Array, first: int, x: float) -> float:
     return ((beta[first] * x + beta[first + 1]) * x + beta[first + 2]) * x + beta[first + 3]
 
 
-@njit(cache=True)
+@compiled()
 def _cubic_slope(beta: Array, first: int, x: float) -> float:
     return (3.0 * beta[first] * x + 2.0 * beta[first + 1]) * x + beta[first + 2]
 
 
-@njit(cache=True)
+@compiled()
 def stress_update(
     beta: Array,
     nu: float,
@@ -192,7 +193,7 @@ def stress_update(
     return True
 
 
-@njit(cache=True)
+@compiled()
 def membrane_stress(
     m: float,
     q: float,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import queue
@@ -16,6 +17,7 @@ from ..identification.methods import FitOptions
 from ..identification.problem import FieldProblem
 from .start import EvaluationRecord, StartRecord, run_start
 
+log = logging.getLogger(__name__)
 Record = EvaluationRecord | StartRecord
 WAIT_S = 0.5
 
@@ -49,8 +51,13 @@ def run_starts(
     # fork: the compiled kernels and the project are there already; elsewhere spawn works too.
     methods = multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("fork" if "fork" in methods else "spawn")
-    tasks: Any = context.Queue()
-    records: Any = context.Queue()
+    try:
+        tasks: Any = context.Queue()
+        records: Any = context.Queue()
+    except OSError as error:  # no semaphores: /dev/shm missing or not writable
+        log.warning("one process only: this machine has no shared memory (%s)", error)
+        yield from run_starts(build, options, seed, numbers, 1)
+        return
     count = min(jobs, len(numbers))
     for task in [*numbers, *([None] * count)]:
         tasks.put(task)

@@ -322,6 +322,20 @@ def test_errors_cross_the_process_border_whole() -> None:
     assert caught.value.field == "quads"
 
 
+def test_without_shared_memory_one_process_does_it_all(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A container with /dev/shm missing or read-only cannot make the semaphores of a queue."""
+
+    def refuse(*arguments: Any, **named: Any) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refuse)
+    ends = study_with(2, [0, 1])
+    assert all(value < 1e-6 for value, _, _ in ends.values())
+    assert "one process only" in caplog.text
+
+
 def test_the_processes_end_when_the_reader_stops() -> None:
     import multiprocessing
 

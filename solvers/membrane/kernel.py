@@ -9,14 +9,14 @@ a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), with four 3 x 3 blocks a Gaus
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...caching import compiled
 from ...materials.point_law import FAST, SLOPES, membrane_stress
 
-# mypy does not see through njit; the shapes are in the docstrings.
+# mypy does not see through numba; the shapes are in the docstrings.
 
 
-@njit(cache=True, fastmath=FAST, inline="always")
+@compiled(fastmath=FAST, inline="always")
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
     """f (2, 3): images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
     for i in range(2):
@@ -29,7 +29,7 @@ def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
             )
 
 
-@njit(cache=True, fastmath=FAST, inline="always")
+@compiled(fastmath=FAST, inline="always")
 def metric(f):  # type: ignore[no-untyped-def]
     """m, q, c of the Cauchy-Green components (see materials/point_law.py)."""
     c11 = f[0, 0] ** 2 + f[0, 1] ** 2 + f[0, 2] ** 2
@@ -38,7 +38,7 @@ def metric(f):  # type: ignore[no-untyped-def]
     return 0.5 * (c11 + c22), 0.5 * (c11 - c22), c12
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def assemble(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure,
     beta, nu, end, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,

@@ -8,8 +8,8 @@ the solve, strain and stress derivatives are advanced to the end of the incremen
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...caching import compiled
 from ...materials.point_law import (
     D11,
     D11_E1,
@@ -36,7 +36,7 @@ NU12, PRESSURE_OFFSET = 12, 13
 POINT = 24
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def explicit(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, beta, nu, end, power,
     h_old, s_old, which, dh_old, ds_old, ds_new, point, rate,
@@ -135,7 +135,7 @@ def explicit(  # type: ignore[no-untyped-def]
                     rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
 
 
-@njit(cache=True, fastmath=FAST)
+@compiled(fastmath=FAST)
 def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
     """Add what the displacement derivatives du (3 n, np) bring to dh and ds (in place)."""
     count = du.shape[1]

@@ -1,0 +1,64 @@
+"""Where bubblefit keeps what it compiled: kernels here, material libraries and ccx elsewhere."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+SETTINGS: Any = numba.config
+ROOT = Path(__file__).parent
+#: Everything that compiled functions call: an edit of one must reach the compiled code of all,
+#: while numba's own cache looks only at the file a function stands in.
+KERNELS = (
+    "materials/point_law.py",
+    "materials/law.py",
+    "solvers/membrane/kernel.py",
+    "solvers/membrane/sensitivity.py",
+)
+
+
+def cache_folder() -> Path:
+    """$BUBBLEFIT_CACHE, else bubblefit/ in $XDG_CACHE_HOME or ~/.cache; it may not exist yet."""
+    named = os.environ.get("BUBBLEFIT_CACHE")
+    if named:
+        return Path(named)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path(os.path.expanduser("~")) / ".cache") / "bubblefit"
+
+
+@cache
+def _kernel_folder() -> Path | None:
+    """Folder of the compiled kernels of exactly these sources; None where none can be written."""
+    digest = hashlib.sha256()
+    for name in KERNELS:
+        digest.update((ROOT / name).read_bytes())
+    folder = cache_folder() / f"kernels-{digest.hexdigest()[:12]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK | os.X_OK) else None
+
+
+def compiled(**options: Any) -> Callable[[Any], Any]:
+    """`numba.njit(**options)`, cached where a folder can be written, else compiled every time."""
+
+    def decorate(function: Any) -> Any:
+        folder = _kernel_folder()
+        if folder is None:
+            return numba.njit(**options)(function)
+        # numba reads this setting once, here; other packages' functions keep their own.
+        before = SETTINGS.CACHE_DIR
+        SETTINGS.CACHE_DIR = str(folder)
+        try:
+            return numba.njit(cache=True, **options)(function)
+        finally:
+            SETTINGS.CACHE_DIR = before
+
+    return decorate

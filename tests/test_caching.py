@@ -1,0 +1,65 @@
+"""Compiled code is kept where that can be done, follows every edit, and is never required."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bubblefit import caching
+
+#: Compiles one kernel that calls another file's functions, and prints what it computes.
+PROGRAM = """
+import numpy as np
+from bubblefit.materials.law import HypoelasticLaw
+law = HypoelasticLaw.linear(400.0, 250.0, 12.0)
+print(law.increment(np.zeros(3), np.array([0.01, 0.0, 0.0]), np.zeros(3))[0])
+"""
+
+
+def run(cache: Path, package: Path | None = None) -> str:
+    environment = {**os.environ, "BUBBLEFIT_CACHE": str(cache)}
+    if package is not None:
+        environment["PYTHONPATH"] = str(package)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BUBBLEFIT_CACHE", "/x")
+    assert caching.cache_folder() == Path("/x")
+    monkeypatch.delenv("BUBBLEFIT_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/y")
+    assert caching.cache_folder() == Path("/y/bubblefit")
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", "/z")
+    assert caching.cache_folder() == Path("/z/.cache/bubblefit")
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    kept = run(tmp_path / "cache")
+    assert list((tmp_path / "cache").glob("kernels-*/*/*.nbi"))
+    assert run(tmp_path / "file" / "cache") == kept
+
+
+def test_an_edit_reaches_code_compiled_from_another_file(tmp_path: Path) -> None:
+    package = tmp_path / "copy" / "bubblefit"
+    shutil.copytree(
+        caching.ROOT,
+        package,
+        ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
+    )
+    before = run(tmp_path / "cache", package.parent)
+    law = package / "materials" / "point_law.py"
+    text = law.read_text()
+    edited = text.replace("* x + beta[first + 3]", "* x + 2.0 * beta[first + 3]")
+    assert edited != text
+    law.write_text(edited)
+    assert run(tmp_path / "cache", package.parent) != before
