@@ -164,7 +164,7 @@ def _versions() -> dict[str, str]:
 def write_numbers(
     project: BubbleProject, setup: BubbleSetup, found: Assessment, folder: OutputFolder
 ) -> None:
-    """material.toml, surfaces.csv and result.json."""
+    """material.toml and surfaces.csv."""
     limits = np.minimum(found.reached, project.strain_range)
     card = MaterialCard(
         replace(found.law, strain_range=limits),
@@ -177,6 +177,10 @@ def write_numbers(
     if setup.surfaces:
         with replacing(folder.path / "surfaces.csv") as path:
             write_surfaces(setup.surfaces, path)
+
+
+def write_result(found: Assessment, folder: OutputFolder) -> None:
+    """result.json, after everything else: where it is, the output is complete."""
     folder.write(RESULT, json.dumps(found.result, indent=1, allow_nan=False) + "\n")
 
 
