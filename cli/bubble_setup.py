@@ -215,7 +215,9 @@ def _at_nodes(field: DisplacementField, mesh: Mesh) -> Array:
     return np.asarray(between)
 
 
-def _check_scale(project: BubbleProject, field: DisplacementField, inside: Array) -> None:
+def _check_scale(
+    project: BubbleProject, field: DisplacementField, inside: NDArray[np.bool_]
+) -> None:
     """Metres taken for millimetres, or the other way round, show in where the points lie."""
     reach = float(np.abs(field.points).max())
     if inside.mean() < LEAST_SHARE:
