@@ -18,7 +18,7 @@ from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
 from ..runs.start import StartRecord
 from .bubble_figures import report
-from .bubble_results import assess, summary, write_numbers
+from .bubble_results import assess, summary, write_numbers, write_result
 from .bubble_setup import bubble_problem, bubble_setup
 from .fingerprint import fingerprint
 from .options import cores, default_folder, exits
@@ -66,6 +66,8 @@ def command(
     begun = time.perf_counter()
     if resume and overwrite:
         raise InputError(None, "--resume, --overwrite", "give one of them, not both")
+    if fail_above is not None and not fail_above >= 0:
+        raise InputError(None, "--fail-above", f"expected 0 or more, got {fail_above:g}")
     settings = _with_options(read_project(project, data), starts, seed, method, solver_name)
     setup = bubble_setup(settings)
     folder = OutputFolder(
@@ -90,6 +92,7 @@ def command(
     assessment = assess(settings, setup, records, ranked, time.perf_counter() - begun)
     write_numbers(settings, setup, assessment, folder)
     report(settings, setup, assessment, folder)
+    write_result(assessment, folder)
     if as_json:
         click.echo(json.dumps(assessment.result, indent=1))
     else:

@@ -14,10 +14,9 @@ import numpy as np
 from ..errors import OutputError
 from ..materials.card import read_card
 from ..reports import plot_profiles, write_vtu
-from ..solvers.registry import solver_named
 from ..writing import replacing
 from .bubble_results import UNSTABLE
-from .bubble_setup import bubble_model
+from .bubble_setup import bubble_model, chosen_solver
 from .options import default_folder, exits
 from .project import read_project
 
@@ -46,7 +45,7 @@ def simulate_bubble(
     """Inflate the bubble of PROJECT.toml with the material of a card."""
     settings = read_project(project, need_data=False)
     card = read_card(card_path)
-    solver = solver_named(solver_name or settings.solver)
+    solver = chosen_solver(solver_name or settings.solver, project)
     folder = out or default_folder(project).with_name(default_folder(project).name + "-simulated")
     if (folder / "result.json").exists() and not overwrite:
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
@@ -73,12 +72,13 @@ def simulate_bubble(
         "strain_reached": dict(zip(("warp", "fill", "shear"), reached.tolist(), strict=True)),
         "warnings": [*history.remarks, *beyond, *unstable],
     }
-    with replacing(folder / "result.json") as path:
-        path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     with replacing(folder / "displacement.csv") as path:
         path.write_text(_table(1e3 * history.load, model.mesh.points, u), encoding="utf-8")
     write_vtu(model.mesh, u[-1], folder / "bubble.vtu")
     plot_profiles(folder / "profiles.png", settings.pressures, model.mesh.points, u)
+    # Last: where it is, the output is complete.
+    with replacing(folder / "result.json") as path:
+        path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if as_json:
         click.echo(json.dumps(result, indent=1))
         return
