@@ -85,7 +85,7 @@ class Point:
     def __post_init__(self):
         self.committed = np.zeros((4, 8, self.states))
 
-    def call(self, gradient, icmd=1, pnewdt=-1.0):
+    def call(self, gradient, icmd=1, pnewdt=-1.0, time=math.nan, begun=math.nan):
         """S (6,), dS/dE (6, 6) with engineering shears, state, pnewdt."""
         k, f = numbers(self.constants), numbers(np.asarray(gradient).T)
         trial, stress = self.committed.copy(), np.full(6, 77.0)
@@ -94,8 +94,8 @@ class Point:
         empty = array(nothing)
         self.function(
             b"@BUBBLEFIT_HYPOELASTIC".ljust(80), whole(3), whole(2), whole(-100 - len(k)), array(k),
-            empty, empty, empty, empty, empty, array(f), empty, whole(0), empty, empty, empty,
-            empty, whole(icmd), whole(0), whole(8), whole(self.states), array(self.committed),
+            empty, empty, empty, empty, empty, array(f), empty, whole(0), empty, empty,
+            array(numbers([time])), array(numbers([begun])), whole(icmd), whole(0), whole(8), whole(self.states), array(self.committed),
             array(trial), array(stress), array(stiff), whole(2 if self.orab else 0),
             array(position), array(orab), array(request), whole(0), 80,
         )  # fmt: skip
@@ -313,7 +313,7 @@ def test_constants_are_in_the_documented_order():
     found = constants(LAWS["incompressible"], 300.0, 25.0, 45.0, 1)
     assert len(found) == CONSTANTS and CONSTANTS % 8
     assert found[:12] == tuple(BETA)
-    assert found[12:] == (0.3, 0.13, 0.13, 0.13, 0.0, 300.0, 25.0, 45.0, 1.0)
+    assert found[12:] == (0.3, 0.13, 0.13, 0.13, 0.0, 300.0, 25.0, 45.0, 1.0, 0.0)
     assert constants(LAWS["linear"])[16:19] == (1.0, 800.0, 20.0)
 
 
@@ -369,3 +369,15 @@ def test_a_cache_that_cannot_be_written_says_so(folder, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="BUBBLEFIT_CACHE"):
         material_library(Path(tmp_path / "file"))
+
+
+def test_whole_times_commit_only_at_the_end_of_a_step(function):
+    stretch = np.diag([1.03, 1.02, 1.0])
+    always = Point(function, constants(LAWS["cubic"]))
+    at_ends = Point(function, constants(LAWS["cubic"], whole_times=True))
+    stress, _, state, _ = always.call(stretch)
+    inside, _, kept, _ = at_ends.call(stretch, time=0.4, begun=2.0)
+    assert np.array_equal(inside, stress) and not kept.any()
+    # Sums of increments end a step only nearly at a whole number.
+    _, _, kept, _ = at_ends.call(stretch, time=1 - 1e-12, begun=2.0)
+    assert np.array_equal(kept, state) and state[0] > 0

@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { /* *USER MATERIAL, CONSTANTS=21: the order of library.py */
+enum { /* *USER MATERIAL, CONSTANTS=22: the order of library.py */
     BETA = 0,           /* 12 coefficients, MPa: G12, E2, E1, highest power first (Eqs 3.1-3.3) */
     NU12 = 12,
     RANGE_END = 13,     /* 3: eps1, eps2, gamma12, where the moduli are held */
@@ -23,7 +23,8 @@ enum { /* *USER MATERIAL, CONSTANTS=21: the order of library.py */
     TRANSVERSE_SHEAR = 18,
     ANGLE = 19,         /* degrees from the first in-plane axis to warp, about the normal */
     NORMAL_AXIS = 20,   /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
-    CONSTANTS = 21
+    WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number */
+    CONSTANTS = 22
 };
 enum { STATES = 6 };    /* *DEPVAR: eps1, eps2, gamma12, sigma1, sigma2, tau12 (material frame) */
 
@@ -210,7 +211,7 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
                  const double *orab, double *pnewdt, const int *ipkon, const int size) {
     static const int I[6] = {0, 1, 2, 0, 0, 1}, J[6] = {0, 1, 2, 1, 2, 2}, PLANE[3] = {0, 1, 3};
     (void)amat, (void)emec, (void)emec0, (void)beta, (void)xokl, (void)voj, (void)vj;
-    (void)ithermal, (void)t1l, (void)dtime, (void)time, (void)ttime, (void)ielas, (void)ipkon;
+    (void)ithermal, (void)t1l, (void)dtime, (void)ielas, (void)ipkon;
     (void)size;
     if (*kode != -100 - CONSTANTS || *nstate < STATES) {
         printf(" *ERROR in HYPOELASTIC: %d constants and *DEPVAR %d are needed, not %d and %d\n",
@@ -231,7 +232,10 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
     double normal = 0.5 * (dot(f[2], f[2]) - 1);
     double shear1 = dot(f[0], f[2]), shear2 = dot(f[1], f[2]);
     good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);
-    for (int i = 0; i < STATES; i++) xstate[place + i] = good ? state[i] : old[i];
+    /* With one *STEP of length 1 for every increment of the law, the strain path does not depend on
+     * how many increments CalculiX needed in between (cut-back in the membrane solver likewise). */
+    int commit = good && !(k[WHOLE_TIMES] > 0 && fabs(*time + *ttime - round(*time + *ttime)) > 1e-9);
+    for (int i = 0; i < STATES; i++) xstate[place + i] = commit ? state[i] : old[i];
     if (!good) { /* stre stays what it was; the stiffness only has to be harmless */
         if (!(*pnewdt > 0 && *pnewdt < SMALLER_INCREMENT)) *pnewdt = SMALLER_INCREMENT;
         for (int i = 0; i < 21; i++) stiff[i] = 0;

@@ -24,7 +24,7 @@ STATE_VARIABLES = 6
 #: A law without stiffness is for the analysis to refuse, not for the deck: MPa.
 LEAST = 1e-3
 #: `*USER MATERIAL, CONSTANTS=`. Never a multiple of 8: CalculiX reads one more line then.
-CONSTANTS = 21
+CONSTANTS = 22
 
 SOURCE = Path(__file__).with_name("law.c")
 # No contraction: the same rounding on every machine.
@@ -37,11 +37,12 @@ def constants(
     transverse_shear: float | None = None,
     angle: float = 0.0,
     normal_axis: int = 3,
+    whole_times: bool = False,
 ) -> tuple[float, ...]:
-    """The constants of `*USER MATERIAL` (21,), in the order of `law.c`.
+    """The constants of `*USER MATERIAL` (22,), in the order of `law.c`.
 
     beta (12, MPa), nu12, ends of the strain range (3), area power, normal modulus (MPa),
-    transverse shear modulus (MPa), angle (degrees), normal axis.
+    transverse shear modulus (MPa), angle (degrees), normal axis, whole times.
 
     Parameters
     ----------
@@ -52,6 +53,8 @@ def constants(
     normal_axis : 3 without `*ORIENTATION` (warp from global x, fill from y) or with a rectangular
         one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is
         axial and fill hoop at angle 0.
+    whole_times : commit strain and stress only where the total time is a whole number, so that
+        the law's increments are the deck's steps of length 1, whatever increments they took.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def constants(
     ends = (float(end) for end in law.strain_range)
     coefficients = (float(b) for b in law.beta)
     through = (law.area_power, normal_modulus, transverse_shear, float(angle), float(normal_axis))
-    return (*coefficients, law.nu12, *ends, *through)
+    return (*coefficients, law.nu12, *ends, *through, float(whole_times))
 
 
 def compiler() -> list[str]:
