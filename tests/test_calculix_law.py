@@ -1,4 +1,4 @@
-"""The material library against the Python law, through ctypes: no ccx is needed, only a compiler."""
+"""The material library against the Python law, through ctypes: a compiler is needed, no ccx."""
 
 import ctypes
 import math
@@ -20,10 +20,10 @@ from bubblefit.solvers.calculix.library import (
 )
 
 # Table 4.2, MPa.
-BETA = 1e3 * np.array(
-    [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437]
-    + [-479.622, 212.650, -20.2028, 0.806350]
-)
+G12 = (-7.96788e-3, 0.710747, -0.156912, 0.0200439)
+E2 = (-10.6241, 13.7830, -0.931830, 0.139437)
+E1 = (-479.622, 212.650, -20.2028, 0.806350)
+BETA = 1e3 * np.array([*G12, *E2, *E1])
 LAWS = {
     "cubic": HypoelasticLaw(BETA, strain_range=np.array([0.13, 0.13, 0.13])),
     "held": HypoelasticLaw(BETA, strain_range=np.array([0.02, 0.03, 0.04])),
@@ -101,8 +101,8 @@ class Point:
         )  # fmt: skip
         square = np.zeros((6, 6))
         # The upper triangle comes column by column.
-        for n, (i, j) in enumerate((i, j) for j in range(6) for i in range(j + 1)):
-            square[i, j] = square[j, i] = stiff[n]
+        column, row = np.tril_indices(6)
+        square[row, column] = square[column, row] = stiff
         rest = np.delete(trial.reshape(32, -1), 2 * 8 + 1, axis=0)
         assert not rest.any()
         return stress, square, trial[2, 1], request[0]
