@@ -1,9 +1,10 @@
-"""The material library against the Python law, through ctypes: no ccx is needed, only a compiler."""
+"""The material library against the Python law: by itself through ctypes, and inside ccx."""
 
 import ctypes
 import math
 import os
 import shutil
+import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,10 +21,10 @@ from bubblefit.solvers.calculix.library import (
 )
 
 # Table 4.2, MPa.
-BETA = 1e3 * np.array(
-    [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437]
-    + [-479.622, 212.650, -20.2028, 0.806350]
-)
+G12 = (-7.96788e-3, 0.710747, -0.156912, 0.0200439)
+E2 = (-10.6241, 13.7830, -0.931830, 0.139437)
+E1 = (-479.622, 212.650, -20.2028, 0.806350)
+BETA = 1e3 * np.array([*G12, *E2, *E1])
 LAWS = {
     "cubic": HypoelasticLaw(BETA, strain_range=np.array([0.13, 0.13, 0.13])),
     "held": HypoelasticLaw(BETA, strain_range=np.array([0.02, 0.03, 0.04])),
@@ -101,8 +102,8 @@ class Point:
         )  # fmt: skip
         square = np.zeros((6, 6))
         # The upper triangle comes column by column.
-        for n, (i, j) in enumerate((i, j) for j in range(6) for i in range(j + 1)):
-            square[i, j] = square[j, i] = stiff[n]
+        column, row = np.tril_indices(6)
+        square[row, column] = square[column, row] = stiff
         rest = np.delete(trial.reshape(32, -1), 2 * 8 + 1, axis=0)
         assert not rest.any()
         return stress, square, trial[2, 1], request[0]
@@ -381,3 +382,83 @@ def test_whole_times_commit_only_at_the_end_of_a_step(function):
     # Sums of increments end a step only nearly at a whole number.
     _, _, kept, _ = at_ends.call(stretch, time=1 - 1e-12, begun=2.0)
     assert np.array_equal(kept, state) and state[0] > 0
+
+
+# A patch of 2 mm x 1 mm: nodes (x, y, z) and element of each type, in CalculiX's order.
+QUAD = [(0, 0), (2, 0), (2, 1), (0, 1)]
+EIGHT = [*QUAD, (1, 0), (2, 0.5), (1, 1), (0, 0.5)]
+PATCHES = {
+    "S4": [(x, y, 0) for x, y in QUAD],
+    "S8R": [(x, y, 0) for x, y in EIGHT],
+    "C3D8I": [(x, y, z) for z in (0, 0.8) for x, y in QUAD],
+}
+ORIENTATIONS = {
+    "none": (0.0, "", 0.0),
+    "angle": (45.0, "", 45.0),
+    "orientation": (0.0, "*ORIENTATION, NAME=WARP\n1., 1., 0., -1., 1., 0.\n", 45.0),
+    "both": (15.0, "*ORIENTATION, NAME=WARP\n1., 1., 0., -1., 1., 0.\n", 60.0),
+}
+
+
+def patch_deck(element, law, gradient, increments, angle, orientation):
+    """Every node is moved to F X in equal increments."""
+    nodes = PATCHES[element]
+    moves = np.array(nodes) @ (gradient - np.eye(3)).T
+    solid = element == "C3D8I"
+    name = library.MATERIAL
+    lines = [
+        "*NODE, NSET=ALL",
+        *(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(nodes, 1)),
+        f"*ELEMENT, TYPE={element}, ELSET=PATCH",
+        ", ".join(map(str, [1, *range(1, len(nodes) + 1)])),
+        *orientation.splitlines(),
+        f"*MATERIAL, NAME={name}",
+        f"*USER MATERIAL, CONSTANTS={CONSTANTS}",
+    ]
+    written = [f"{v:.12e}" for v in constants(law, angle=angle)]
+    lines += [", ".join(written[i : i + 8]) for i in range(0, CONSTANTS, 8)]
+    lines += ["*DEPVAR", str(STATE_VARIABLES)]
+    section = f"*{'SOLID' if solid else 'SHELL'} SECTION, ELSET=PATCH, MATERIAL={name}"
+    lines.append(section + (", ORIENTATION=WARP" if orientation else ""))
+    lines += [] if solid else ["0.8"]
+    lines += ["*STEP, NLGEOM, INC=1000", "*STATIC, DIRECT", f"{1 / increments}, 1."]
+    lines.append("*BOUNDARY")
+    lines += [
+        f"{i}, {axis}, {axis}, {move[axis - 1]:.12e}"
+        for i, move in enumerate(moves, 1)
+        for axis in (1, 2, 3)
+    ]
+    lines += [f"*EL PRINT, ELSET=PATCH, GLOBAL=YES, FREQUENCY={increments}", "S"]
+    return "\n".join([*lines, "*END STEP", ""])
+
+
+@pytest.mark.parametrize("element", PATCHES)
+@pytest.mark.parametrize("how", ORIENTATIONS)
+def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element, how):
+    law, increments = LAWS["cubic"], 10
+    angle, orientation, warp_at = ORIENTATIONS[how]
+    gradient = np.eye(3)
+    gradient[:2, :2] = [[1.06, 0.03], [0.05, 1.04]]
+    deck = patch_deck(element, law, gradient, increments, angle, orientation)
+    (tmp_path / "patch.inp").write_text(deck)
+    done = subprocess.run(
+        [ccx.path, "patch"],
+        cwd=tmp_path,
+        env={**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    printed = [line.split() for line in (tmp_path / "patch.dat").read_text().splitlines()]
+    found = np.array([row[2:] for row in printed if len(row) == 8 and row[0] == "1"], float)
+    assert len(found) >= 4
+    axes = rotation((0, 0, 1), warp_at).T
+    state = np.zeros(6)
+    for step in range(1, increments + 1):
+        f = np.eye(3) + step / increments * (gradient - np.eye(3))
+        s, _, state = expected(law, axes, f, state, 1.0, 1.0)
+    cauchy = f @ tensor(s) @ f.T / np.linalg.det(f)
+    wanted = voigt(cauchy)
+    # Seven digits are printed.
+    np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=2e-6 * wanted.max())

@@ -248,7 +248,7 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
     }
     local[2] = e3 * normal, local[4] = g3 * shear1, local[5] = g3 * shear2;
     c[2][2] = e3, c[4][4] = c[5][5] = g3;
-    /* Local engineering strain = turn . global engineering strain; S turns back by its transpose. */
+    /* Local engineering strain = turn . global one; S turns back by its transpose. */
     for (int m = 0; m < 6; m++)
         for (int n = 0; n < 6; n++) {
             turn[m][n] = a[I[m]][I[n]] * a[J[m]][J[n]];

@@ -28,7 +28,10 @@ class Increment:
 
 
 def increments(sta: Path) -> list[Increment]:
-    """Increments that converged so far; half a line at the end is left for the next look."""
+    """Increments that converged so far; half a line at the end is left for the next look.
+
+    Attempts that were given up are marked with a U in the file and left out here.
+    """
     try:
         text = sta.read_text(encoding="ascii", errors="replace")
     except OSError:
@@ -37,8 +40,7 @@ def increments(sta: Path) -> list[Increment]:
     for line in text[: text.rfind("\n") + 1].splitlines():
         parts = line.split()
         try:
-            # An attempt that had to be repeated is marked with a U: 1U.
-            numbers = [int(part.rstrip("U")) for part in parts[:4]]
+            numbers = [int(part) for part in parts[:4]]
             found.append(Increment(*numbers, float(parts[4])))
         except (ValueError, IndexError, TypeError):
             continue  # the two header lines
