@@ -96,7 +96,8 @@ class Point:
         self.function(
             b"@BUBBLEFIT_HYPOELASTIC".ljust(80), whole(3), whole(2), whole(-100 - len(k)), array(k),
             empty, empty, empty, empty, empty, array(f), empty, whole(0), empty, empty,
-            array(numbers([time])), array(numbers([begun])), whole(icmd), whole(0), whole(8), whole(self.states), array(self.committed),
+            array(numbers([time])), array(numbers([begun])), whole(icmd), whole(0), whole(8),
+            whole(self.states), array(self.committed),
             array(trial), array(stress), array(stiff), whole(2 if self.orab else 0),
             array(position), array(orab), array(request), whole(0), 80,
         )  # fmt: skip

@@ -140,9 +140,7 @@ class FrdFile:
             raise self._wrong("a value that is not a finite number")
         return numbers, values.reshape(count, width)
 
-    def _text_rows(
-        self, count: int, width: int, digits: int
-    ) -> tuple[NDArray[np.int64], Array]:
+    def _text_rows(self, count: int, width: int, digits: int) -> tuple[NDArray[np.int64], Array]:
         lines = [min(ROW, width - first) for first in range(0, width, ROW)]
         sizes = [3 + digits + 12 * n + 1 for n in lines]
         table = np.frombuffer(self._take(count * sum(sizes)), np.uint8).reshape(count, sum(sizes))

@@ -30,9 +30,7 @@ def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
     """Shape functions (nodes,) and their derivatives (2, nodes) at x (2,)."""
     s = _NATURAL[:4] * x
     values = 0.25 * (1 + s[:, 0]) * (1 + s[:, 1])
-    slopes = 0.25 * np.stack(
-        [_NATURAL[:4, 0] * (1 + s[:, 1]), _NATURAL[:4, 1] * (1 + s[:, 0])]
-    )
+    slopes = 0.25 * np.stack([_NATURAL[:4, 0] * (1 + s[:, 1]), _NATURAL[:4, 1] * (1 + s[:, 0])])
     if nodes == 4:
         return values, slopes
     middle, rise = np.empty(4), np.empty((2, 4))

@@ -40,9 +40,9 @@ def increments(sta: Path) -> list[Increment]:
     for line in text[: text.rfind("\n") + 1].splitlines():
         parts = line.split()
         try:
-            numbers = [int(part) for part in parts[:4]]
-            found.append(Increment(*numbers, float(parts[4])))
-        except (ValueError, IndexError, TypeError):
+            step, increment, attempt, iterations = (int(part) for part in parts[:4])
+            found.append(Increment(step, increment, attempt, iterations, float(parts[4])))
+        except (ValueError, IndexError):
             continue  # the two header lines
     return found
 
@@ -67,7 +67,9 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     if re.search(r"increment size smaller than minimum|too many cutbacks", text, re.IGNORECASE):
         following = done[-1].increment + 1 if done else 1
         step = done[-1].step if done else 1
-        return f"did not converge at step {step}, increment {following}: increments became too small"
+        return (
+            f"did not converge at step {step}, increment {following}: increments became too small"
+        )
     error = _ERROR.search(text)
     if error:
         return f"{' '.join(error[1].split())} ({reached})"
