@@ -59,9 +59,12 @@ def render(solver: str, name: str, context: Mapping[str, Any], folder: Path | No
         raise InputError(where, f"line {line}", f"{error}{known}") from None
 
 
-def _number(value: float, digits: int = 12) -> str:
-    """Shortest decimal with up to `digits` digits: 0.81, not 0.8100000000000001."""
-    return f"{value:.{digits}g}"
+def _number(value: float) -> str:
+    """Shortest decimal of 13 digits: 0.81, not 0.8100000000000001.
+
+    At most 20 characters: CalculiX reads no more, and would lose the end of an exponent.
+    """
+    return f"{value:.13g}"
 
 
 def _place(error: BaseException, default: Path) -> tuple[Path, int]:
