@@ -21,7 +21,7 @@ from .bubble_figures import report
 from .bubble_results import assess, summary, write_numbers
 from .bubble_setup import bubble_problem, bubble_setup
 from .fingerprint import fingerprint
-from .options import cores, default_folder, exits
+from .options import cores, default_folder, exits, solver_choice, with_solver
 from .progress import StudyProgress
 from .project import BubbleProject, read_project
 
@@ -36,7 +36,7 @@ WORSE = 1  # exit code of --fail-above
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
 @click.option("--method", type=click.Choice(METHODS), help="Optimiser.")
-@click.option("--solver", "solver_name", metavar="NAME", help="Solver that runs the model.")
+@solver_choice
 @click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted study.")
 @click.option("--overwrite", is_flag=True, help="Replace what the output folder holds.")
@@ -51,7 +51,7 @@ def command(
     seed: int | None,
     jobs: int | None,
     method: str | None,
-    solver_name: str | None,
+    solver_given: dict[str, Any],
     fail_above: float | None,
     resume: bool,
     overwrite: bool,
@@ -66,7 +66,9 @@ def command(
     begun = time.perf_counter()
     if resume and overwrite:
         raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-    settings = _with_options(read_project(project, data), starts, seed, method, solver_name)
+    settings = _with_options(
+        with_solver(read_project(project, data), solver_given), starts, seed, method
+    )
     setup = bubble_setup(settings)
     folder = OutputFolder(
         out or default_folder(project), settings.modulus_unit, settings.modulus_scale
@@ -105,9 +107,8 @@ def _with_options(
     starts: int | None,
     seed: int | None,
     method: str | None,
-    solver: str | None,
 ) -> BubbleProject:
-    given: dict[str, Any] = {"starts": starts, "seed": seed, "method": method, "solver": solver}
+    given: dict[str, Any] = {"starts": starts, "seed": seed, "method": method}
     return replace(project, **{k: v for k, v in given.items() if v is not None})
 
 

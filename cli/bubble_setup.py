@@ -53,6 +53,22 @@ def bubble_model(project: BubbleProject) -> BubbleModel:
     return BubbleModel(mesh, project.thickness, project.pressures, project.increments)
 
 
+def project_solver(project: BubbleProject) -> Solver:
+    """The project's solver with its options.
+
+    Raises
+    ------
+    SolverFailure : it is not installed, or does not carry the law.
+    """
+    solver = solver_named(project.solver, **project.solver_options.get(project.solver, {}))
+    # Once here, in one line, rather than as the failure of every analysis.
+    if solver.external:
+        found = solver.check()
+        if not (found.available and found.carries_law):
+            raise SolverFailure(found.advice or "is not usable", solver.name)
+    return solver
+
+
 def bubble_setup(project: BubbleProject) -> BubbleSetup:
     """Read or compute the data and set up the fit.
 
@@ -60,7 +76,7 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     ------
     InputError : in the project or its data. SolverFailure : the known solution cannot be run.
     """
-    solver = solver_named(project.solver)
+    solver = project_solver(project)
     model = bubble_model(project)
     law = HypoelasticLaw(
         np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change

@@ -28,7 +28,7 @@ def site_packages(python: Path | str) -> Path:
 
 def shipped() -> set[str]:
     """What a wheel of this working tree has to hold, found without setuptools."""
-    wanted = {"bubblefit/py.typed"}
+    wanted = {"bubblefit/py.typed", "bubblefit/solvers/calculix/law.c"}
     for package in PACKAGES:
         folder = ROOT.joinpath(*package.split(".")[1:])
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in folder.glob("*.py")}
