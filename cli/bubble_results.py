@@ -64,7 +64,9 @@ def assess(
     problem = setup.problem
     problem.reset()
     unknowns = np.array(ranked[0].unknowns)
-    best = problem.evaluate(unknowns, not problem.solver.external, warm=False)
+    # The derivatives behind what the data could not determine are the surrogate's, if there is one.
+    leading = problem.surrogate or problem
+    best = problem.evaluate(unknowns, leading is problem, warm=False)
     if best is None:
         raise SolverFailure("the best fit does not run again", problem.solver.name)
     history = best.history
@@ -72,7 +74,8 @@ def assess(
     reached[2] = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
     reached = np.maximum(reached, 1e-6)
     law = problem.law.with_beta(problem.parameters.beta(unknowns))
-    sure = certainty(problem, best, law, reached) if best.jacobian is not None else None
+    slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)
+    sure = certainty(leading, slopes, law, reached) if slopes is not None else None
     offset, pressure_offset = problem.parameters.offsets(unknowns)
     mean = problem.objective.mean_absolute(history.displacement, offset)
     analyses = sum(r.analyses for r in records)
@@ -100,11 +103,12 @@ def assess(
                 "objective": r.objective,
                 "status": r.status,
                 "analyses": r.analyses,
+                "external_runs": r.external_runs,
             }
             for r in records
         ],
         "analyses": analyses,
-        "external_runs": analyses if problem.solver.external else 0,
+        "external_runs": sum(r.external_runs for r in records),
         "data": {
             "matched_by": project.match_by,
             "places": [len(t.displacement) for t in problem.objective.targets],

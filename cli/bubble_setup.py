@@ -19,12 +19,15 @@ from ..meshes.disk import disk_mesh
 from ..meshes.location import sampling_matrix
 from ..meshes.mesh import Mesh
 from ..models.bubble import BubbleModel
-from ..solvers.base import Solver
+from ..solvers.base import DifferentiatingSolver, Solver
 from ..solvers.registry import solver_named
 from .project import BubbleProject
 from .project_data import KnownSolution, PointFiles
 
 Array = NDArray[np.float64]
+
+#: Leads the fit where the solver that counts gives no derivatives.
+SURROGATE = "membrane"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +98,9 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     except InputError as error:
         raise InputError(project.path, error.field, error.problem) from None
     problem = FieldProblem(model, solver, law, objective, parameters)
+    if not isinstance(solver, DifferentiatingSolver):
+        lead = solver_named(SURROGATE)
+        problem.surrogate = FieldProblem(model, lead, law, objective, parameters)
     dropped = sum(f.dropped for f in fields)
     return BubbleSetup(problem, fields, known, surfaces, dropped, outside)
 

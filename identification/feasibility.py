@@ -25,6 +25,8 @@ def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
     ------
     NoFeasibleStart : nothing found in 200,000 draws or 50 analyses.
     """
+    # Where another solver counts, its runs are not spent on draws.
+    problem = problem.surrogate or problem
     p = problem.parameters
     random = np.random.default_rng([seed, number])
     grid, margin = p.positivity

@@ -8,6 +8,7 @@ from typing import Literal
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .correction import corrected_fit
 from .fit import levenberg_marquardt
 from .nonlinear import NloptOptions, nlopt_minimise
 from .optimum import Optimum
@@ -19,13 +20,17 @@ METHODS = ("lm", *ALGORITHMS)
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How each start is fitted; see the [fit] section of a project file."""
+    """How each start is fitted; see the [fit] section of a project file.
+
+    max_runs : of a solver that a differentiating surrogate leads to the least of its objective.
+    """
 
     method: str = "lm"
     gradient: Literal["exact", "differences"] = "exact"
     constraints: Literal["margin", "boolean"] = "margin"
     tolerance: float = 1e-7
     max_analyses: int = 100
+    max_runs: int = 10
 
 
 def fit_from(problem: FieldProblem, start: NDArray, options: FitOptions) -> Optimum | None:
@@ -35,11 +40,17 @@ def fit_from(problem: FieldProblem, start: NDArray, options: FitOptions) -> Opti
     ------
     InputError : a method of another name.
     """
+    if options.method == "lm" and problem.surrogate is not None:
+        return corrected_fit(
+            problem, start, options.tolerance, options.max_analyses, options.max_runs
+        )
     if options.method == "lm":
         return levenberg_marquardt(problem, start, options.tolerance, options.max_analyses)
     if options.method in ALGORITHMS:
         nlopt_options = NloptOptions(
-            ALGORITHMS[options.method], options.gradient, options.constraints
+            ALGORITHMS[options.method],
+            options.gradient if problem.surrogate is None else "differences",
+            options.constraints,
         )
         return nlopt_minimise(
             problem, start, options.tolerance, options.max_analyses, nlopt_options

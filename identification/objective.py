@@ -7,8 +7,9 @@ block norms. With plain millimetres the scale is one and e is a sum of RMS error
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -69,6 +70,15 @@ class FieldObjective:
         sizes = np.repeat([len(t.displacement) for t in self.targets], 3)
         self.starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         self.block = np.repeat(np.arange(len(sizes)), sizes)
+
+    def shifted(self, by: Array) -> FieldObjective:
+        """The objective of displacement + `by` (frames, nodes, 3), with the same scales."""
+        other = copy.copy(self)
+        other.targets = tuple(
+            replace(target, displacement=target.displacement - target.at(moved))
+            for target, moved in zip(self.targets, by, strict=True)
+        )
+        return other
 
     def residual(self, displacement: Array, offset: Array | None = None) -> Array:
         """Blocks laid end to end, (m,), from model displacement (frames, nodes, 3)."""

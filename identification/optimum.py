@@ -12,11 +12,13 @@ from .problem import Evaluation
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Best feasible point of one start: its last word and its count of analyses."""
+    """Best feasible point of one start, how it ended, all its analyses, and those of them that
+    the solver that counts ran while a surrogate led (0 where there is none)."""
 
     best: Evaluation
     status: str
     analyses: int
+    runs: int = 0
 
     @property
     def value(self) -> float:

@@ -38,8 +38,8 @@ class Evaluation:
         return self.history.stable is not False
 
 
-#: Called after every analysis with unknowns, e (None when it failed), and what happened.
-Watch = Callable[[Array, float | None, str], None]
+#: Called after every analysis with unknowns, e (None when it failed), what happened, who ran it.
+Watch = Callable[[Array, float | None, str, str], None]
 
 
 #: Largest predicted change of displacement, relative, for a warm start.
@@ -50,7 +50,8 @@ NEAR = 0.02
 class FieldProblem:
     """Model, solver, measured fields and unknowns of one fit.
 
-    `law` carries nu12, strain range and thickness option; its beta is replaced.
+    `law` carries nu12, strain range and thickness option; its beta is replaced. `surrogate`: the
+    same problem for a solver that differentiates, where this one's does not.
     """
 
     model: Any
@@ -59,6 +60,7 @@ class FieldProblem:
     objective: FieldObjective
     parameters: ModuliParameters
     watch: Watch | None = None
+    surrogate: FieldProblem | None = None
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
     warm_starts: bool = True
@@ -68,6 +70,8 @@ class FieldProblem:
         """Forget the warm start and the count: every start of a study begins alike."""
         self.analyses, self.unstable, self.warm_starts = 0, 0, True
         self._last = None
+        if self.surrogate is not None:
+            self.surrogate.reset()
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run the model at unknowns y; None when the analysis did not end well (Eq. 4.9).
@@ -103,7 +107,7 @@ class FieldProblem:
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:
-            self.watch(y, value, status)
+            self.watch(y, value, status, self.solver.name)
 
     def _names(self) -> list[str]:
         names = [f"beta_{i}" for i in self.parameters.places]

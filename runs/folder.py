@@ -72,7 +72,7 @@ class OutputFolder:
     def header(self, columns: Sequence[str]) -> list[str]:
         """Columns of history.csv; coefficients carry their unit in the name."""
         named = [f"{c}_{self.modulus_unit}" if c.startswith("beta") else c for c in columns]
-        return ["start", "analysis", "objective", "status", *named]
+        return ["start", "analysis", "solver", "objective", "status", *named]
 
     def add(self, record: EvaluationRecord | StartRecord) -> None:
         """Append to history.csv or starts.jsonl and hand it to the system at once."""
@@ -84,7 +84,8 @@ class OutputFolder:
                 return
             coefficients = [repr(c / self.modulus_scale) for c in record.coefficients]
             value = "" if record.objective is None else repr(record.objective)
-            row = [record.start, record.analysis, value, record.status, *coefficients]
+            row = [record.start, record.analysis, record.solver, value, record.status]
+            row += coefficients
             _append(self._history, _table([[*row, *map(repr, record.nuisance)]]))
 
     def finish(self) -> None:

@@ -18,7 +18,7 @@ from ..identification.problem import FieldProblem
 
 @dataclass(frozen=True)
 class EvaluationRecord:
-    """One analysis: one row of history.csv. `objective` is None when the analysis failed."""
+    """One analysis by `solver`, a row of history.csv. `objective` is None when it failed."""
 
     start: int
     analysis: int
@@ -26,11 +26,15 @@ class EvaluationRecord:
     status: str
     coefficients: tuple[float, ...]
     nuisance: tuple[float, ...]
+    solver: str = "membrane"
 
 
 @dataclass(frozen=True)
 class StartRecord:
-    """How one start ended. `unknowns` are the optimiser's; objective None: no feasible start."""
+    """How one start ended. `unknowns` are the optimiser's; objective None: no feasible start.
+
+    analyses : in all; external_runs : of them, by an external solver.
+    """
 
     number: int
     seed: tuple[int, int]
@@ -40,6 +44,7 @@ class StartRecord:
     unknowns: tuple[float, ...]
     coefficients: tuple[float, ...]
     wall_s: float
+    external_runs: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, exact in JSON."""
@@ -57,6 +62,7 @@ class StartRecord:
             unknowns=tuple(map(float, values["unknowns"])),
             coefficients=tuple(map(float, values["coefficients"])),
             wall_s=float(values["wall_s"]),
+            external_runs=int(values.get("external_runs", 0)),
         )
 
 
@@ -72,20 +78,28 @@ def run_start(
     problem.reset()
     size = problem.parameters.size
 
-    def watch(y: NDArray, value: float | None, status: str) -> None:
+    analyses = runs = 0
+
+    def watch(y: NDArray, value: float | None, status: str, solver: str) -> None:
+        nonlocal analyses, runs
+        analyses += 1
+        runs += problem.solver.external and solver == problem.solver.name
         coefficients = problem.parameters.to_coefficients @ y[:size]
         tell(
             EvaluationRecord(
                 number,
-                problem.analyses,
+                analyses,
                 value,
                 status,
                 tuple(coefficients.tolist()),
                 tuple(np.asarray(y[size:]).tolist()),
+                solver,
             )
         )
 
-    problem.watch = watch
+    watched = [p for p in (problem, problem.surrogate) if p is not None]
+    for p in watched:
+        p.watch = watch
     try:
         start = feasible_start(problem, seed, number)
         optimum = fit_from(problem, start, options)
@@ -93,17 +107,19 @@ def run_start(
     except NoFeasibleStart as error:
         optimum, status = None, str(error)
     finally:
-        problem.watch = None
+        for p in watched:
+            p.watch = None
     wall = time.perf_counter() - begun
     if optimum is None:
-        return StartRecord(number, (seed, number), None, status, problem.analyses, (), (), wall)
+        return StartRecord(number, (seed, number), None, status, analyses, (), (), wall, runs)
     return StartRecord(
         number,
         (seed, number),
         optimum.value,
         optimum.status,
-        optimum.analyses,
+        analyses,
         tuple(optimum.best.unknowns.tolist()),
         tuple(optimum.coefficients.tolist()),
         wall,
+        runs,
     )

@@ -23,6 +23,7 @@ from bubblefit.identification.problem import FieldProblem
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from threadpoolctl import threadpool_limits
 
@@ -415,7 +416,7 @@ def test_the_number_of_analyses_is_a_limit(method: str) -> None:
 
 def test_watch_hears_of_every_analysis() -> None:
     heard: list[tuple[float | None, str]] = []
-    fit = problem(watch=lambda y, value, status: heard.append((value, status)))
+    fit = problem(watch=lambda y, value, status, solver: heard.append((value, status)))
     fit.solver = Failing(lambda run: run == 2)
     y = CUBIC.unknowns(LAW.beta)
     fit.evaluate(y, True)
@@ -483,6 +484,82 @@ def test_noise_in_e_is_about_what_was_put_in() -> None:
     truth = fit.evaluate(CUBIC.unknowns(LAW.beta), False).value
     found = levenberg_marquardt(fit, CUBIC.unknowns(LAW.beta), 1e-7, 100)
     assert found is not None and 0.9 * truth < found.value < truth
+
+
+# A solver without derivatives, led by the membrane
+
+
+class Thicker:
+    """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes."""
+
+    name, external = "thicker", True
+
+    def __init__(self, digits: int = 12, fails: tuple[int, ...] = ()) -> None:
+        self.digits, self.fails, self.runs = digits, fails, 0
+        self.membrane = MembraneSolver()
+
+    def run(self, model: BubbleModel, law: HypoelasticLaw, *unused: object) -> History:
+        self.runs += 1
+        if self.runs in self.fails:
+            raise SolverFailure("on purpose", self.name)
+        history = self.membrane.run(replace(model, thickness=1.02 * model.thickness), law)
+        return replace(history, displacement=np.round(history.displacement, self.digits))
+
+    def check(self) -> SolverCheck:
+        return SolverCheck(self.name, True, "1", True)
+
+
+def led(solver: Thicker) -> FieldProblem:
+    fields = solver.membrane.run(replace(MODEL, thickness=1.02 * MODEL.thickness), LAW)
+    objective = FieldObjective(targets(fields.displacement))
+    surrogate = FieldProblem(MODEL, MembraneSolver(), LAW, objective, CUBIC)
+    return FieldProblem(MODEL, solver, LAW, objective, CUBIC, surrogate=surrogate)
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_the_membrane_leads_another_solver_in_few_runs(number: int) -> None:
+    fit = led(Thicker())
+    heard: list[tuple[str, float]] = []
+    fit.watch = lambda y, value, status, solver: heard.append((solver, value))
+    found = fit_from(fit, feasible_start(fit, 1, number), FitOptions())
+    assert found is not None and found.status == "converged" and found.value < 1e-7
+    assert found.runs == fit.solver.runs == len(heard) <= 7
+    errors = [value for _, value in heard]
+    assert errors[2] < 1e-3 and errors[3] < 1e-4
+    law = LAW.with_beta(CUBIC.beta(found.best.unknowns))
+    assert max(moduli_error(law, LAW, np.full(3, 0.1)).values()) < 1e-5
+    assert fit.surrogate.objective is fit.objective
+
+
+def test_a_rounded_solver_settles_at_its_rounding() -> None:
+    fit = led(Thicker(digits=4))
+    rounding = fit.evaluate(CUBIC.unknowns(LAW.beta), False).value
+    fit.reset()
+    found = fit_from(fit, feasible_start(fit, 1, 0), FitOptions())
+    assert found.status == "settled" and found.value < 1.5 * rounding and found.runs <= 6
+
+
+def test_a_failed_run_shortens_the_step_and_the_fit_goes_on() -> None:
+    fit = led(Thicker(fails=(2,)))
+    told: list[float | None] = []
+    fit.watch = lambda y, value, status, solver: told.append(value)
+    found = fit_from(fit, feasible_start(fit, 1, 0), FitOptions())
+    assert told[1] is None and found.value < 1e-6
+    assert fit_from(led(Thicker(fails=(1,))), feasible_start(fit, 1, 0), FitOptions()) is None
+
+
+def test_the_best_run_is_returned_when_runs_are_used_up() -> None:
+    fit = led(Thicker())
+    found = fit_from(fit, feasible_start(fit, 1, 0), FitOptions(max_runs=2))
+    assert found.status == "runs used up" and found.runs == 2 and 1e-4 < found.value < 1e-2
+
+
+def test_nlopt_takes_differences_where_there_are_no_derivatives() -> None:
+    fit = led(Thicker())
+    start = feasible_start(fit, 1, 0)
+    options = FitOptions("slsqp", max_analyses=150)
+    found = fit_from(fit, start, options)
+    assert found is not None and found.value < 0.5 * fit.evaluate(start, False).value
 
 
 # Assessment

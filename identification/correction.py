@@ -1,0 +1,78 @@
+"""A fit to a solver without derivatives: the membrane leads, the other corrects it.
+
+Minimised is  membrane(beta) + [other(beta_k) - membrane(beta_k)] - data , with the membrane's exact
+Jacobian; the other solver then runs once at the new beta, and so on until its own objective
+settles. A step that worsens that objective is shortened (trust region). What counts, and what is
+returned, is always the other solver's objective.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fit import levenberg_marquardt
+from .optimum import Optimum
+from .problem import Evaluation, FieldProblem
+
+Array = NDArray[np.float64]
+
+SETTLED = 0.1  # relative decrease of e by one run that is no longer worth another
+SHORTER = 0.5
+MOST_SHORTENED = 3  # in a row
+
+
+def corrected_fit(
+    problem: FieldProblem, start: Array, tolerance: float, max_analyses: int, max_runs: int
+) -> Optimum | None:
+    """Fit from the unknowns `start`; None when the other solver fails at the membrane's own fit.
+
+    Parameters
+    ----------
+    problem : with the solver that counts, and a `surrogate` that differentiates.
+    max_analyses : of the surrogate, in each of its fits. max_runs : of the solver that counts.
+    """
+    surrogate = problem.surrogate
+    assert surrogate is not None
+    data = surrogate.objective
+    best: Evaluation | None = None
+    status, shortened = "runs used up", 0
+    try:
+        y = _led(surrogate, start, tolerance, max_analyses)
+        while y is not None and problem.analyses < max_runs:
+            point = problem.evaluate(y, False)
+            if best is not None and (point is None or point.value >= best.value):
+                level = point is not None and point.value < (1 + SETTLED) * best.value
+                if level or shortened == MOST_SHORTENED:
+                    status = "settled"
+                    break
+                shortened += 1
+                y = best.unknowns + SHORTER * (y - best.unknowns)
+                continue
+            if point is None:
+                return None
+            settled = best is not None and point.value > (1 - SETTLED) * best.value
+            best, shortened = point, 0
+            if best.value < tolerance or settled:
+                status = "settled" if settled else "converged"
+                break
+            beside = surrogate.evaluate(y, False, warm=False)
+            if beside is None:
+                status = f"{surrogate.solver.name} failed"
+                break
+            surrogate.objective = data.shifted(
+                point.history.displacement - beside.history.displacement
+            )
+            y = _led(surrogate, y, tolerance, max_analyses)
+    finally:
+        surrogate.objective = data
+    if best is None:
+        return None
+    return Optimum(best, status, problem.analyses + surrogate.analyses, problem.analyses)
+
+
+def _led(surrogate: FieldProblem, y: Array, tolerance: float, analyses: int) -> Array | None:
+    """Unknowns at the least of the surrogate's (corrected) objective."""
+    surrogate.warm_starts = True
+    found = levenberg_marquardt(surrogate, y, tolerance, surrogate.analyses + analyses)
+    return None if found is None else found.best.unknowns
