@@ -68,7 +68,7 @@ def project_solver(project: BubbleProject) -> Solver:
         solver = solver_named(project.solver, **project.solver_options.get(project.solver, {}))
     except InputError as error:
         field = error.field if error.field != "solver" else "fit.solver (or --solver)"
-        raise InputError(project.path, field, error.problem) from None
+        raise InputError(error.path or project.path, field, error.problem) from None
     # Once here, in one line, rather than as the failure of every analysis.
     if solver.external:
         found = solver.check()
