@@ -310,7 +310,7 @@ def study(folder, script):
 def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
     """Runs 1 and 2 make the data (for the command and for its starts); run 3 is killed."""
     script = f"echo x >> {tmp_path}/runs; [ $(wc -l < {tmp_path}/runs) = 3 ] && kill -9 $$\n"
-    command = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "3", "--jobs", "1"]
+    command = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", "1"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     with (tmp_path / "out" / "history.csv").open() as file:
