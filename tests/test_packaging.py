@@ -103,7 +103,7 @@ def test_make_and_ci_agree():
     run = (ROOT / ".ci" / "run").read_text()
     assert "make lint" in run and "make test" in run
     makefile = (ROOT / "Makefile").read_text()
-    for target in ("demo", "test", "lint", "bench", "clean"):
+    for target in ("demo", "test", "lint", "bench", "calculix", "clean"):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE)
 
 
