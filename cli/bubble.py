@@ -18,7 +18,7 @@ from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
 from ..runs.start import StartRecord
 from .bubble_figures import report
-from .bubble_results import assess, summary, write_numbers
+from .bubble_results import assess, summary, write_numbers, write_result
 from .bubble_setup import bubble_problem, bubble_setup
 from .fingerprint import fingerprint
 from .options import cores, default_folder, exits, solver_choice, with_solver
@@ -66,6 +66,8 @@ def command(
     begun = time.perf_counter()
     if resume and overwrite:
         raise InputError(None, "--resume, --overwrite", "give one of them, not both")
+    if fail_above is not None and not fail_above >= 0:
+        raise InputError(None, "--fail-above", f"expected 0 or more, got {fail_above:g}")
     settings = _with_options(
         with_solver(read_project(project, data), solver_given), starts, seed, method
     )
@@ -92,6 +94,7 @@ def command(
     assessment = assess(settings, setup, records, ranked, time.perf_counter() - begun)
     write_numbers(settings, setup, assessment, folder)
     report(settings, setup, assessment, folder)
+    write_result(assessment, folder)
     if as_json:
         click.echo(json.dumps(assessment.result, indent=1))
     else:

@@ -20,7 +20,7 @@ from ..reports import (
     write_report,
     write_vtu,
 )
-from ..runs.folder import OutputFolder
+from ..runs.folder import RESULT, OutputFolder
 from .bubble_setup import BubbleSetup
 from .project import BubbleProject
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 NOT_MATCHED = "for the record: the fit matched the points themselves"
 BEST = 5  # fits drawn beside the known solution, as in Figs 4.9 to 4.11
 FILES = (
-    ("result.json", "all numbers of this page, for programs"),
+    (RESULT, "all numbers of this page, for programs"),
     ("material.toml", "the material card"),
     ("history.csv", "one row an analysis"),
     ("surfaces.csv", "polynomial surfaces of the data"),
@@ -83,7 +83,7 @@ def report(
         figures=figures,
         tables=_tables(project, setup, found),
         starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in found.records],
-        files=[f for f in FILES if (folder.path / f[0]).exists()],
+        files=[f for f in FILES if f[0] == RESULT or (folder.path / f[0]).exists()],
         versions=result["versions"],
     )
     write_report(folder.path, page)

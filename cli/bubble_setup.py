@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 #: Leads the fit where the solver that counts gives no derivatives.
 SURROGATE = "membrane"
+#: Of the points on the disk, and of its radius covered: less is taken for a wrong unit.
+LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +60,16 @@ def project_solver(project: BubbleProject) -> Solver:
 
     Raises
     ------
+    InputError : there is no such solver (says in which file), or an option is wrong.
     SolverFailure : it is not installed, or does not carry the law.
     """
-    solver = solver_named(project.solver, **project.solver_options.get(project.solver, {}))
+    name = project.solver
+    try:
+        solver = solver_named(name, **project.solver_options.get(name, {}))
+    except InputError as error:
+        if error.field != "solver":
+            raise
+        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
     # Once here, in one line, rather than as the failure of every analysis.
     if solver.external:
         found = solver.check()
@@ -131,7 +140,11 @@ def _surfaces(
         count = min(len(f.points) for f in whole)
         if count < (project.match_degree + 1) ** 2:
             return ()
-    return tuple(fit_surface(f, project.match_degree) for f in whole)
+    try:
+        return tuple(fit_surface(f, project.match_degree) for f in whole)
+    except InputError as error:
+        problem = f"{error.field}: {error.problem}"
+        raise InputError(project.path, "match.degree", problem) from None
 
 
 def bubble_problem(project: BubbleProject) -> FieldProblem:
@@ -216,6 +229,22 @@ def _at_nodes(field: DisplacementField, mesh: Mesh) -> Array:
     return np.asarray(between)
 
 
+def _check_scale(
+    project: BubbleProject, field: DisplacementField, inside: NDArray[np.bool_]
+) -> None:
+    """Metres taken for millimetres, or the other way round, show in where the points lie."""
+    reach = float(np.abs(field.points).max())
+    if inside.mean() < LEAST_SHARE:
+        found = f"{int(inside.sum())} of {len(inside)} points lie on the disk of radius"
+    elif reach < LEAST_SHARE * project.radius:
+        found = f"all points lie within {reach:.3g} mm of the centre of a disk of radius"
+    else:
+        return
+    at = f"data at {field.pressure * 1e3:g} kPa"
+    problem = f"{found} {project.radius:g} mm: are the length unit and the columns x and y right?"
+    raise InputError(project.path, at, problem)
+
+
 def _at_points(
     project: BubbleProject, fields: tuple[DisplacementField, ...], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
@@ -223,12 +252,6 @@ def _at_points(
     for field in fields:
         sample, inside = sampling_matrix(mesh, field.points)
         outside += int((~inside).sum())
-        if not inside.any():
-            raise InputError(
-                project.path,
-                f"data at {field.pressure * 1e3:g} kPa",
-                f"no point lies within {project.radius:g} mm of the centre: are the length unit "
-                "and the columns x and y right?",
-            )
+        _check_scale(project, field, inside)
         targets.append(FieldTarget(field.pressure, field.displacement[inside], sample))
     return targets, outside

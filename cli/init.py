@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -30,12 +31,19 @@ def command(folder: Path, example: str) -> None:
     for file in files:
         if (folder / file.name).exists():
             raise InputError(folder / file.name, "", "is already there; name another folder")
+    written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for file in files:
-            (folder / file.name).write_bytes(file.read_bytes())
+            written.append(folder / file.name)
+            written[-1].write_bytes(file.read_bytes())
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror}") from None
+        for path in written:  # half an example would be in the way of the next attempt
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+        raise OutputError(
+            f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
+        ) from None
     project = folder / ("project.toml" if example == "known" else "test1-linear.toml")
     click.echo(f"wrote {', '.join(f.name for f in files)} to {folder}")
     click.echo(f"next: bubblefit bubble {project}" + (" --data DIR" if example != "known" else ""))

@@ -142,6 +142,9 @@ def read_project(
             path, "bubble.increments", bubble.increments, pressure, pressures
         )
     lower, upper = _bounds(path, file, modulus)
+    if bubble.thickness >= bubble.radius:
+        problem = f"expected less than the radius {bubble.radius:g}, got {bubble.thickness:g}"
+        raise InputError(path, "bubble.thickness", f"{problem} {file.units.length}")
     return BubbleProject(
         path=path,
         title=file.project.title or path.parent.resolve().name,

@@ -63,6 +63,9 @@ def locate_data(
         problem = "expected exactly one of [data.known_solution] and [data.points]"
         raise InputError(path, "data", problem)
     if known is not None:
+        if data_folder is not None:
+            problem = "this project computes its data and reads none; leave --data out"
+            raise InputError(path, "data.known_solution", problem)
         return _known(path, file, known, pressures, increments)
     assert points is not None
     return _points(path, file, points, len(pressures), data_folder, need_data)
@@ -121,6 +124,12 @@ def _points(
     need_data: bool,
 ) -> PointFiles:
     names = _file_names(path, points)
+    columns = points.columns.model_dump()
+    for name, column in columns.items():
+        first = next(other for other in columns if columns[other] == column)
+        if first != name:
+            problem = f"column {column!r} is named for {first} and for {name}"
+            raise InputError(path, f"data.points.columns.{name}", problem)
     if len(names) != count:
         field = "data.points.files" if points.files is not None else "data.points.indices"
         problem = f"expected one file for each of the {count} pressures, got {len(names)}"
@@ -131,7 +140,7 @@ def _points(
         _check_there(path, folder, files)
     return PointFiles(
         files=files,
-        columns=points.columns.model_dump(),
+        columns=columns,
         flag_column=points.flag_column,
         comment=points.comment,
         length_scale=LENGTH_UNITS[points.length_unit or file.units.length],

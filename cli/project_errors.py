@@ -39,6 +39,10 @@ def _problem(error: Mapping[str, Any]) -> str:
         return _unknown(location)
     if kind == "finite_number":
         return f"expected a finite number, got {given!r}"
+    if kind in ("too_short", "too_long"):
+        few = "at least" if kind == "too_short" else "at most"
+        count = error["ctx"]["min_length" if kind == "too_short" else "max_length"]
+        return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
     return f"expected {expected}, got {_short(given)}"
 

@@ -6,12 +6,21 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
+
 #: MPa per unit, MPa per unit, mm per unit.
 MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
 PRESSURE_UNITS = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
 LENGTH_UNITS = {"mm": 1.0, "m": 1000.0}
 
-Positive = Annotated[float, Field(gt=0)]
+#: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
+HUGE = 1e18
+
+Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
+Positive = Annotated[float, Field(gt=0, le=HUGE)]
+#: Logarithmic, so 2 is 640 %: who writes 13 means percent.
+Strain = Annotated[float, Field(gt=0, le=2)]
+Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
 LengthUnit = Literal["mm", "m"]
 
@@ -38,7 +47,7 @@ class BubbleSection(Section):
     thickness: Positive
     pressures: Annotated[list[Positive], Field(min_length=1)]
     increments: list[Positive] | None = None
-    elements: Annotated[int, Field(ge=8)] = 800
+    elements: Elements = 800
     symmetry: Symmetry = "full"
     generator: Literal["blocks", "gmsh"] = "blocks"
 
@@ -47,17 +56,17 @@ class MaterialSection(Section):
     nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
     thickness_change: Literal["constant", "incompressible"] = "constant"
     degree: Annotated[int, Field(ge=0, le=3)] = 3
-    strain_range: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+    strain_range: Annotated[list[Strain], Field(min_length=3, max_length=3)] | None = None
 
 
 class BoundsSection(Section):
-    lower: list[float]
-    upper: list[float]
+    lower: list[Number]
+    upper: list[Number]
 
 
 class KnownSolutionSection(Section):
-    beta: list[float]
-    elements: Annotated[int, Field(ge=8)] | None = None
+    beta: list[Number]
+    elements: Elements | None = None
     increments: list[Positive] | None = None
     symmetry: Symmetry | None = None
 

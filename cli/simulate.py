@@ -73,12 +73,13 @@ def simulate_bubble(
         "strain_reached": dict(zip(("warp", "fill", "shear"), reached.tolist(), strict=True)),
         "warnings": [*history.remarks, *beyond, *unstable],
     }
-    with replacing(folder / "result.json") as path:
-        path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     with replacing(folder / "displacement.csv") as path:
         path.write_text(_table(1e3 * history.load, model.mesh.points, u), encoding="utf-8")
     write_vtu(model.mesh, u[-1], folder / "bubble.vtu")
     plot_profiles(folder / "profiles.png", settings.pressures, model.mesh.points, u)
+    # Last: where it is, the output is complete.
+    with replacing(folder / "result.json") as path:
+        path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if as_json:
         click.echo(json.dumps(result, indent=1))
         return

@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -104,14 +103,6 @@ def test_the_full_disk_is_the_quarter_mirrored():
     quarter, full = disk_mesh(RADIUS, 800, "quarter"), disk_mesh(RADIUS, 800, "full")
     mirrored = {tuple(p * (sx, sy, 1)) for p in quarter.points for sx in (1, -1) for sy in (1, -1)}
     assert {tuple(p) for p in full.points} == mirrored
-
-
-def test_a_fine_mesh_takes_well_under_a_second():
-    begun = time.perf_counter()
-    mesh = disk_mesh(RADIUS, 20_000)
-    scaled_jacobian(mesh)
-    assert time.perf_counter() - begun < 0.5
-    assert len(mesh.quads) == 20_000
 
 
 @pytest.mark.parametrize(
