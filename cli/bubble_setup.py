@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,14 +60,16 @@ def project_solver(project: BubbleProject) -> Solver:
 
     Raises
     ------
-    InputError : there is none of that name. SolverFailure : it is not installed, or does not
-        carry the law.
+    InputError : there is no such solver (says in which file), or an option is wrong.
+    SolverFailure : it is not installed, or does not carry the law.
     """
+    name = project.solver
     try:
-        solver = solver_named(project.solver, **project.solver_options.get(project.solver, {}))
+        solver = solver_named(name, **project.solver_options.get(name, {}))
     except InputError as error:
-        field = error.field if error.field != "solver" else "fit.solver (or --solver)"
-        raise InputError(error.path or project.path, field, error.problem) from None
+        if error.field != "solver":
+            raise
+        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
     # Once here, in one line, rather than as the failure of every analysis.
     if solver.external:
         found = solver.check()

@@ -90,7 +90,7 @@ def test_versions_agree():
 
 @pytest.mark.parametrize(
     ("module", "absent"),
-    [("cli.main", {"numpy", "matplotlib", "numba", "gmsh"}), ("cli.bubble", {"gmsh"})],
+    [("cli.main", {"matplotlib", "numba", "gmsh"}), ("cli.bubble", {"gmsh"})],
 )
 def test_start_up_loads_only_what_it_needs(module, absent):
     # gmsh needs X and GL libraries; the others make `bubblefit --help` slow.

@@ -64,7 +64,11 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     if jacobian:
         where = f" in element {jacobian[1]}" if jacobian[1] else ""
         return f"negative Jacobian{where} {reached}"
-    if re.search(r"increment size smaller than minimum|max. # of increments|too many cutbacks", text, re.IGNORECASE):
+    if re.search(
+        r"increment size smaller than minimum|max. # of increments|too many cutbacks",
+        text,
+        re.IGNORECASE,
+    ):
         following = done[-1].increment + 1 if done else 1
         step = done[-1].step if done else 1
         return (

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...meshes.mesh import Mesh
 
 Element = Literal["S4", "S8R"]
-ELEMENTS: tuple[Element, ...] = ("S4", "S8R")
+ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
 
 
 @dataclass(frozen=True, eq=False)
