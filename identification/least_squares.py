@@ -38,7 +38,6 @@ def descend(
     `reweighted`: minimise e itself, not the sum of squared blocks; `held` unknowns stay.
     Returns the last (best) point and "converged", "settled" or "analyses used up".
     """
-    a, c = problem.parameters.inequalities
     damping, growth, idle = FIRST_DAMPING, 2.0, 0
     scale: Array | None = None
     while True:
@@ -56,6 +55,7 @@ def descend(
         # Half-life of one iteration: directions that went flat keep some damping.
         scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
         gradient = j.T @ r
+        a, c = problem.parameters.inequalities
         for _ in range(MOST_TRIALS):
             if problem.analyses >= max_analyses:
                 return point, "analyses used up"

@@ -42,6 +42,8 @@ class Evaluation:
 Watch = Callable[[Array, float | None, str, str], None]
 
 
+#: Status of an analysis whose equilibrium no test can show.
+UNSTABLE = "unstable equilibrium"
 #: Largest predicted change of displacement, relative, for a warm start.
 NEAR = 0.02
 
@@ -99,10 +101,10 @@ class FieldProblem:
         if slope is not None:
             jacobian = self._chain(slope)
         value = self.objective.value(residual)
-        self._report(y, value, "ok")
         coefficients = beta[self.parameters.places]
         point = Evaluation(y.copy(), coefficients, residual, value, jacobian, history)
         self.unstable += not point.stable
+        self._report(y, value, "ok" if point.stable else UNSTABLE)
         return point
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
