@@ -116,6 +116,12 @@ def test_negative_jacobian(fake):
     )
 
 
+def test_too_many_increments_is_no_convergence(fake):
+    text = " *ERROR in nonlingeo: max. # of increments reached"
+    found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\necho '{text}'; exit 201"))
+    assert "did not converge at step 1, increment 3" in found.reason
+
+
 def test_a_hanging_program_is_killed_with_its_children(fake, tmp_path):
     pids = tmp_path / "pids"
     solver = fake(f"sleep 1000 & echo $! $$ > {pids}; wait", timeout=1.0)
@@ -231,7 +237,7 @@ def test_a_law_that_cannot_converge(ccx, tmp_path):
     beta[10:12] = -8e4, 800.0
     with pytest.raises(SolverFailure) as found:
         CalculixSolver(element="S4", scratch=tmp_path).run(model(), LAW.with_beta(beta))
-    assert "did not converge at step" in found.value.reason
+    assert "did not converge at" in found.value.reason
     assert found.value.exit_number == 201 and found.value.scratch.parent == tmp_path
 
 
