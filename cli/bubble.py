@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from ..errors import InputError, NoFeasibleStart
+from ..experiments.fields import DisplacementField
 from ..identification.methods import METHODS, FitOptions
 from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
@@ -78,7 +79,7 @@ def command(
     columns = [f"beta_{i}" for i in settings.free] + list(setup.problem.parameters.nuisance)
     done = folder.begin(fingerprint(settings, setup), columns, resume, overwrite)
     try:
-        records = _study(settings, folder, done, jobs or cores(), quiet or as_json)
+        records = _study(settings, setup.fields, folder, done, jobs or cores(), quiet or as_json)
     except KeyboardInterrupt:
         folder.close()
         click.echo(f"interrupted; go on with --resume (kept in {folder.path})", err=True)
@@ -117,6 +118,7 @@ def _with_options(
 
 def _study(
     project: BubbleProject,
+    fields: tuple[DisplacementField, ...],
     folder: OutputFolder,
     done: dict[int, StartRecord],
     jobs: int,
@@ -131,7 +133,7 @@ def _study(
     )
     finished = {n: r for n, r in done.items() if n < project.starts}
     missing = [n for n in range(project.starts) if n not in finished]
-    build = functools.partial(bubble_problem, project)
+    build = functools.partial(bubble_problem, project, fields)
     known = [r.objective for r in finished.values() if r.objective is not None]
     best = min(known, default=None)
     with StudyProgress(project.starts, len(finished), quiet, best) as progress:

@@ -78,8 +78,10 @@ def project_solver(project: BubbleProject) -> Solver:
     return solver
 
 
-def bubble_setup(project: BubbleProject) -> BubbleSetup:
-    """Read or compute the data and set up the fit.
+def bubble_setup(
+    project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
+) -> BubbleSetup:
+    """Read or compute the data, unless `fields` are given, and set up the fit.
 
     Raises
     ------
@@ -93,9 +95,9 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     known = None
     if isinstance(project.data, KnownSolution):
         known = law.with_beta(project.data.beta)
-        fields = _computed(project, project.data, model, known, solver)
+        fields = fields or _computed(project, project.data, model, known, solver)
     else:
-        fields = _measured(project, project.data)
+        fields = fields or _measured(project, project.data)
     folded = tuple(_folded(f) for f in fields) if project.symmetry == "quarter" else fields
     surfaces = _surfaces(project, fields, known is not None)
     if project.match_by == "surfaces":
@@ -147,9 +149,11 @@ def _surfaces(
         raise InputError(project.path, "match.degree", problem) from None
 
 
-def bubble_problem(project: BubbleProject) -> FieldProblem:
-    """Only the fit: what each worker process builds for itself."""
-    return bubble_setup(project).problem
+def bubble_problem(
+    project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
+) -> FieldProblem:
+    """Only the fit: what each worker process builds for itself, from data that are there."""
+    return bubble_setup(project, fields).problem
 
 
 def _computed(
@@ -175,7 +179,13 @@ def _computed(
     try:
         history = solver.run(source, known)
     except SolverFailure as failure:
-        raise SolverFailure(f"the known solution cannot be run: {failure.reason}") from None
+        raise SolverFailure(
+            f"the known solution cannot be run: {failure.reason}",
+            failure.solver,
+            failure.exit_number,
+            failure.log_tail,
+            failure.scratch,
+        ) from None
     return tuple(
         DisplacementField(p, source.mesh.points[:, :2], u, 0)
         for p, u in zip(project.pressures, history.displacement, strict=True)

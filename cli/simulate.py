@@ -19,6 +19,7 @@ from ..writing import replacing
 from .bubble_results import UNSTABLE
 from .bubble_setup import bubble_model, project_solver
 from .options import default_folder, exits, solver_choice, with_solver
+from .progress import run_progress
 from .project import read_project
 
 
@@ -51,7 +52,8 @@ def simulate_bubble(
     if (folder / "result.json").exists() and not overwrite:
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
     model = replace(bubble_model(settings), thickness=card.thickness)
-    history = solver.run(model, card.law)
+    with run_progress(solver, len(model.increments), as_json):
+        history = solver.run(model, card.law)
     u = history.displacement
     apex = int(model.mesh.node_sets["apex"][0])
     shear = max(abs(history.strain_min[2]), history.strain_max[2])

@@ -275,3 +275,17 @@ def test_solver_options_are_checked(tmp_path):
     assert "there is no such file" in done.stderr and done.stderr.count("\n") == 1
     done = bubblefit(*arguments, "--templates", "nowhere", cwd=tmp_path, code=2)
     assert "nowhere: templates: there is no such folder" in done.stderr
+
+
+def test_a_pressure_offset_reaches_an_external_solver(ccx):
+    model = bubble(64, "quarter", (0.022, 0.059))
+    moved = model.with_pressure_offset(0.003)
+    np.testing.assert_allclose(moved.pressures, (0.025, 0.062))
+    found = CalculixSolver(element="S4").run(moved, LINEAR)
+    expected = MembraneSolver().run(model, LINEAR, pressure_offset=0.003)
+    np.testing.assert_allclose(found.load, expected.load)
+    apex = model.mesh.node_sets["apex"][0]
+    heights = found.displacement[:, apex, 2], expected.displacement[:, apex, 2]
+    np.testing.assert_allclose(*heights, rtol=2e-3)
+    with pytest.raises(InputError):
+        model.with_pressure_offset(-0.02)

@@ -14,6 +14,9 @@ FINISHED = "Job finished"
 FULL = 1024**2
 _ERROR = re.compile(r"^\s*\*ERROR\b:?\s*(.*(?:\n {6,}\S.*)*)", re.MULTILINE)
 _JACOBIAN = re.compile(r"nonpositive jacobian.*?element\s*(\d*)", re.IGNORECASE | re.DOTALL)
+_TOO_SMALL = re.compile(
+    r"increment size smaller than minimum|max\. # of increments|too many cutbacks", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -64,16 +67,9 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     if jacobian:
         where = f" in element {jacobian[1]}" if jacobian[1] else ""
         return f"negative Jacobian{where} {reached}"
-    if re.search(
-        r"increment size smaller than minimum|max. # of increments|too many cutbacks",
-        text,
-        re.IGNORECASE,
-    ):
-        following = done[-1].increment + 1 if done else 1
-        step = done[-1].step if done else 1
-        return (
-            f"did not converge at step {step}, increment {following}: increments became too small"
-        )
+    if _TOO_SMALL.search(text):
+        at = f"step {done[-1].step}, increment {done[-1].increment + 1}" if done else "increment 1"
+        return f"did not converge at {at}: the increments became too small or too many"
     error = _ERROR.search(text)
     if error:
         return f"{' '.join(error[1].split())} ({reached})"

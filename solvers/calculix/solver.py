@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
+from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
 from ..base import History, SolverCheck
 from ..process import log_tail, run_process
@@ -67,7 +68,7 @@ class CalculixSolver:
         self.timeout, self.scratch, self.keep = timeout, scratch, keep
         self.threads, self.progress = threads, progress
         self._found: Executable | None = None
-        self._shells: tuple[BubbleModel, ShellMesh] | None = None
+        self._shells: tuple[Mesh, ShellMesh] | None = None
 
     def check(self) -> SolverCheck:
         """Whether there is a ccx that can load the law; its version."""
@@ -163,8 +164,8 @@ class CalculixSolver:
         return bubble_history(folder / f"{JOB}.frd", model, self._shell_mesh(model), iterations)
 
     def _shell_mesh(self, model: BubbleModel) -> ShellMesh:
-        if self._shells is None or self._shells[0] is not model:
-            self._shells = (model, shell_mesh(model.mesh, self.element))
+        if self._shells is None or self._shells[0] is not model.mesh:
+            self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
         return self._shells[1]
 
 
