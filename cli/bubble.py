@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from ..errors import InputError, NoFeasibleStart
+from ..experiments.fields import DisplacementField
 from ..identification.methods import METHODS, FitOptions
 from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
@@ -21,7 +22,7 @@ from .bubble_figures import report
 from .bubble_results import assess, summary, write_numbers, write_result
 from .bubble_setup import bubble_problem, bubble_setup
 from .fingerprint import fingerprint
-from .options import cores, default_folder, exits
+from .options import cores, default_folder, exits, solver_choice, with_solver
 from .progress import StudyProgress
 from .project import BubbleProject, read_project
 
@@ -36,7 +37,7 @@ WORSE = 1  # exit code of --fail-above
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
 @click.option("--method", type=click.Choice(METHODS), help="Optimiser.")
-@click.option("--solver", "solver_name", metavar="NAME", help="Solver that runs the model.")
+@solver_choice
 @click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted study.")
 @click.option("--overwrite", is_flag=True, help="Replace what the output folder holds.")
@@ -51,7 +52,7 @@ def command(
     seed: int | None,
     jobs: int | None,
     method: str | None,
-    solver_name: str | None,
+    solver_given: dict[str, Any],
     fail_above: float | None,
     resume: bool,
     overwrite: bool,
@@ -68,7 +69,9 @@ def command(
         raise InputError(None, "--resume, --overwrite", "give one of them, not both")
     if fail_above is not None and not fail_above >= 0:
         raise InputError(None, "--fail-above", f"expected 0 or more, got {fail_above:g}")
-    settings = _with_options(read_project(project, data), starts, seed, method, solver_name)
+    settings = _with_options(
+        with_solver(read_project(project, data), solver_given), starts, seed, method
+    )
     setup = bubble_setup(settings)
     folder = OutputFolder(
         out or default_folder(project), settings.modulus_unit, settings.modulus_scale
@@ -76,7 +79,7 @@ def command(
     columns = [f"beta_{i}" for i in settings.free] + list(setup.problem.parameters.nuisance)
     done = folder.begin(fingerprint(settings, setup), columns, resume, overwrite)
     try:
-        records = _study(settings, folder, done, jobs or cores(), quiet or as_json)
+        records = _study(settings, setup.fields, folder, done, jobs or cores(), quiet or as_json)
     except KeyboardInterrupt:
         folder.close()
         click.echo(f"interrupted; go on with --resume (kept in {folder.path})", err=True)
@@ -108,14 +111,14 @@ def _with_options(
     starts: int | None,
     seed: int | None,
     method: str | None,
-    solver: str | None,
 ) -> BubbleProject:
-    given: dict[str, Any] = {"starts": starts, "seed": seed, "method": method, "solver": solver}
+    given: dict[str, Any] = {"starts": starts, "seed": seed, "method": method}
     return replace(project, **{k: v for k, v in given.items() if v is not None})
 
 
 def _study(
     project: BubbleProject,
+    fields: tuple[DisplacementField, ...],
     folder: OutputFolder,
     done: dict[int, StartRecord],
     jobs: int,
@@ -130,7 +133,7 @@ def _study(
     )
     finished = {n: r for n, r in done.items() if n < project.starts}
     missing = [n for n in range(project.starts) if n not in finished]
-    build = functools.partial(bubble_problem, project)
+    build = functools.partial(bubble_problem, project, fields)
     known = [r.objective for r in finished.values() if r.objective is not None]
     best = min(known, default=None)
     with StudyProgress(project.starts, len(finished), quiet, best) as progress:

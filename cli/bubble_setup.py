@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,28 +49,45 @@ class BubbleSetup:
     outside: int
 
 
-def chosen_solver(name: str, path: Path) -> Solver:
-    """The solver that a project file or the command line names; InputError says which file."""
-    try:
-        return solver_named(name)
-    except InputError as error:
-        raise InputError(path, "fit.solver (or --solver)", error.problem) from None
-
-
 def bubble_model(project: BubbleProject) -> BubbleModel:
     """The model of a project."""
     mesh = disk_mesh(project.radius, project.elements, project.symmetry, project.generator)
     return BubbleModel(mesh, project.thickness, project.pressures, project.increments)
 
 
-def bubble_setup(project: BubbleProject) -> BubbleSetup:
-    """Read or compute the data and set up the fit.
+def project_solver(project: BubbleProject) -> Solver:
+    """The solver that the project file or the command line names, with its options.
+
+    Raises
+    ------
+    InputError : there is no such solver (says in which file), or an option is wrong.
+    SolverFailure : it is not installed, or does not carry the law.
+    """
+    name = project.solver
+    try:
+        solver = solver_named(name, **project.solver_options.get(name, {}))
+    except InputError as error:
+        if error.field != "solver":
+            raise
+        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
+    # Once here, in one line, rather than as the failure of every analysis.
+    if solver.external:
+        found = solver.check()
+        if not (found.available and found.carries_law):
+            raise SolverFailure(found.advice or "is not usable", solver.name)
+    return solver
+
+
+def bubble_setup(
+    project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
+) -> BubbleSetup:
+    """Read or compute the data, unless `fields` are given, and set up the fit.
 
     Raises
     ------
     InputError : in the project or its data. SolverFailure : the known solution cannot be run.
     """
-    solver = chosen_solver(project.solver, project.path)
+    solver = project_solver(project)
     model = bubble_model(project)
     law = HypoelasticLaw(
         np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change
@@ -79,9 +95,9 @@ def bubble_setup(project: BubbleProject) -> BubbleSetup:
     known = None
     if isinstance(project.data, KnownSolution):
         known = law.with_beta(project.data.beta)
-        fields = _computed(project, project.data, model, known, solver)
+        fields = fields or _computed(project, project.data, model, known, solver)
     else:
-        fields = _measured(project, project.data)
+        fields = fields or _measured(project, project.data)
     folded = tuple(_folded(f) for f in fields) if project.symmetry == "quarter" else fields
     surfaces = _surfaces(project, fields, known is not None)
     if project.match_by == "surfaces":
@@ -133,9 +149,11 @@ def _surfaces(
         raise InputError(project.path, "match.degree", problem) from None
 
 
-def bubble_problem(project: BubbleProject) -> FieldProblem:
-    """Only the fit: what each worker process builds for itself."""
-    return bubble_setup(project).problem
+def bubble_problem(
+    project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
+) -> FieldProblem:
+    """Only the fit: what each worker process builds for itself, from data that are there."""
+    return bubble_setup(project, fields).problem
 
 
 def _computed(
@@ -161,7 +179,13 @@ def _computed(
     try:
         history = solver.run(source, known)
     except SolverFailure as failure:
-        raise SolverFailure(f"the known solution cannot be run: {failure.reason}") from None
+        raise SolverFailure(
+            f"the known solution cannot be run: {failure.reason}",
+            failure.solver,
+            failure.exit_number,
+            failure.log_tail,
+            failure.scratch,
+        ) from None
     return tuple(
         DisplacementField(p, source.mesh.points[:, :2], u, 0)
         for p, u in zip(project.pressures, history.displacement, strict=True)

@@ -12,7 +12,9 @@ from .bubble_setup import BubbleSetup
 from .project import BubbleProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
-FREE = {"path", "title", "starts", "data"}
+FREE = {"path", "title", "starts", "data", "solver_options"}
+# Of an external solver's options, what does.
+DECK = ("element", "templates")
 
 
 def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
@@ -21,6 +23,9 @@ def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
     for field in fields(project):
         if field.name not in FREE:
             digest.update(f"{field.name}={_plain(getattr(project, field.name))};".encode())
+    options = project.solver_options.get(project.solver, {})
+    for name in DECK:
+        digest.update(f"{name}={options.get(name)};".encode())
     for target in setup.problem.objective.targets:
         digest.update(np.ascontiguousarray(target.displacement).tobytes())
     return digest.hexdigest()

@@ -13,6 +13,7 @@ COMMANDS = {
     "bubble": ("bubble", "Fit a material to a bubble inflation test."),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "init": ("init", "Write a commented example project."),
+    "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }
 
 

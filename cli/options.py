@@ -5,13 +5,17 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import BubblefitError
+from ..errors import BubblefitError, InputError
+
+if TYPE_CHECKING:
+    from .project import BubbleProject
 
 INTERRUPTED = 130
 
@@ -44,3 +48,44 @@ def default_folder(project: Path) -> Path:
     """out/NAME below the current folder, after the project's folder and file."""
     name = project.resolve().parent.name
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+
+
+def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options that pick a solver; the command is given them as one dict, `solver_given`."""
+
+    @click.option("--solver", metavar="NAME", help="Solver that runs the model.")
+    @click.option("--ccx", metavar="PATH", help="The CalculiX to run.")
+    @click.option(
+        "--templates", type=click.Path(path_type=Path), help="Folder of your own input decks."
+    )
+    @click.option("--element", metavar="NAME", help="Shell element of CalculiX: S8R or S4.")
+    @functools.wraps(command)
+    def wrapped(
+        *args: Any,
+        solver: str | None,
+        ccx: str | None,
+        templates: Path | None,
+        element: str | None,
+        **kwargs: Any,
+    ) -> Any:
+        given = {"solver": solver, "ccx": ccx, "templates": templates, "element": element}
+        return command(*args, solver_given=given, **kwargs)
+
+    return wrapped
+
+
+def with_solver(project: BubbleProject, given: Mapping[str, Any]) -> BubbleProject:
+    """The project with the solver and the solver's options of the command line.
+
+    Raises
+    ------
+    InputError : an option of a solver that does not run.
+    """
+    name = given["solver"] or project.solver
+    mine = {k: v for k, v in given.items() if k != "solver" and v is not None}
+    known = project.solver_options.get(name, {})
+    for option in mine:
+        if option not in known:
+            raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
+    options = {**project.solver_options, name: {**known, **mine}}
+    return replace(project, solver=name, solver_options=options)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -12,6 +15,22 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ..runs.start import EvaluationRecord, StartRecord
 
 PLAIN_EVERY_S = 60.0
+
+
+@contextmanager
+def run_progress(solver: Any, steps: int, quiet: bool) -> Iterator[None]:
+    """Steps done of one run, on a terminal, where the solver tells while it runs."""
+    if quiet or not sys.stderr.isatty() or not hasattr(solver, "progress"):
+        yield
+        return
+    columns = (TextColumn("step"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("step", total=steps)
+        solver.progress = lambda increment: bar.update(task, completed=increment.time)
+        try:
+            yield
+        finally:
+            solver.progress = None
 
 
 class StudyProgress:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,13 @@ from ..errors import InputError
 from ..models.bubble import default_increments
 from .project_data import KnownSolution, PointFiles, locate_data, merge_increments
 from .project_errors import first_error
-from .project_schema import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, ProjectFile
+from .project_schema import (
+    LENGTH_UNITS,
+    MODULUS_UNITS,
+    PRESSURE_UNITS,
+    CalculixSection,
+    ProjectFile,
+)
 
 Array = NDArray[np.float64]
 
@@ -35,6 +43,7 @@ class BubbleProject:
     power first). `free` : their places in the full beta (12,). `pressures` are reported and
     matched, `increments` are the load steps and contain them. `strain_range` : ends
     (eps1, eps2, gamma12). `margin_E`, `margin_G` : smallest modulus allowed on that range.
+    `solver_options` : by name of a solver, what its constructor is given.
     `modulus_unit`, `modulus_scale` : unit of the file and MPa per unit, for output in kind.
 
     Raises
@@ -75,6 +84,7 @@ class BubbleProject:
     pressure_offset: bool
     modulus_unit: str
     modulus_scale: float
+    solver_options: Mapping[str, Mapping[str, Any]]
 
     def __post_init__(self) -> None:
         if self.method == "lm" and self.constraints == "boolean":
@@ -169,7 +179,20 @@ def read_project(
         pressure_offset=fit.nuisance.pressure_offset,
         modulus_unit=file.units.modulus,
         modulus_scale=modulus,
+        solver_options={"calculix": _calculix(path, file.solver.calculix)},
     )
+
+
+def _calculix(path: Path, section: CalculixSection) -> dict[str, Any]:
+    """Options of CalculixSolver; paths in a project file are beside that file."""
+    options = section.model_dump()
+    for name in ("templates", "scratch"):
+        if options[name] is not None:
+            options[name] = path.parent / options[name]
+    # A bare name is a program on the PATH.
+    if options["ccx"] is not None and os.sep in options["ccx"]:
+        options["ccx"] = path.parent / os.path.expanduser(options["ccx"])
+    return options
 
 
 def _parse(path: Path) -> ProjectFile:

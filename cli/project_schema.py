@@ -124,6 +124,20 @@ class FitSection(Section):
     nuisance: NuisanceSection = NuisanceSection()
 
 
+class CalculixSection(Section):
+    ccx: str | None = None
+    templates: str | None = None
+    element: Literal["S8R", "S4"] = "S8R"
+    timeout: Positive = 3600.0
+    scratch: str | None = None
+    keep: bool = False
+    threads: Annotated[int, Field(ge=1)] = 1
+
+
+class SolverSection(Section):
+    calculix: CalculixSection = CalculixSection()
+
+
 class ProjectFile(Section):
     """The whole file."""
 
@@ -135,3 +149,4 @@ class ProjectFile(Section):
     data: DataSection
     match: MatchSection = MatchSection()
     fit: FitSection = FitSection()
+    solver: SolverSection = SolverSection()

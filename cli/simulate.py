@@ -7,6 +7,7 @@ import io
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -16,8 +17,9 @@ from ..materials.card import read_card
 from ..reports import plot_profiles, write_vtu
 from ..writing import replacing
 from .bubble_results import UNSTABLE
-from .bubble_setup import bubble_model, chosen_solver
-from .options import default_folder, exits
+from .bubble_setup import bubble_model, project_solver
+from .options import default_folder, exits, solver_choice, with_solver
+from .progress import run_progress
 from .project import read_project
 
 
@@ -30,7 +32,7 @@ def command() -> None:
 @click.argument("project", type=click.Path(path_type=Path))
 @click.option("--card", "card_path", type=click.Path(path_type=Path), required=True)
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder [out/NAME-simulated].")
-@click.option("--solver", "solver_name", metavar="NAME", help="Solver that runs the model.")
+@solver_choice
 @click.option("--overwrite", is_flag=True, help="Replace what the output folder holds.")
 @click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout.")
 @exits
@@ -38,19 +40,20 @@ def simulate_bubble(
     project: Path,
     card_path: Path,
     out: Path | None,
-    solver_name: str | None,
+    solver_given: dict[str, Any],
     overwrite: bool,
     as_json: bool,
 ) -> None:
     """Inflate the bubble of PROJECT.toml with the material of a card."""
-    settings = read_project(project, need_data=False)
+    settings = with_solver(read_project(project, need_data=False), solver_given)
     card = read_card(card_path)
-    solver = chosen_solver(solver_name or settings.solver, project)
+    solver = project_solver(settings)
     folder = out or default_folder(project).with_name(default_folder(project).name + "-simulated")
     if (folder / "result.json").exists() and not overwrite:
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
     model = replace(bubble_model(settings), thickness=card.thickness)
-    history = solver.run(model, card.law)
+    with run_progress(solver, len(model.increments), as_json):
+        history = solver.run(model, card.law)
     u = history.displacement
     apex = int(model.mesh.node_sets["apex"][0])
     shear = max(abs(history.strain_min[2]), history.strain_max[2])

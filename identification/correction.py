@@ -25,7 +25,7 @@ MOST_SHORTENED = 3  # in a row
 def corrected_fit(
     problem: FieldProblem, start: Array, tolerance: float, max_analyses: int, max_runs: int
 ) -> Optimum | None:
-    """Fit from the unknowns `start`; None when the other solver fails at the membrane's own fit.
+    """Fit from the unknowns `start`; None when the other solver fails wherever the membrane leads.
 
     Parameters
     ----------
@@ -41,16 +41,19 @@ def corrected_fit(
         y = _led(surrogate, start, tolerance, max_analyses)
         while y is not None and problem.analyses < max_runs:
             point = problem.evaluate(y, False)
-            if best is not None and (point is None or point.value >= best.value):
-                level = point is not None and point.value < (1 + SETTLED) * best.value
+            if point is None or (best is not None and point.value >= best.value):
+                level = (
+                    point is not None
+                    and best is not None
+                    and point.value < (1 + SETTLED) * best.value
+                )
                 if level or shortened == MOST_SHORTENED:
                     status = "settled"
                     break
                 shortened += 1
-                y = best.unknowns + SHORTER * (y - best.unknowns)
+                origin = start if best is None else best.unknowns
+                y = origin + SHORTER * (y - origin)
                 continue
-            if point is None:
-                return None
             settled = best is not None and point.value > (1 - SETTLED) * best.value
             best, shortened = point, 0
             if best.value < tolerance or settled:

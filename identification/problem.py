@@ -148,7 +148,8 @@ class FieldProblem:
     def _plain(self, law: HypoelasticLaw, pressure: float, guess: Array | None) -> History:
         if isinstance(self.solver, DifferentiatingSolver):
             return self.solver.run(self.model, law, pressure_offset=pressure, guess=guess)
-        return self.solver.run(self.model, law)
+        model = self.model if pressure == 0.0 else self.model.with_pressure_offset(pressure)
+        return self.solver.run(model, law)
 
     def _chain(self, slope: Array) -> Array:
         """Jacobian by the unknowns from the slope by the solver's parameters."""

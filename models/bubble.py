@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,19 @@ class BubbleModel:
             raise InputError(None, "mesh", "has no node set 'rim' to pin")
         object.__setattr__(self, "pressures", tuple(wanted.tolist()))
         object.__setattr__(self, "increments", tuple(steps.tolist()))
+
+    def with_pressure_offset(self, offset: float) -> BubbleModel:
+        """The same model with `offset` (MPa) added to every pressure and increment.
+
+        Raises
+        ------
+        InputError : the first increment would not be positive.
+        """
+        return replace(
+            self,
+            pressures=[p + offset for p in self.pressures],
+            increments=[p + offset for p in self.increments],
+        )
 
     @property
     def reported(self) -> NDArray[np.intp]:

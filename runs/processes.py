@@ -111,6 +111,14 @@ def _work(
     # Ctrl-C reaches the whole group; the parent decides and terminates us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
+    def end(*_: object) -> None:
+        # By an exception, so that a solver that runs is killed and its scratch folder removed.
+        # Nobody reads the queue any more: do not wait for that.
+        records.cancel_join_thread()
+        raise SystemExit(1)
+
+    signal.signal(signal.SIGTERM, end)
+
     def tell(record: Record | BaseException) -> None:
         if os.getppid() != parent:  # killed without a chance to end us
             os._exit(1)

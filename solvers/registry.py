@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from ..errors import InputError
 from .base import Solver
 from .membrane.solver import MembraneSolver
 
-SOLVERS: dict[str, Callable[[], Solver]] = {"membrane": MembraneSolver}
+
+def _calculix(**options: Any) -> Solver:
+    from .calculix.solver import CalculixSolver
+
+    return CalculixSolver(**options)
 
 
-def solver_named(name: str) -> Solver:
-    """A new solver; InputError names the ones there are."""
+SOLVERS: dict[str, Callable[..., Solver]] = {"calculix": _calculix, "membrane": MembraneSolver}
+
+
+def solver_named(name: str, **options: Any) -> Solver:
+    """A new solver with its constructor's `options`; InputError names the ones there are."""
     if name not in SOLVERS:
         raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(sorted(SOLVERS))}")
-    return SOLVERS[name]()
+    return SOLVERS[name](**options)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+from bubblefit.errors import BubblefitError
+from bubblefit.solvers.calculix.executable import Executable, find_ccx
 
 
 @pytest.fixture(scope="session")
@@ -14,3 +17,14 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data: {folder} is not there")
     return folder
+
+
+@pytest.fixture(scope="session")
+def ccx() -> Executable:
+    """A ccx that can load material libraries; without one tests skip, except in CI."""
+    try:
+        return find_ccx()
+    except BubblefitError as error:
+        if os.environ.get("CI"):
+            pytest.fail(f"CI needs CalculiX: {error}")
+        pytest.skip(str(error))

@@ -545,7 +545,11 @@ def test_a_failed_run_shortens_the_step_and_the_fit_goes_on() -> None:
     fit.watch = lambda y, value, status, solver: told.append(value)
     found = fit_from(fit, feasible_start(fit, 1, 0), FitOptions())
     assert told[1] is None and found.value < 1e-6
-    assert fit_from(led(Thicker(fails=(1,))), feasible_start(fit, 1, 0), FitOptions()) is None
+    at_first = led(Thicker(fails=(1,)))
+    assert fit_from(at_first, feasible_start(at_first, 1, 0), FitOptions()).value < 1e-6
+    never = led(Thicker(fails=tuple(range(1, 20))))
+    assert fit_from(never, feasible_start(never, 1, 0), FitOptions()) is None
+    assert never.solver.runs == 4
 
 
 def test_the_best_run_is_returned_when_runs_are_used_up() -> None:

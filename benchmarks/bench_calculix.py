@@ -1,0 +1,95 @@
+"""CalculiX beside the membrane: cost of an analysis, and fits to data that CalculiX made.
+
+Usage: bench_calculix.py [RUNS]. First the same bubble (200 quads, 9 increments of the law) on both
+solvers in one run. Then, on a coarser mesh, one start with the membrane leading and CalculiX
+correcting, and the same start with NLopt straight on CalculiX (finite differences), stopped after
+RUNS runs (60 unless given).
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+from bench_analysis import EXAMPLE, seconds
+from bubblefit.cli.bubble_setup import bubble_setup
+from bubblefit.cli.project import read_project
+from bubblefit.cli.project_data import KnownSolution
+from bubblefit.errors import SolverFailure
+from bubblefit.identification.assessment import moduli_error
+from bubblefit.identification.methods import FitOptions
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bubble import BubbleModel
+from bubblefit.runs.start import EvaluationRecord, run_start
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from threadpoolctl import threadpool_limits
+
+METHODS = (("lm", "led by the membrane"), ("slsqp", "differences"), ("cobyla", "no derivatives"))
+COARSE = 192
+LEVELS = (1e-2, 1e-3, 1e-4)
+
+
+def main() -> None:
+    most = int(sys.argv[1]) if len(sys.argv) > 1 else 60
+    project = read_project(EXAMPLE / "project.toml")
+    setup = bubble_setup(project)
+    model, law = setup.problem.model, setup.known
+    assert law is not None
+    compare(model, {"cubic (Table 4.2)": law, "linear": HypoelasticLaw.linear(800.0, 400.0, 20.0)})
+    assert isinstance(project.data, KnownSolution)
+    data = replace(project.data, elements=COARSE)
+    coarse = replace(project, elements=COARSE, data=data, solver="calculix")
+    fit = bubble_setup(coarse)
+    quads = len(fit.problem.model.mesh.quads)
+    print(f"fits to CalculiX' own data, {quads} quads, start 0: runs until e is below")
+    levels = "".join(f"{level:9g}" for level in LEVELS)
+    ends = f"{'runs':>7s}{'wall, s':>9s}{'e':>10s}{'E1, %':>8s}{'E2, %':>8s}{'G12, %':>8s}"
+    print(f"{'':28s}{levels}{ends}")
+    for method, words in METHODS:
+        options = FitOptions(method, max_analyses=100 if method == "lm" else most)
+        heard: list[float] = []
+
+        def hear(record: EvaluationRecord, heard: list[float] = heard) -> None:
+            if record.solver == "calculix":
+                heard.append(np.inf if record.objective is None else record.objective)
+
+        begun = time.perf_counter()
+        with threadpool_limits(1):
+            record = run_start(fit.problem, options, 1, 0, hear)
+        wall = time.perf_counter() - begun
+        firsts = [next((i + 1 for i, e in enumerate(heard) if e < level), None) for level in LEVELS]
+        row = "".join(f"{'-' if first is None else first:>9}" for first in firsts)
+        beta = fit.problem.parameters.beta(np.array(record.unknowns))
+        assert fit.known is not None
+        error = moduli_error(fit.known.with_beta(beta), fit.known, np.full(3, 0.1))
+        moduli = "".join(f"{100 * error[name]:8.2g}" for name in ("E1", "E2", "G12"))
+        print(f"{f'{method}, {words}':28s}{row}{record.external_runs:7d}{wall:9.0f}"
+              f"{record.objective:10.1e}{moduli}", flush=True)  # fmt: skip
+
+
+def compare(model: BubbleModel, laws: dict[str, HypoelasticLaw]) -> None:
+    """Seconds of one analysis on both solvers; the least of a few turns each."""
+    print(f"{len(model.mesh.quads)} quads, {len(model.increments)} increments of the law, one core")
+    membrane = MembraneSolver()
+    with threadpool_limits(1):
+        for name, law in laws.items():
+            for element in ("S8R", "S4"):
+                calculix = CalculixSolver(element=element)
+                inside = min(seconds(lambda law=law: membrane.run(model, law)) for _ in range(10))
+                try:
+                    outside = min(
+                        seconds(lambda law=law, solver=calculix: solver.run(model, law))
+                        for _ in range(2)
+                    )
+                except SolverFailure as failure:  # S4 with the cubic card: see docs/calculix.md
+                    print(f"{name:18s} {element:4s} {failure.reason}")
+                    continue
+                ratio = f"{outside / inside:4.0f} times {1e3 * inside:.1f} ms"
+                print(f"{name:18s} {element:4s} CalculiX {outside:6.2f} s, {ratio}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

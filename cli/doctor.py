@@ -1,0 +1,58 @@
+"""`bubblefit doctor`: which solvers are here, and do they carry the law?"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from ..solvers.diagnosis import Diagnosis, diagnose
+from .options import exits
+
+UNUSABLE = 4
+
+
+@click.command("doctor")
+@click.option("--ccx", metavar="PATH", help="A CalculiX to look at beside the ones found.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings on stdout as JSON.")
+@exits
+def command(ccx: str | None, as_json: bool) -> None:
+    """List every solver found and prove each with bars whose end stresses are published.
+
+    Exit code 0 when the embedded solver works and so does every other one that was named (--ccx,
+    BUBBLEFIT_CCX) or built (make calculix); 4 otherwise. A ccx that merely lies on the PATH is
+    reported, but does not count.
+    """
+    found = diagnose(ccx)
+    good = all(one.usable for one in found if one.expected)
+    if as_json:
+        solvers = [{**asdict(one), "path": _text(one.path)} for one in found]
+        click.echo(json.dumps({"ok": good, "solvers": solvers}, indent=1))
+    else:
+        for one in found:
+            click.echo(_line(one))
+            if one.advice:
+                click.echo(f"{'':10}  {one.advice}")
+        if not any(one.name == "calculix" and one.usable for one in found):
+            click.echo("Fits work without CalculiX; it is the reference to check them against.")
+    if not good:
+        sys.exit(UNUSABLE)
+
+
+def _line(one: Diagnosis) -> str:
+    state = "ok" if one.usable else "NOT USABLE"
+    where = f"{one.path} ({one.origin})" if one.path else one.origin
+    words = [f"{one.name:10}  {state}", f"version {one.version}" if one.version else "", where]
+    if one.path:
+        carries = {True: "yes", False: "no", None: "cannot be seen"}[one.external_materials]
+        words.append(f"external materials: {carries}")
+    if one.difference is not None:
+        words.append(f"bars within {100 * one.difference:.4f} % of Marc")
+    return "  ".join(word for word in words if word)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

@@ -1,0 +1,1 @@
+"""CalculiX as the reference: decks, the law as a material library, results."""

@@ -1,0 +1,218 @@
+"""CalculiX result files (.frd), text and binary, read frame by frame and to the last byte.
+
+Records are told by their first columns (cgx manual, "Result Format"): 1C, 1U, 1P headers, 2C
+nodes, 3C elements, 100C one result of one increment, 9999 the end. Data lines of the text form
+have fixed columns without separators; the binary forms (flag 2: float32, flag 3: float64) have
+fixed records. Either way a block's size follows from its header, and a file that does not hold
+what its headers announce, or stops before 9999, is refused: an analysis that was killed leaves
+such a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+
+Array = NDArray[np.float64]
+SHORT, LONG, FLOAT, DOUBLE = range(4)
+ROW = 6  # values in a text line
+#: Nodes of each element type of the format.
+NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
+
+
+@dataclass(frozen=True, eq=False)
+class FrdMesh:
+    """numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
+
+    numbers: NDArray[np.int64]
+    points: Array
+    elements: tuple[tuple[int, NDArray[np.int64]], ...]
+
+
+@dataclass(eq=False)
+class FrdFrame:
+    """One increment: total time, step and increment, and fields by name (nodes of the mesh, c).
+
+    NaN where a field has no value at a node.
+    """
+
+    time: float
+    step: int
+    increment: int
+    fields: dict[str, Array] = field(default_factory=dict)
+
+
+class FrdFile:
+    """A result file, checked as it is read: `mesh`, then `frames()` one by one.
+
+    Raises
+    ------
+    InputError : no such file, not a result file, truncated or corrupt (which byte).
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        try:
+            self._data = self.path.read_bytes()
+        except OSError as error:
+            raise InputError(self.path, "", f"cannot be read: {error.strerror}") from None
+        self._at = 0
+        self.mesh = self._header()
+        self._first = self._at
+
+    def frames(self) -> Iterator[FrdFrame]:
+        """Every increment, in the file's order; steps may be missing or repeated."""
+        self._at = self._first
+        frame: FrdFrame | None = None
+        step = increment = 0
+        while not (line := self._line()).startswith("9999", 1):
+            if line.startswith("    1PSTEP"):
+                increment, step = self._int(line[36:48]), self._int(line[48:60])
+            elif line.startswith("  100C"):
+                time = self._float(line[12:24])
+                if frame is None or (frame.step, frame.increment) != (step, increment):
+                    if frame is not None:
+                        yield frame
+                    frame = FrdFrame(time, step, increment)
+                self._result(line, frame)
+            elif not line.startswith("    1"):
+                raise self._wrong(f"unknown record {line[:12]!r}")
+        if frame is not None:
+            yield frame
+
+    def _header(self) -> FrdMesh:
+        if not self._data.startswith(b"    1C"):
+            raise InputError(self.path, "", "is not a CalculiX result file (no 1C record)")
+        numbers, points, elements = np.empty(0, np.int64), np.empty((0, 3)), []
+        while True:
+            start = self._at
+            line = self._line()
+            if line.startswith("    2C"):
+                numbers, points = self._rows(self._int(line[24:36]), 3, self._int(line[73:75]))
+            elif line.startswith("    3C"):
+                elements = self._elements(self._int(line[24:36]), self._int(line[73:75]))
+            elif line.startswith(("  100C", "    1PSTEP")) or line.startswith("9999", 1):
+                self._at = start
+                break
+            elif not line.startswith("    1"):
+                raise self._wrong(f"unknown record {line[:12]!r}")
+        if not len(numbers):
+            raise self._wrong("no node block")
+        if not (np.diff(numbers) > 0).all():
+            raise self._wrong("node numbers do not increase")
+        return FrdMesh(numbers, points, tuple(elements))
+
+    def _result(self, header: str, frame: FrdFrame) -> None:
+        count, flag = self._int(header[24:36]), self._int(header[73:75])
+        line = self._line()
+        if not line.startswith(" -4"):
+            raise self._wrong("a result without its name")
+        name, components = line[5:13].strip(), self._int(line[13:18])
+        for _ in range(self._int(line[13:18])):
+            # Calculated components (the length of a vector) are named but not stored.
+            components -= self._line()[33:38].strip() == "1"
+        numbers, values = self._rows(count, components, flag)
+        place = np.searchsorted(self.mesh.numbers, numbers)
+        known = place < len(self.mesh.numbers)
+        if not known.all() or (self.mesh.numbers[place] != numbers).any():
+            raise self._wrong(f"{name} at a node that the mesh does not have")
+        whole = np.full((len(self.mesh.numbers), components), np.nan)
+        whole[place] = values
+        frame.fields[name] = whole
+
+    def _rows(self, count: int, width: int, flag: int) -> tuple[NDArray[np.int64], Array]:
+        """Node numbers (count,) and values (count, width) of one block."""
+        if flag in (FLOAT, DOUBLE):
+            kind = np.dtype([("node", "<i4"), ("values", "<f4" if flag == FLOAT else "<f8", width)])
+            table = np.frombuffer(self._take(count * kind.itemsize), kind)
+            numbers, values = table["node"].astype(np.int64), table["values"].astype(float)
+        else:
+            digits = 10 if flag == LONG else 5
+            numbers, values = self._text_rows(count, width, digits)
+            self._end_of_block()
+        if not np.isfinite(values).all():
+            raise self._wrong("a value that is not a finite number")
+        return numbers, values.reshape(count, width)
+
+    def _text_rows(self, count: int, width: int, digits: int) -> tuple[NDArray[np.int64], Array]:
+        lines = [min(ROW, width - first) for first in range(0, width, ROW)]
+        sizes = [3 + digits + 12 * n + 1 for n in lines]
+        table = np.frombuffer(self._take(count * sum(sizes)), np.uint8).reshape(count, sum(sizes))
+        parts, at = [], 0
+        for i, (n, size) in enumerate(zip(lines, sizes, strict=True)):
+            rows = table[:, at : at + size]
+            key = b" -1" if i == 0 else b" -2"
+            if (rows[:, :3] != np.frombuffer(key, np.uint8)).any() or (rows[:, -1] != 10).any():
+                raise self._wrong("a data line that is too short or too long")
+            parts.append(self._numbers(rows[:, 3 + digits : -1], 12, float).reshape(count, n))
+            at += size
+        return self._numbers(table[:, 3 : 3 + digits], digits, int).reshape(count), np.hstack(parts)
+
+    def _numbers(self, columns: NDArray[np.uint8], width: int, kind: type) -> NDArray:
+        try:
+            return np.ascontiguousarray(columns).view(f"S{width}").astype(kind)
+        except ValueError as error:
+            raise self._wrong(str(error)) from None
+
+    def _elements(self, count: int, flag: int) -> list[tuple[int, NDArray[np.int64]]]:
+        found = []
+        for _ in range(count):
+            if flag in (FLOAT, DOUBLE):
+                kind = int(np.frombuffer(self._take(16), "<i4")[1])
+                nodes = np.frombuffer(self._take(4 * self._nodes(kind)), "<i4").astype(np.int64)
+            else:
+                digits = 10 if flag == LONG else 5
+                kind = self._int(self._line()[3 + digits : 8 + digits])
+                text = ""
+                while len(text) < digits * self._nodes(kind):
+                    text += self._line()[3:]
+                places = range(0, digits * self._nodes(kind), digits)
+                nodes = np.array([self._int(text[i : i + digits]) for i in places])
+            found.append((kind, nodes))
+        if flag not in (FLOAT, DOUBLE):
+            self._end_of_block()
+        return found
+
+    def _nodes(self, kind: int) -> int:
+        if kind not in NODES:
+            raise self._wrong(f"unknown element type {kind}")
+        return NODES[kind]
+
+    def _end_of_block(self) -> None:
+        if not self._line().startswith(" -3"):
+            raise self._wrong("a block longer than announced")
+
+    def _take(self, size: int) -> bytes:
+        if size < 0 or self._at + size > len(self._data):
+            raise self._wrong("the file ends in the middle of a block: truncated")
+        self._at += size
+        return self._data[self._at - size : self._at]
+
+    def _line(self) -> str:
+        end = self._data.find(b"\n", self._at)
+        if end < 0:
+            raise self._wrong("the file ends before its end mark (9999): truncated")
+        line = self._data[self._at : end].decode("ascii", errors="replace")
+        self._at = end + 1
+        return line
+
+    def _int(self, text: str) -> int:
+        try:
+            return int(text)
+        except ValueError:
+            raise self._wrong(f"expected a whole number, got {text.strip()!r}") from None
+
+    def _float(self, text: str) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            raise self._wrong(f"expected a number, got {text.strip()!r}") from None
+
+    def _wrong(self, problem: str) -> InputError:
+        return InputError(self.path, f"byte {self._at}", problem)

@@ -1,0 +1,268 @@
+/* The hypoelastic orthotropic law as a CalculiX material: *MATERIAL, NAME=@BUBBLEFIT_HYPOELASTIC
+ * (several in one deck: @BUBBLEFIT_HYPOELASTIC@BODY, ...). The in-plane law is that of
+ * materials/point_law.py, function by function; tests/test_calculix_law.py compares the two.
+ *
+ * One increment goes from the committed state (*DEPVAR) to the end of the increment:
+ *   F -> C = F'F in the material frame -> log strain -> d sigma = D(midpoint) d eps
+ *     -> S = J2^power U^-1 sigma U^-1 and dS/dE (CalculiX takes the symmetric part only).
+ * The normal direction and the transverse shears are linear and do not couple (nu13 = nu23 = 0),
+ * so that an expanded shell behaves in its plane as the membrane does and keeps its thickness.
+ * CalculiX gives and takes everything in global axes, with an *ORIENTATION or without. *STEP
+ * needs NLGEOM.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { /* *USER MATERIAL, CONSTANTS=22: the order of library.py */
+    BETA = 0,           /* 12 coefficients, MPa: G12, E2, E1, highest power first (Eqs 3.1-3.3) */
+    NU12 = 12,
+    RANGE_END = 13,     /* 3: eps1, eps2, gamma12, where the moduli are held */
+    AREA_POWER = 16,    /* 1 constant thickness, 0 incompressible */
+    NORMAL_MODULUS = 17,
+    TRANSVERSE_SHEAR = 18,
+    ANGLE = 19,         /* degrees from the first in-plane axis to warp, about the normal */
+    NORMAL_AXIS = 20,   /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
+    WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number */
+    CONSTANTS = 22
+};
+enum { STATES = 6 };    /* *DEPVAR: eps1, eps2, gamma12, sigma1, sigma2, tau12 (material frame) */
+
+static const double SMALLER_INCREMENT = 0.5;
+
+static double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double *a, const double *b, double *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* a without its part along the unit vector n, at unit length. */
+static void unit_across(double *a, const double *n) {
+    double along = dot(a, n);
+    for (int i = 0; i < 3; i++) a[i] -= along * n[i];
+    double length = sqrt(dot(a, a));
+    for (int i = 0; i < 3; i++) a[i] /= length;
+}
+
+/* Axes (rows) of an *ORIENTATION, as transformatrix.f: cylindrical is radial, hoop, axial. */
+static void local_axes(const double *orab, const double *point, double axes[3][3]) {
+    const double nothing[3] = {0, 0, 0};
+    if (orab[6] > 0) {
+        for (int i = 0; i < 3; i++) axes[0][i] = orab[i], axes[1][i] = orab[3 + i];
+        unit_across(axes[0], nothing);
+        unit_across(axes[1], axes[0]);
+        cross(axes[0], axes[1], axes[2]);
+    } else {
+        for (int i = 0; i < 3; i++) {
+            axes[0][i] = point[i] - orab[i];
+            axes[2][i] = orab[3 + i] - orab[i];
+        }
+        unit_across(axes[2], nothing);
+        unit_across(axes[0], axes[2]);
+        cross(axes[2], axes[0], axes[1]);
+    }
+}
+
+/* Rows of a: warp, fill, normal, in global axes. */
+static void material_axes(const double *k, int orientation, const double *orab,
+                          const double *point, double a[3][3]) {
+    double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    if (orientation > 0) local_axes(orab + 7 * (orientation - 1), point, axes);
+    double turn = k[ANGLE] * acos(-1.0) / 180.0, c = cos(turn), s = sin(turn);
+    int cylindrical = k[NORMAL_AXIS] < 2;
+    for (int i = 0; i < 3; i++) { /* (axial, -hoop, radial) is right-handed, like (1, 2, 3) */
+        double first = cylindrical ? axes[2][i] : axes[0][i];
+        double second = cylindrical ? -axes[1][i] : axes[1][i];
+        a[0][i] = c * first + s * second;
+        a[1][i] = c * second - s * first;
+        a[2][i] = cylindrical ? axes[0][i] : axes[2][i];
+    }
+}
+
+/* f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0. */
+static double atanh_ratio(double z, double *slope) {
+    if (z < 0.01) {
+        double f = 0, d = 0;
+        for (int n = 7; n >= 1; n--) f = f * z + 1.0 / (2 * n + 1), d = d * z + n / (2.0 * n + 1);
+        *slope = d;
+        return 1.0 + z * f;
+    }
+    double s = sqrt(z), f = atanh(s) / s;
+    *slope = (1.0 / (1.0 - z) - f) / (2.0 * z);
+    return f;
+}
+
+/* Log strain h and p = dh/dE from m = (C11 + C22)/2, q = (C11 - C22)/2, c = C12. */
+static int log_strain(double m, double q, double c, double *h, double p[3][3]) {
+    double r = q * q + c * c, det = m * m - r, f1;
+    if (!(m > 1e-20 && m < 1e20 && det > 1e-9 * m * m)) return 0;
+    double f = atanh_ratio(r / (m * m), &f1);
+    double b = f / m, b_r = f1 / (m * m * m), b_m = -f / (m * m) - 2 * r * f1 / (m * m * m * m);
+    double a = 0.5 * log(det);
+    h[0] = 0.5 * (a + b * q);
+    h[1] = 0.5 * (a - b * q);
+    h[2] = b * c;
+    double a_m = m / det, a_q = -q / det, a_c = -c / det, b_q = 2 * q * b_r, b_c = 2 * c * b_r;
+    double u_m = b_m * q, u_q = b + q * b_q, u_c = q * b_c;
+    p[0][0] = 0.5 * (a_m + u_m + a_q + u_q);
+    p[0][1] = 0.5 * (a_m + u_m - a_q - u_q);
+    p[0][2] = 0.5 * (a_c + u_c);
+    p[1][0] = 0.5 * (a_m - u_m + a_q - u_q);
+    p[1][1] = 0.5 * (a_m - u_m - a_q + u_q);
+    p[1][2] = 0.5 * (a_c - u_c);
+    p[2][0] = c * (b_m + b_q);
+    p[2][1] = c * (b_m - b_q);
+    p[2][2] = b + c * b_c;
+    return 1;
+}
+
+/* A cubic (highest power first) at x held to [0, end]; its slope is nothing where held. */
+static double modulus(const double *b, double x, double end, double *slope) {
+    double held = x < 0 ? 0 : x > end ? end : x;
+    *slope = held == x ? (3 * b[0] * x + 2 * b[1]) * x + b[2] : 0;
+    return ((b[0] * held + b[1]) * held + b[2]) * held + b[3];
+}
+
+/* s = s_old + D(midpoint) (h - h_old) and d = ds/dh; 0 when a modulus or 1 - nu12 nu21 is not
+ * positive. */
+static int stress_update(const double *k, const double *h, const double *h_old,
+                         const double *s_old, double *s, double d[3][3]) {
+    double nu = k[NU12], slope1, slope2, slope3, mid = 0.5 * (h[2] + h_old[2]);
+    double shear = modulus(k + BETA, fabs(mid), k[RANGE_END + 2], &slope3);
+    double fill = modulus(k + BETA + 4, 0.5 * (h[1] + h_old[1]), k[RANGE_END + 1], &slope2);
+    double warp = modulus(k + BETA + 8, 0.5 * (h[0] + h_old[0]), k[RANGE_END], &slope1);
+    if (!(shear > 0 && fill > 0 && warp > 0)) return 0;
+    double ratio = nu * nu / warp, den = 1 - ratio * fill;
+    if (!(den > 1e-3)) return 0;
+    double d11 = warp / den, d22 = fill / den, d12 = nu * d22;
+    /* Derivatives of d11 and d22 (and d12 = nu d22) with respect to the moduli. */
+    double d11_warp = (1 - 2 * ratio * fill) / (den * den), d11_fill = nu * nu / (den * den);
+    double d22_warp = -ratio * fill * fill / warp / (den * den), d22_fill = 1 / (den * den);
+    double dh[3] = {h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]};
+    s[0] = s_old[0] + d11 * dh[0] + d12 * dh[1];
+    s[1] = s_old[1] + d12 * dh[0] + d22 * dh[1];
+    s[2] = s_old[2] + shear * dh[2];
+    d[0][0] = d11 + 0.5 * slope1 * (d11_warp * dh[0] + nu * d22_warp * dh[1]);
+    d[0][1] = d12 + 0.5 * slope2 * (d11_fill * dh[0] + nu * d22_fill * dh[1]);
+    d[1][0] = d12 + 0.5 * slope1 * (nu * d22_warp * dh[0] + d22_warp * dh[1]);
+    d[1][1] = d22 + 0.5 * slope2 * (nu * d22_fill * dh[0] + d22_fill * dh[1]);
+    d[2][2] = shear + 0.5 * slope3 * (mid < 0 ? -1 : 1) * dh[2];
+    d[0][2] = d[1][2] = d[2][0] = d[2][1] = 0;
+    return 1;
+}
+
+/* s = U^-1 t U^-1 with U^-1 = k [[C22 + J, -C12], [-C12, C11 + J]], k = 1/(J sqrt(tr C + 2 J));
+ * w = ds/dt, g = ds/dE at fixed t. */
+static void pull_back(double m, double q, double c, const double *t, double *s, double w[3][3],
+                      double g[3][3]) {
+    double j = sqrt(m * m - q * q - c * c), root = sqrt(2 * (m + j)), k = 1 / (root * j);
+    double a = m - q + j, b = m + q + j, w1 = k * a, w2 = k * b, w3 = -k * c;
+    w[0][0] = w1 * w1, w[0][1] = w3 * w3, w[0][2] = 2 * w1 * w3;
+    w[1][0] = w3 * w3, w[1][1] = w2 * w2, w[1][2] = 2 * w3 * w2;
+    w[2][0] = w1 * w3, w[2][1] = w3 * w2, w[2][2] = w1 * w2 + w3 * w3;
+    for (int i = 0; i < 3; i++) {
+        s[i] = dot(w[i], t);
+        double dm = i < 2, dq = i == 0 ? 1 : i == 1 ? -1 : 0, dc = i == 2;
+        double dj = (m * dm - q * dq - c * dc) / j;
+        double dk = -k * ((dm + dj) / (root * root) + dj / j);
+        double d1 = k * (dm - dq + dj) + a * dk, d2 = k * (dm + dq + dj) + b * dk;
+        double d3 = -k * dc - c * dk, d13 = d1 * w3 + w1 * d3, d32 = d3 * w2 + w3 * d2;
+        g[0][i] = 2 * (w1 * d1 * t[0] + d13 * t[2] + w3 * d3 * t[1]);
+        g[1][i] = 2 * (w3 * d3 * t[0] + d32 * t[2] + w2 * d2 * t[1]);
+        g[2][i] = d13 * t[0] + (d1 * w2 + w1 * d2 + 2 * w3 * d3) * t[2] + d32 * t[1];
+    }
+}
+
+/* In-plane S = (S11, S22, S12), g = dS/dE with engineering shear, and the new state. */
+static int membrane_stress(const double *k, double c11, double c22, double c12, const double *old,
+                           double *state, double *s, double g[3][3]) {
+    double m = 0.5 * (c11 + c22), q = 0.5 * (c11 - c22), p[3][3], d[3][3], w[3][3], t[3];
+    double *h = state, *sigma = state + 3;
+    if (!log_strain(m, q, c12, h, p)) return 0;
+    if (!stress_update(k, h, old, old + 3, sigma, d)) return 0;
+    double power = k[AREA_POWER], ratio = exp(power * (h[0] + h[1]));
+    for (int i = 0; i < 3; i++) t[i] = ratio * sigma[i];
+    pull_back(m, q, c12, t, s, w, g);
+    for (int i = 0; i < 3; i++) { /* the area ratio grows with both normal strains */
+        d[i][0] = ratio * (d[i][0] + power * sigma[i]);
+        d[i][1] = ratio * (d[i][1] + power * sigma[i]);
+        d[i][2] *= ratio;
+    }
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int n = 0; n < 3; n++)
+                g[i][j] += w[i][n] * (d[n][0] * p[0][j] + d[n][1] * p[1][j] + d[n][2] * p[2][j]);
+    return 1;
+}
+
+/* Interface: umat_user.f in the CalculiX sources. xkl is column by column; components are
+ * 11 22 33 12 13 23; stiff is the upper triangle of dS/dE, column by column. */
+void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *kode,
+                 const double *constants, const double *emec, const double *emec0,
+                 const double *beta, const double *xokl, const double *voj, const double *xkl,
+                 const double *vj, const int *ithermal, const double *t1l, const double *dtime,
+                 const double *time, const double *ttime, const int *icmd, const int *ielas,
+                 const int *mi, const int *nstate, const double *xstateini, double *xstate,
+                 double *stre, double *stiff, const int *iorien, const double *pgauss,
+                 const double *orab, double *pnewdt, const int *ipkon, const int size) {
+    static const int I[6] = {0, 1, 2, 0, 0, 1}, J[6] = {0, 1, 2, 1, 2, 2}, PLANE[3] = {0, 1, 3};
+    (void)amat, (void)emec, (void)emec0, (void)beta, (void)xokl, (void)voj, (void)vj;
+    (void)ithermal, (void)t1l, (void)dtime, (void)ielas, (void)ipkon;
+    (void)size;
+    if (*kode != -100 - CONSTANTS || *nstate < STATES) {
+        printf(" *ERROR in HYPOELASTIC: %d constants and *DEPVAR %d are needed, not %d and %d\n",
+               CONSTANTS, STATES, -100 - *kode, *nstate);
+        exit(201);
+    }
+    const double *const k = constants, e3 = k[NORMAL_MODULUS], g3 = k[TRANSVERSE_SHEAR];
+    size_t place = (size_t)*nstate * ((size_t)mi[0] * (*iel - 1) + (*iint - 1));
+    const double *old = xstateini + place;
+    double a[3][3], f[3][3], state[STATES] = {0}, plane[3], g[3][3];
+    double local[6] = {0}, c[6][6] = {{0}}, turn[6][6];
+    material_axes(k, *iorien, orab, pgauss, a);
+    for (int n = 0; n < 3; n++) /* images of the material axes */
+        for (int i = 0; i < 3; i++)
+            f[n][i] = xkl[i] * a[n][0] + xkl[i + 3] * a[n][1] + xkl[i + 6] * a[n][2];
+    double c11 = dot(f[0], f[0]), c22 = dot(f[1], f[1]), c12 = dot(f[0], f[1]);
+    int good = membrane_stress(k, c11, c22, c12, old, state, plane, g);
+    double normal = 0.5 * (dot(f[2], f[2]) - 1);
+    double shear1 = dot(f[0], f[2]), shear2 = dot(f[1], f[2]);
+    good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);
+    /* With one *STEP of length 1 for every increment of the law, the strain path does not depend on
+     * how many increments CalculiX needed in between (cut-back in the membrane solver likewise). */
+    int commit = good && !(k[WHOLE_TIMES] > 0 && fabs(*time + *ttime - round(*time + *ttime)) > 1e-9);
+    for (int i = 0; i < STATES; i++) xstate[place + i] = commit ? state[i] : old[i];
+    if (!good) { /* stre stays what it was; the stiffness only has to be harmless */
+        if (!(*pnewdt > 0 && *pnewdt < SMALLER_INCREMENT)) *pnewdt = SMALLER_INCREMENT;
+        for (int i = 0; i < 21; i++) stiff[i] = 0;
+        for (int i = 0, n = 0; i < 6; n += ++i + 1) stiff[n] = i < 3 ? e3 : g3;
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        local[PLANE[i]] = plane[i];
+        for (int j = 0; j < 3; j++) c[PLANE[i]][PLANE[j]] = 0.5 * (g[i][j] + g[j][i]);
+    }
+    local[2] = e3 * normal, local[4] = g3 * shear1, local[5] = g3 * shear2;
+    c[2][2] = e3, c[4][4] = c[5][5] = g3;
+    /* Local engineering strain = turn . global one; S turns back by its transpose. */
+    for (int m = 0; m < 6; m++)
+        for (int n = 0; n < 6; n++) {
+            turn[m][n] = a[I[m]][I[n]] * a[J[m]][J[n]];
+            if (m > 2) turn[m][n] += a[J[m]][I[n]] * a[I[m]][J[n]];
+        }
+    for (int n = 0; n < 6; n++) {
+        stre[n] = 0;
+        for (int m = 0; m < 6; m++) stre[n] += turn[m][n] * local[m];
+    }
+    if (*icmd == 3) return;
+    for (int j = 0, n = 0; j < 6; j++)
+        for (int i = 0; i <= j; i++, n++) {
+            stiff[n] = 0;
+            for (int m = 0; m < 6; m++)
+                for (int l = 0; l < 6; l++) stiff[n] += turn[m][i] * c[m][l] * turn[l][j];
+        }
+}

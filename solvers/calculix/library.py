@@ -1,0 +1,138 @@
+"""The law as a material library: `law.c`, compiled on first use and kept by content."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shlex
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from ...caching import cache_folder
+from ...errors import InputError, OutputError, SolverFailure
+from ...materials.law import HypoelasticLaw
+
+#: Name on `*MATERIAL`: CalculiX loads libBUBBLEFIT.so and calls HYPOELASTIC. Several materials in
+#: one deck: MATERIAL + "@BODY", MATERIAL + "@SEAM".
+MATERIAL = "@BUBBLEFIT_HYPOELASTIC"
+LIBRARY_FILE = "libBUBBLEFIT.so"
+#: `*DEPVAR`: log strain eps1, eps2, gamma12 and Cauchy stress sigma1, sigma2, tau12 (MPa), both
+#: in the material frame.
+STATE_VARIABLES = 6
+#: A law without stiffness is for the analysis to refuse, not for the deck: MPa.
+LEAST = 1e-3
+#: `*USER MATERIAL, CONSTANTS=`. Never a multiple of 8: CalculiX reads one more line then.
+CONSTANTS = 22
+
+SOURCE = Path(__file__).with_name("law.c")
+# No contraction: the same rounding on every machine.
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+
+
+def constants(
+    law: HypoelasticLaw,
+    normal_modulus: float | None = None,
+    transverse_shear: float | None = None,
+    angle: float = 0.0,
+    normal_axis: int = 3,
+    whole_times: bool = False,
+) -> tuple[float, ...]:
+    """The constants of `*USER MATERIAL` (22,), in the order of `law.c`.
+
+    beta (12, MPa), nu12, ends of the strain range (3), area power, normal modulus (MPa),
+    transverse shear modulus (MPa), angle (degrees), normal axis, whole times.
+
+    Parameters
+    ----------
+    law : what to carry over.
+    normal_modulus : through the thickness, MPa; the larger of E1 and E2 at no strain unless given.
+    transverse_shear : MPa; G12 at no strain unless given.
+    angle : from the first in-plane axis to the warp, degrees, turning about the normal.
+    normal_axis : 3 without `*ORIENTATION` (warp from global x, fill from y) or with a rectangular
+        one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is
+        axial and fill hoop at angle 0.
+    whole_times : commit strain and stress only where the total time is a whole number, so that
+        the law's increments are the deck's steps of length 1, whatever increments they took.
+
+    Raises
+    ------
+    InputError : a modulus or an axis that cannot be.
+    """
+    if normal_modulus is None:
+        normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
+    if transverse_shear is None:
+        transverse_shear = max(float(law.G12(0.0)), LEAST)
+    for name, value in (
+        ("normal modulus", normal_modulus),
+        ("transverse shear modulus", transverse_shear),
+    ):
+        if not 0 < value < float("inf"):
+            raise InputError(None, name, f"expected > 0 MPa, got {value}")
+    if normal_axis not in (1, 3):
+        raise InputError(None, "normal_axis", f"expected 1 or 3, got {normal_axis}")
+    ends = (float(end) for end in law.strain_range)
+    coefficients = (float(b) for b in law.beta)
+    through = (law.area_power, normal_modulus, transverse_shear, float(angle), float(normal_axis))
+    return (*coefficients, law.nu12, *ends, *through, float(whole_times))
+
+
+def compiler() -> list[str]:
+    """The system's C compiler as a command: $CC, else cc or gcc.
+
+    Raises
+    ------
+    SolverFailure : there is none.
+    """
+    named = shlex.split(os.environ.get("CC", ""))
+    for command in [named] if named else [["cc"], ["gcc"]]:
+        found = shutil.which(command[0])
+        if found is not None:
+            return [found, *command[1:]]
+    wanted = f"the C compiler {named[0]!r} that CC names" if named else "a C compiler (cc)"
+    advice = "install gcc, or name a compiler in the environment variable CC"
+    raise SolverFailure(f"the material library needs {wanted}, which is not there; {advice}",
+                        "calculix")  # fmt: skip
+
+
+def material_library(cache: Path | None = None) -> Path:
+    """Path of libBUBBLEFIT.so, compiled when it is not in the cache yet.
+
+    Put its folder into LD_LIBRARY_PATH for ccx. `cache` is bubblefit's own unless given.
+
+    Raises
+    ------
+    SolverFailure : no compiler, or it does not accept the source.
+    OutputError : the cache cannot be written.
+    """
+    command = compiler()
+    source = SOURCE.read_bytes()
+    digest = hashlib.sha256(source)
+    # The file's date and size stand for the compiler's version: asking for that takes a process.
+    at = os.stat(command[0])
+    for part in (*command, *FLAGS, str(at.st_size), str(at.st_mtime_ns), os.uname().machine):
+        digest.update(b"\0" + part.encode())
+    folder = (cache_folder() if cache is None else cache) / "calculix"
+    library = folder / f"law-{digest.hexdigest()[:16]}" / LIBRARY_FILE
+    if library.is_file():
+        return library
+    try:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".law-") as place:
+            built = Path(place) / LIBRARY_FILE
+            _compile([*command, *FLAGS, str(SOURCE), "-o", str(built), "-lm"])
+            # Two processes at once: both have the same content, either may win.
+            os.replace(built, library)
+    except OSError as error:
+        problem = f"cannot be written ({error.strerror}); name another folder: BUBBLEFIT_CACHE"
+        raise OutputError(f"{folder}: {problem}") from None
+    return library
+
+
+def _compile(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace")
+    if done.returncode != 0:
+        tail = "\n".join((done.stderr or done.stdout).splitlines()[-25:])
+        problem = f"{command[0]} does not compile the material library {SOURCE.name}"
+        raise SolverFailure(problem, "calculix", done.returncode, tail)

@@ -1,0 +1,182 @@
+"""CalculiX behind the solver protocol: a deck, a subprocess, its results."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from ...errors import InputError, SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.mesh import Mesh
+from ...models.bubble import BubbleModel
+from ..base import History, SolverCheck
+from ..process import log_tail, run_process
+from ..scratch import fresh_folder, put_aside, remove
+from .bubble import decks
+from .executable import ADVICE, Executable, find_ccx
+from .library import material_library
+from .reasons import Increment, increments, reason
+from .results import bubble_history
+from .shells import ELEMENTS, ShellMesh, shell_mesh
+
+log = logging.getLogger(__name__)
+
+JOB = "job"
+TIMEOUT_S = 3600.0
+
+
+class CalculixSolver:
+    """CalculiX as a subprocess.
+
+    Parameters
+    ----------
+    ccx : the program; found by `find_ccx` unless given.
+    templates : the user's own folder of templates, see docs/calculix.md.
+    element : "S8R" or "S4".
+    timeout : s, of one run, unless `run` is given another.
+    scratch : folder for scratch folders; memory, else the temporary folder, unless given.
+    keep : keep scratch folders of runs that end well, too.
+    threads : of one run; starts run side by side already.
+    progress : called with every increment that converged while a run is under way.
+
+    Raises
+    ------
+    InputError : an element there is not, a template folder that is not there.
+    """
+
+    name = "calculix"
+    external = True
+
+    def __init__(
+        self,
+        ccx: Path | str | None = None,
+        templates: Path | None = None,
+        element: str = "S8R",
+        timeout: float = TIMEOUT_S,
+        scratch: Path | None = None,
+        keep: bool = False,
+        threads: int = 1,
+        progress: Callable[[Increment], None] | None = None,
+    ) -> None:
+        if element not in ELEMENTS:
+            problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
+            raise InputError(None, "solver.calculix.element", problem)
+        if templates is not None and not templates.is_dir():
+            raise InputError(templates, "templates", "there is no such folder")
+        self.ccx, self.templates, self.element = ccx, templates, element
+        self.timeout, self.scratch, self.keep = timeout, scratch, keep
+        self.threads, self.progress = threads, progress
+        self._found: Executable | None = None
+        self._shells: tuple[Mesh, ShellMesh] | None = None
+
+    def check(self) -> SolverCheck:
+        """Whether there is a ccx that can load the law; its version."""
+        try:
+            found = self.executable()
+        except SolverFailure as failure:
+            return SolverCheck(self.name, False, "", False, failure.reason)
+        carries = found.external is not False
+        return SolverCheck(self.name, True, found.version, carries, "" if carries else ADVICE)
+
+    def executable(self) -> Executable:
+        """The ccx that runs, looked for once."""
+        if self._found is None:
+            self._found = find_ccx(self.ccx)
+        return self._found
+
+    def run(
+        self,
+        model: BubbleModel,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+    ) -> History:
+        """Inflate the model.
+
+        Parameters
+        ----------
+        scratch : the folder below which the run's own is made.
+        timeout : s.
+
+        Raises
+        ------
+        SolverFailure : it did not end well; the scratch folder is kept and named.
+        InputError : a template that cannot be used, a ccx that cannot be started.
+        """
+        program, library = self.executable().path, material_library()
+        shells = self._shell_mesh(model)
+        files = decks(model, law, shells, self.element, self.templates)
+        folder = fresh_folder("ccx", scratch or self.scratch)
+        try:
+            history = self._in(folder, program, library, files, timeout or self.timeout, model)
+        except SolverFailure as failure:
+            kept = put_aside(folder)
+            log.info("failed run kept in %s", kept)
+            tail = log_tail(kept / f"{JOB}.log")
+            raise SolverFailure(
+                failure.reason, self.name, failure.exit_number, tail, kept
+            ) from None
+        except BaseException:
+            remove(folder)  # interrupted, or never begun: there is nothing to look into
+            raise
+        if self.keep:
+            log.info("run kept in %s", folder)
+        else:
+            remove(folder)
+        return history
+
+    def _in(
+        self,
+        folder: Path,
+        program: Path,
+        library: Path,
+        files: dict[str, str],
+        timeout: float,
+        model: BubbleModel,
+    ) -> History:
+        """One run in a folder that is empty at its start."""
+        try:
+            for name, text in files.items():
+                (folder / name).write_text(text, encoding="ascii", errors="replace")
+        except OSError as error:
+            raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
+        sta = folder / f"{JOB}.sta"
+        threads = str(self.threads)
+        environment = {
+            "LD_LIBRARY_PATH": str(library.parent),
+            "OMP_NUM_THREADS": threads,
+            "CCX_NPROC_STIFFNESS": threads,
+            "CCX_NPROC_EQUATION_SOLVER": threads,
+        }
+        outcome = run_process(
+            [program, "-i", JOB],
+            folder,
+            folder / f"{JOB}.log",
+            timeout,
+            environment,
+            _Watch(sta, self.progress) if self.progress is not None else None,
+        )
+        problem = reason(folder, JOB, outcome, timeout)
+        if problem is not None:
+            raise SolverFailure(problem, self.name, outcome.exit_code)
+        iterations = sum(i.iterations for i in increments(sta))
+        return bubble_history(folder / f"{JOB}.frd", model, self._shell_mesh(model), iterations)
+
+    def _shell_mesh(self, model: BubbleModel) -> ShellMesh:
+        if self._shells is None or self._shells[0] is not model.mesh:
+            self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
+        return self._shells[1]
+
+
+class _Watch:
+    """Tells of every increment once, as it appears in the .sta file."""
+
+    def __init__(self, sta: Path, tell: Callable[[Increment], None]) -> None:
+        self.sta, self.tell, self.told = sta, tell, 0
+
+    def __call__(self) -> None:
+        fresh = increments(self.sta)[self.told :]
+        self.told += len(fresh)
+        for increment in fresh:
+            self.tell(increment)

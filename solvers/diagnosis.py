@@ -1,0 +1,107 @@
+"""Every solver on this machine, tried on bars whose end stresses are published."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..errors import BubblefitError
+from ..materials.law import HypoelasticLaw
+from .calculix.executable import ADVICE, FOUND, NAMED, Executable, every_ccx
+from .calculix.proof import BARS, INCREMENTS, TOLERANCE, bar_law, prove
+
+EMBEDDED = "embedded"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One solver: what it is, where, and what the bars showed.
+
+    external_materials: whether it can load material libraries (None: embedded, or not to be
+    seen). stresses: end stresses of the bars (MPa) in the order of `proof.BARS`, difference: the
+    largest relative one from Marc's; None where the bars did not run. expected: somebody chose
+    this solver, so that it has to work. advice: one line, what to do; empty when usable.
+    """
+
+    name: str
+    version: str
+    path: Path | None
+    origin: str
+    expected: bool
+    external_materials: bool | None
+    usable: bool
+    stresses: tuple[float, ...] | None = None
+    difference: float | None = None
+    advice: str = ""
+
+
+def diagnose(ccx: Path | str | None = None) -> list[Diagnosis]:
+    """The embedded solver, then every ccx (`ccx`: one more, by path), each tried.
+
+    A ccx that is not there at all is one entry without a path, expected only if it was named.
+    """
+    found = [_membrane()]
+    try:
+        candidates = every_ccx(ccx)
+    except BubblefitError as error:
+        return [*found, _absent(str(error), NAMED, True)]
+    if not candidates:
+        return [*found, _absent(f"there is no ccx; {ADVICE}", "not found", False)]
+    return [*found, *(_calculix(candidate) for candidate in candidates)]
+
+
+def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
+    return Diagnosis("calculix", "", None, origin, expected, None, False, advice=advice)
+
+
+def _membrane() -> Diagnosis:
+    stresses = tuple(
+        _end_stress(bar_law(bar.model), bar.elongation, 0 if bar.direction == "warp" else 1)
+        for bar in BARS
+    )
+    off = _difference(stresses)
+    good = off < TOLERANCE
+    advice = "" if good else "the embedded law is broken; install bubblefit and numba again"
+    return Diagnosis("membrane", __version__, None, EMBEDDED, True, None, good,
+                     stresses, off, advice)  # fmt: skip
+
+
+def _calculix(ccx: Executable) -> Diagnosis:
+    expected = ccx.origin != FOUND
+    usable, stresses, off, advice = False, None, None, ""
+    if ccx.external is False:
+        advice = f"cannot load material libraries; {ADVICE}"
+    else:
+        try:
+            stresses = prove(ccx.path)
+            usable, off = True, _difference(stresses)
+        except BubblefitError as error:
+            advice = str(error).splitlines()[0]
+    return Diagnosis("calculix", ccx.version, ccx.path, ccx.origin, expected, ccx.external,
+                     usable, stresses, off, advice)  # fmt: skip
+
+
+def _difference(stresses: tuple[float, ...]) -> float:
+    return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
+
+
+def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
+    """Cauchy stress (MPa) of a bar pulled along warp (0) or fill (1), the other direction free.
+
+    The law's own increments, the ones the membrane solver takes.
+    """
+    free = 1 - pulled
+    strain, stress = np.zeros(3), np.zeros((1, 3))
+    for end in np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS):
+        new = strain.copy()
+        new[pulled] = end
+        # The modulus across is held at its end value, so that the second round is exact.
+        for _ in range(2):
+            trial, tangent = law.increment(strain, new, stress)
+            new[free] -= trial[0, free] / tangent[0, free, free]
+        stress, _ = law.increment(strain, new, stress)
+        strain = new
+    return float(stress[0, pulled])

@@ -1,0 +1,114 @@
+"""A solver as a subprocess: its own process group, a log, a time limit, no orphans."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+
+POLL_S = 0.05
+#: Lines of the log that an error carries.
+TAIL = 25
+_PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a subprocess ended: exit_code as in `subprocess` (-n: signal n), wall time s."""
+
+    exit_code: int
+    timed_out: bool
+    seconds: float
+
+    @property
+    def signal_name(self) -> str:
+        """Name of the signal that killed it, or empty."""
+        if self.exit_code >= 0:
+            return ""
+        with suppress(ValueError):
+            return signal.Signals(-self.exit_code).name
+        return f"signal {-self.exit_code}"
+
+
+def run_process(
+    command: Sequence[str | Path],
+    folder: Path,
+    log: Path,
+    timeout: float | None = None,
+    environment: Mapping[str, str] | None = None,
+    watch: Callable[[], None] | None = None,
+) -> Outcome:
+    """Run `command` in `folder` to its end, its output (both streams) going to `log`.
+
+    Parameters
+    ----------
+    timeout : s; then the whole process group is killed.
+    environment : added to ours.
+    watch : called about twenty times a second while it runs.
+
+    Raises
+    ------
+    InputError : the program cannot be started (not there, no permission, another machine's).
+    Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after the group is killed.
+    """
+    begun = time.monotonic()
+    with log.open("wb") as output:
+        try:
+            process = subprocess.Popen(
+                [str(part) for part in command],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **(environment or {})},
+                start_new_session=True,
+                preexec_fn=_die_with_parent if _LIBC is not None else None,
+            )
+        except OSError as error:
+            problem = f"cannot be started: {error.strerror}; name another program"
+            raise InputError(Path(command[0]), "", problem) from None
+        timed_out = False
+        try:
+            while True:
+                try:
+                    process.wait(POLL_S)
+                    break
+                except subprocess.TimeoutExpired:
+                    if timeout is not None and time.monotonic() - begun > timeout:
+                        timed_out = True
+                        break
+                if watch is not None:
+                    watch()
+        finally:
+            # Also after a clean end: what a wrapper script left behind must not go on writing.
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    return Outcome(process.returncode, timed_out, time.monotonic() - begun)
+
+
+def log_tail(log: Path, lines: int = TAIL) -> str:
+    """Last lines of a log of any size and encoding; empty when there is none."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 400 * lines))
+            text = file.read().decode("utf-8", errors="replace")
+    except OSError:
+        return ""
+    return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
+
+
+def _die_with_parent() -> None:
+    # A worker that is killed outright (SIGKILL, out of memory) cannot end its solver any more.
+    if _LIBC is not None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
