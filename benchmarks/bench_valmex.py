@@ -1,8 +1,8 @@
 """The three real bubble tests: residual of each fit beside the published one.
 
-Usage: bench_valmex.py [DATA_FOLDER] [STARTS] [TEST ...]. Prints the mean |dx| + |dy| + |dz| in mm, over all
-points and pressures, of linear orthotropic and cubic moduli, with and without a pressure or a
-displacement offset. Published (linear orthotropic, Abaqus): 1.55, 1.66, 1.70 mm.
+Usage: bench_valmex.py [DATA_FOLDER] [STARTS] [TEST ...]. Prints the mean |dx| + |dy| + |dz| in mm,
+over all points and pressures, of linear orthotropic and cubic moduli, with and without a pressure
+or a displacement offset. Published (linear orthotropic, Abaqus): 1.55, 1.66, 1.70 mm.
 """
 
 from __future__ import annotations
