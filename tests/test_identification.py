@@ -440,6 +440,19 @@ def test_unstable_equilibria_are_told_and_not_started_from() -> None:
         assert fit.evaluate(feasible_start(fit, 1, number), False).stable
 
 
+@pytest.mark.parametrize("seed, number", [(3, 41), (4, 10), (5, 10), (6, 46)])
+def test_fits_that_meet_instability_get_past_it(seed: int, number: int) -> None:
+    """The example's mesh and the starts, of 400, that once ended on or at a folded membrane."""
+    model = BubbleModel(
+        disk_mesh(100.0, 800, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
+    )
+    fields = MembraneSolver().run(model, LAW).displacement
+    fit = FieldProblem(model, MembraneSolver(), LAW, FieldObjective(targets(fields)), CUBIC)
+    found = levenberg_marquardt(fit, feasible_start(fit, seed, number), 1e-7, 100)
+    assert fit.unstable > 0
+    assert found is not None and found.value < 1e-6 and found.best.stable
+
+
 def test_linear_orthotropic_constants_are_recovered() -> None:
     """Degree 0: three constants."""
     law = HypoelasticLaw.linear(400.0, 250.0, 12.0)
