@@ -48,12 +48,15 @@ def report(
     strains = found.best.history.displacement
     write_vtu(model.mesh, strains[-1], folder.path / "bubble.vtu")
     result = found.result
+    runs = result["external_runs"]
+    external = [(f"of them by {project.solver}", runs)] if runs else []
     facts: list[tuple[str, object]] = [
         ("objective " + result["objective_is"], found.best.value),
         ("mean |dx| + |dy| + |dz|, mm", found.mean_absolute),
         ("method", f"{project.method} on {project.solver}"),
         ("starts", f"{len(found.ranked)} feasible of {len(found.records)}"),
         ("analyses", result["analyses"]),
+        *external,
         ("wall time, s", result["wall_s"]),
         ("Poisson's ratio nu12 (fixed)", project.nu12),
     ]

@@ -189,10 +189,12 @@ def summary(found: Assessment, folder: Path) -> str:
     """A few lines for the terminal."""
     result = found.result
     count = len(found.records)
+    runs = result["external_runs"]
+    external = f" ({runs} of {result['solver']})" if runs else ""
     middle = float(np.median([r.objective for r in found.ranked if r.objective is not None]))
     lines = [
         f"best {result['objective_is']}: {found.best.value:.3g} (median {middle:.3g} of "
-        f"{len(found.ranked)} starts, {count} asked), {result['analyses']} analyses, "
+        f"{len(found.ranked)} starts, {count} asked), {result['analyses']} analyses{external}, "
         f"{result['wall_s']:.0f} s",
         f"mean |dx|+|dy|+|dz|: {found.mean_absolute:.3g} mm",
     ]
