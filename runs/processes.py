@@ -34,20 +34,12 @@ def run_starts(
     Parameters
     ----------
     build : makes the problem; called once in every process.
-    jobs : processes; 1 runs here.
+    jobs : processes beside this one, which only listens.
 
     Raises
     ------
     BubblefitError : a process died (exit code 4: nothing is lost but its current start).
     """
-    if jobs <= 1 or len(numbers) <= 1:
-        with threadpool_limits(1):
-            problem = build()
-            for number in numbers:
-                told: list[Record] = []
-                told.append(run_start(problem, options, seed, number, told.append))
-                yield from told
-        return
     # fork: the compiled kernels and the project are there already; elsewhere spawn works too.
     methods = multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("fork" if "fork" in methods else "spawn")
@@ -56,9 +48,9 @@ def run_starts(
         records: Any = context.Queue()
     except OSError as error:  # no semaphores: /dev/shm missing or not writable
         log.warning("one process only: this machine has no shared memory (%s)", error)
-        yield from run_starts(build, options, seed, numbers, 1)
+        yield from _here(build, options, seed, numbers)
         return
-    count = min(jobs, len(numbers))
+    count = max(min(jobs, len(numbers)), 1)
     for task in [*numbers, *([None] * count)]:
         tasks.put(task)
     workers = [
@@ -87,6 +79,18 @@ def run_starts(
             worker.terminate()
         for worker in workers:
             worker.join()
+
+
+def _here(
+    build: Callable[[], FieldProblem], options: FitOptions, seed: int, numbers: Sequence[int]
+) -> Iterator[Record]:
+    """Without other processes: the records of a start come when it has ended."""
+    with threadpool_limits(1):
+        problem = build()
+        for number in numbers:
+            told: list[Record] = []
+            told.append(run_start(problem, options, seed, number, told.append))
+            yield from told
 
 
 def _check(workers: Sequence[Any]) -> None:
