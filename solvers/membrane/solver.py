@@ -13,11 +13,13 @@ from ... import __version__
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
+from ...models.uniaxial import UniaxialModel
 from ..base import PARAMETERS, History, SolverCheck
-from . import bubble
+from . import bubble, strip
 from .newton import Membrane
 
 Array = NDArray[np.float64]
+Model = BubbleModel | UniaxialModel
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
@@ -29,7 +31,8 @@ class MembraneSolver:
 
     Parameters
     ----------
-    tolerance : largest residual force over the largest nodal pressure force.
+    tolerance : largest residual force over the largest nodal pressure force (a strip: over the
+        largest reaction of a node).
     """
 
     name = "membrane"
@@ -37,7 +40,7 @@ class MembraneSolver:
 
     def __init__(self, tolerance: float = 1e-8) -> None:
         self.tolerance = tolerance
-        self._prepared: tuple[BubbleModel, Membrane] | None = None
+        self._prepared: tuple[Model, Membrane] | None = None
 
     def check(self) -> SolverCheck:
         """Always there; the law is its own."""
@@ -45,18 +48,18 @@ class MembraneSolver:
 
     def run(
         self,
-        model: BubbleModel,
+        model: Model,
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
         pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> History:
-        """Inflate the model (scratch and timeout are for external solvers and not used).
+        """Inflate or pull the model (scratch and timeout are for external solvers and not used).
 
         Parameters
         ----------
-        pressure_offset : MPa added to every load level.
+        pressure_offset : MPa added to every load level; a strip has none.
         guess : (increments, nodes, 3) displacements to start each increment from, mm.
 
         Raises
@@ -67,7 +70,7 @@ class MembraneSolver:
 
     def run_with_sensitivity(
         self,
-        model: BubbleModel,
+        model: Model,
         law: HypoelasticLaw,
         parameters: Sequence[str] = PARAMETERS[:12],
         pressure_offset: float = 0.0,
@@ -75,7 +78,8 @@ class MembraneSolver:
     ) -> tuple[History, Array]:
         """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
 
-        Derivatives by coefficients are per MPa, by the pressure offset per MPa.
+        Derivatives by coefficients are per MPa, by the pressure offset per MPa. Those of a
+        strip's load are in the history (`load_slope`).
         """
         unknown = [name for name in parameters if name not in PARAMETERS]
         if unknown:
@@ -85,19 +89,25 @@ class MembraneSolver:
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
         self,
-        model: BubbleModel,
+        model: Model,
         law: HypoelasticLaw,
         parameters: Sequence[str],
         pressure_offset: float,
         guess: Array | None,
     ) -> tuple[History, Array]:
         membrane = self._membrane(model, law)
+        if isinstance(model, UniaxialModel):
+            return strip.analyse(membrane, model, parameters, pressure_offset, guess)
         return bubble.analyse(membrane, model, parameters, pressure_offset, guess)
 
-    def _membrane(self, model: BubbleModel, law: HypoelasticLaw) -> Membrane:
+    def _membrane(self, model: Model, law: HypoelasticLaw) -> Membrane:
         """Geometry and sparsity are made once a model; strain history anew every run."""
         if self._prepared is None or self._prepared[0] is not model:
-            self._prepared = (model, bubble.prepare(model, law, self.tolerance))
+            if isinstance(model, UniaxialModel):
+                membrane = strip.prepare(model, law, self.tolerance)
+            else:
+                membrane = bubble.prepare(model, law, self.tolerance)
+            self._prepared = (model, membrane)
         membrane = self._prepared[1]
         membrane.law = law
         membrane.keep_tangent, membrane.iterations = False, 0
