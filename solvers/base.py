@@ -22,13 +22,14 @@ PARAMETERS = (*(f"beta_{i}" for i in range(12)), "nu12", "pressure_offset")
 class History:
     """What an analysis that ended well reports, frame by frame.
 
-    load (frames,) MPa; displacement (frames, nodes, 3) mm; reactions by named set (frames, 3) N;
-    strain_min, strain_max (3,) extremes of (eps1, eps2, gamma12) log strain; cavity pressure
-    (MPa) and volume (mm^3), (frames,), where there is a cavity; path: displacement at every
-    increment (increments, nodes, 3) and its derivatives path_slope (..., parameters), where the
-    solver keeps them (a start for the next run); stable: whether the equilibrium at the last load
-    is, None where the solver did not look; iterations: what the solver counts as its work;
-    remarks: what a reader of the result should know.
+    load (frames,) pressure in MPa, or the force on a whole strip in N, and load_slope (frames,
+    parameters) its derivatives where the solver has them; displacement (frames, nodes, 3) mm;
+    reactions by named set (frames, 3) N; strain_min, strain_max (3,) extremes of (eps1, eps2,
+    gamma12) log strain; cavity pressure (MPa) and volume (mm^3), (frames,), where there is a
+    cavity; path: displacement at every increment (increments, nodes, 3) and its derivatives
+    path_slope (..., parameters), where the solver keeps them (a start for the next run); stable:
+    whether the equilibrium at the last load is, None where the solver did not look; iterations:
+    what the solver counts as its work; remarks: what a reader of the result should know.
     """
 
     load: Array
@@ -41,6 +42,7 @@ class History:
     iterations: int = 0
     path: Array | None = None
     path_slope: Array | None = None
+    load_slope: Array | None = None
     stable: bool | None = None
     remarks: tuple[str, ...] = ()
 

@@ -286,12 +286,12 @@ def test_jobs_and_order_do_not_change_a_start() -> None:
 
 
 class Dying(MembraneSolver):
-    def _inflate(self, *arguments: Any) -> Any:
+    def _analyse(self, *arguments: Any) -> Any:
         os._exit(9)
 
 
 class Broken(MembraneSolver):
-    def _inflate(self, *arguments: Any) -> Any:
+    def _analyse(self, *arguments: Any) -> Any:
         raise InputError("mesh.vtu", "quads", "made to fail")
 
 

@@ -263,13 +263,13 @@ class Failing(MembraneSolver):
         super().__init__()
         self.when, self.how, self.runs = when, how, 0
 
-    def _inflate(self, *arguments: Any) -> Any:
+    def _analyse(self, *arguments: Any) -> Any:
         self.runs += 1
         if not self.when(self.runs):
-            return super()._inflate(*arguments)
+            return super()._analyse(*arguments)
         if self.how == "failure":
             raise SolverFailure("on purpose")
-        history, rates = super()._inflate(*arguments)
+        history, rates = super()._analyse(*arguments)
         return replace(history, displacement=history.displacement * np.nan), rates * np.nan
 
 
