@@ -24,7 +24,7 @@ EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bubble-known-so
 def main() -> None:
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 40
     setup = bubble_setup(read_project(EXAMPLE / "project.toml"))
-    model, law = setup.problem.model, setup.known
+    model, law = setup.model, setup.known
     assert law is not None
     solver = MembraneSolver()
     # Warm starts come from a neighbour, as in a fit that is settling: 0.1 % away, with its slope.

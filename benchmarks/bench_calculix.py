@@ -36,14 +36,14 @@ def main() -> None:
     most = int(sys.argv[1]) if len(sys.argv) > 1 else 60
     project = read_project(EXAMPLE / "project.toml")
     setup = bubble_setup(project)
-    model, law = setup.problem.model, setup.known
+    model, law = setup.model, setup.known
     assert law is not None
     compare(model, {"cubic (Table 4.2)": law, "linear": HypoelasticLaw.linear(800.0, 400.0, 20.0)})
     assert isinstance(project.data, KnownSolution)
     data = replace(project.data, elements=COARSE)
     coarse = replace(project, elements=COARSE, data=data, solver="calculix")
     fit = bubble_setup(coarse)
-    quads = len(fit.problem.model.mesh.quads)
+    quads = len(fit.model.mesh.quads)
     print(f"fits to CalculiX' own data, {quads} quads, start 0: runs until e is below")
     levels = "".join(f"{level:9g}" for level in LEVELS)
     ends = f"{'runs':>7s}{'wall, s':>9s}{'e':>10s}{'E1, %':>8s}{'E2, %':>8s}{'G12, %':>8s}"

@@ -31,7 +31,7 @@ AS_SHIPPED = factorisation.LARGEST_BAND
 def main() -> None:
     largest = int(sys.argv[1]) if len(sys.argv) > 1 else QUADS[-1]
     setup = bubble_setup(read_project(EXAMPLE / "project.toml"))
-    base, law = setup.problem.model, setup.known
+    base, law = setup.model, setup.known
     assert law is not None
     print(f"{'quads':>6s}{'unknowns':>10s}{'band, s':>9s}{'SuperLU, s':>12s}"
           f"{'faster / 200 quads':>20s}{'shipped':>9s}{'apex, mm':>10s}")  # fmt: skip

@@ -28,7 +28,7 @@ def main() -> None:
         return
     published = pd.read_csv(path, comment="#")
     setup = bubble_setup(read_project(EXAMPLE / "project.toml"))
-    model, law = setup.problem.model, setup.known
+    model, law = setup.model, setup.known
     assert law is not None
     history = MembraneSolver().run(model, law)
     place = model.mesh.points

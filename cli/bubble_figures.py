@@ -44,8 +44,8 @@ def report(
 ) -> None:
     """Draw everything and write report.html and bubble.vtu."""
     figures = _figures(project, setup, found, folder)
-    model = setup.problem.model
-    strains = found.best.history.displacement
+    model = setup.model
+    strains = found.best.histories[0].displacement
     write_vtu(model.mesh, strains[-1], folder.path / "bubble.vtu")
     result = found.result
     runs = result["external_runs"]
@@ -96,7 +96,7 @@ def _figures(
     project: BubbleProject, setup: BubbleSetup, found: Assessment, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     problem = setup.problem
-    displacement = found.best.history.displacement
+    displacement = found.best.histories[0].displacement
     shown = displacement + found.offset
     label = "known solution" if setup.known is not None else "measured"
     values = [np.nan if r.objective is None else r.objective for r in found.records]
@@ -110,11 +110,11 @@ def _figures(
     known = _curves(setup.known, strains) if setup.known is not None else None
     curves = np.array([_curves(law, strains) for law in laws])
     plot_moduli(folder.path / "moduli.png", strains, curves, known)
-    targets = problem.objective.targets
+    targets = setup.objective.targets
     plot_profiles(
         folder.path / "profiles.png",
         project.pressures,
-        problem.model.mesh.points,
+        setup.model.mesh.points,
         shown,
         measured=[(f.points, f.displacement) for f in setup.fields],
         measured_label=label,
@@ -144,7 +144,7 @@ def _curves(law: HypoelasticLaw, strains: Array) -> Array:
 
 def _tables(project: BubbleProject, setup: BubbleSetup, found: Assessment) -> list[Table]:
     problem = setup.problem
-    norms = problem.objective.block_norms(found.best.residual).reshape(-1, 3)
+    norms = problem.blocks.norms(found.best.residual).reshape(-1, 3)
     kilo = [1e3 * p for p in project.pressures]
     header = ["pressure, kPa", "x", "y", "z"]
     note = (
@@ -174,8 +174,8 @@ def _tables(project: BubbleProject, setup: BubbleSetup, found: Assessment) -> li
                 "What the data determine",
                 ["modulus", "median 1 sigma", "largest 1 sigma"],
                 body,
-                f"white noise of {sure.noise_mm:.2g} mm on every displacement component; the "
-                "single coefficients are far less certain than the moduli they make",
+                f"white noise of {sure.noise['bubble']:.2g} mm on every displacement component; "
+                "the single coefficients are far less certain than the moduli they make",
             )
         )
     return tables

@@ -69,7 +69,7 @@ def assess(
     best = problem.evaluate(unknowns, leading is problem, warm=False)
     if best is None:
         raise SolverFailure("the best fit does not run again", problem.solver.name)
-    history = best.history
+    history = best.histories[0]
     reached = np.array([history.strain_max[0], history.strain_max[1], 0.0])
     reached[2] = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
     reached = np.maximum(reached, 1e-6)
@@ -77,7 +77,7 @@ def assess(
     slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)
     sure = certainty(leading, slopes, law, reached) if slopes is not None else None
     offset, pressure_offset = problem.parameters.offsets(unknowns)
-    mean = problem.objective.mean_absolute(history.displacement, offset)
+    mean = setup.objective.mean_absolute(history.displacement, offset)
     analyses = sum(r.analyses for r in records)
     scale = project.modulus_scale
     result: dict[str, Any] = {
@@ -111,7 +111,7 @@ def assess(
         "external_runs": sum(r.external_runs for r in records),
         "data": {
             "matched_by": project.match_by,
-            "places": [len(t.displacement) for t in problem.objective.targets],
+            "places": [len(t.displacement) for t in setup.objective.targets],
             "doubtful_dropped": setup.dropped,
             "outside_dropped": setup.outside,
         },
@@ -125,7 +125,7 @@ def assess(
         result["moduli_error"] = moduli_error(law, setup.known, reached)
     if sure is not None:
         result["uncertainty"] = {
-            "noise_mm": sure.noise_mm,
+            "noise_mm": sure.noise["bubble"],
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
         }

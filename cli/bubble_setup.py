@@ -13,7 +13,7 @@ from ..experiments.fields import DisplacementField, read_fields
 from ..experiments.surfaces import DisplacementSurface, fit_surface
 from ..identification.objective import FieldObjective, FieldTarget
 from ..identification.parameters import ModuliParameters
-from ..identification.problem import FieldProblem
+from ..identification.problem import FitProblem
 from ..materials.law import HypoelasticLaw
 from ..meshes.disk import disk_mesh
 from ..meshes.location import sampling_matrix
@@ -41,12 +41,24 @@ class BubbleSetup:
     out; outside : points beyond the rim of the model.
     """
 
-    problem: FieldProblem
+    problem: FitProblem
     fields: tuple[DisplacementField, ...]
     known: HypoelasticLaw | None
     surfaces: tuple[DisplacementSurface, ...]
     dropped: int
     outside: int
+
+    @property
+    def model(self) -> BubbleModel:
+        """The bubble's model."""
+        model: BubbleModel = self.problem.experiments[0].model
+        return model
+
+    @property
+    def objective(self) -> FieldObjective:
+        """What the bubble should show."""
+        objective: FieldObjective = self.problem.experiments[0].objective
+        return objective
 
 
 def bubble_model(project: BubbleProject) -> BubbleModel:
@@ -124,10 +136,9 @@ def bubble_setup(
         objective = FieldObjective(targets, project.objective)
     except InputError as error:
         raise InputError(project.path, error.field, error.problem) from None
-    problem = FieldProblem(model, solver, law, objective, parameters)
+    problem = FitProblem.single(model, solver, law, objective, parameters)
     if not isinstance(solver, DifferentiatingSolver):
-        lead = solver_named(SURROGATE)
-        problem.surrogate = FieldProblem(model, lead, law, objective, parameters)
+        problem.surrogate = problem.led_by([solver_named(SURROGATE)])
     dropped = sum(f.dropped for f in fields)
     return BubbleSetup(problem, fields, known, surfaces, dropped, outside)
 
@@ -151,7 +162,7 @@ def _surfaces(
 
 def bubble_problem(
     project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
-) -> FieldProblem:
+) -> FitProblem:
     """Only the fit: what each worker process builds for itself, from data that are there."""
     return bubble_setup(project, fields).problem
 

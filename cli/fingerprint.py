@@ -26,7 +26,7 @@ def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
     options = project.solver_options.get(project.solver, {})
     for name in DECK:
         digest.update(f"{name}={options.get(name)};".encode())
-    for target in setup.problem.objective.targets:
+    for target in setup.objective.targets:
         digest.update(np.ascontiguousarray(target.displacement).tobytes())
     return digest.hexdigest()
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.law import MODULI, HypoelasticLaw
-from ..materials.positivity import GRID
-from .problem import Evaluation, FieldProblem
+from ..materials.positivity import GRID, coefficient_rows
+from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
 
 POINTS = 61
-#: White noise of a displacement component assumed where the data are exact, mm.
-NOISE = 0.05
 #: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
 UNCERTAIN = 0.25
+#: Relative uncertainty of a modulus of which nothing is known.
+PRIOR = 10.0
 ON_BOUND = 1e-6
 
 
@@ -34,59 +35,100 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """1-sigma relative uncertainty of each modulus along (0 ... reached), and plain words."""
+    """1-sigma relative uncertainty of each modulus along (0 ... reached), and plain words.
 
-    noise_mm: float
+    noise : of each test, in the unit of its data (mm, N).
+    """
+
+    noise: dict[str, float]
     strain: dict[str, Array]
     sigma: dict[str, Array]
     undetermined: tuple[str, ...]
 
 
 def certainty(
-    problem: FieldProblem, best: Evaluation, law: HypoelasticLaw, reached: Array
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array
 ) -> Certainty:
-    """Linear propagation of displacement noise to the moduli.
+    """Linear propagation of the noise of every test to the moduli.
 
-    The noise is the RMS misfit in mm, but not less than 0.05 mm: a misfit of zero (computed data)
-    does not mean that a measurement would determine everything. Assumes white noise; a misfit
-    that is systematic makes the moduli less certain than this says.
+    The noise is the RMS misfit, but not less than the objective's least noise: a misfit of zero
+    (computed data) does not mean that a measurement would determine everything. Assumes white
+    noise; a misfit that is systematic makes the moduli less certain than this says.
     """
     assert best.jacobian is not None
-    scale = np.concatenate(
-        [
-            np.repeat(s, len(t.displacement))
-            for t, s in zip(problem.objective.targets, problem.objective.scales, strict=True)
-        ]
-    )
-    misfit = best.residual * scale
-    noise = max(NOISE, float(np.sqrt(np.mean(misfit**2))))
+    noise, sigma = _noise(problem, best)
     # The objective weighs the blocks; the covariance is that of the weighted estimate.
     j = best.jacobian
     inverse = np.linalg.pinv(j.T @ j, rcond=1e-13)
-    estimator = inverse @ j.T / scale[None, :]
-    covariance = noise**2 * estimator @ estimator.T
+    estimator = inverse @ j.T * sigma
+    strains, sigmas = _along(problem, law, reached, estimator @ estimator.T)
+    said = " and ".join(
+        f"{noise[e.name]:.2g} {e.objective.unit}"
+        + (f" ({e.name})" if len(problem.experiments) > 1 else "")
+        for e in problem.experiments
+    )
+    words = [
+        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma at {said} noise), "
+        f"worst at strain {strains[name][relative.argmax()]:.3f}"
+        for name, relative in sigmas.items()
+        if relative.max() > UNCERTAIN
+    ]
+    return Certainty(noise, strains, sigmas, (*words, *_limited(problem, best)))
+
+
+def pinned_by(
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    tests: Sequence[int],
+) -> dict[str, Array]:
+    """1-sigma relative uncertainty of each modulus from some `tests` alone, by their numbers.
+
+    The best estimate that those tests would allow (weights do not count), beside hardly any
+    knowledge before: each modulus at the Chebyshev points to 1000 % of its own size.
+    """
+    assert best.jacobian is not None
+    _, sigma = _noise(problem, best)
+    rows = np.concatenate([np.r_[problem.rows(k)] for k in tests])
+    j = best.jacobian[rows] / sigma[rows, None]
+    before = PRIOR * np.maximum(np.abs(best.unknowns), 1e-3)
+    covariance = np.linalg.inv(j.T @ j + np.diag(before**-2.0))
+    return _along(problem, law, reached, covariance)[1]
+
+
+def _noise(problem: FitProblem, best: Evaluation) -> tuple[dict[str, float], Array]:
+    """Noise of each test in its unit, and of each residual (m,)."""
+    misfit, scale = best.residual * problem.scale, problem.scale
+    noise, sigma = {}, np.empty_like(scale)
+    for k, experiment in enumerate(problem.experiments):
+        rows = problem.rows(k)
+        rms = float(np.sqrt(np.mean(misfit[rows] ** 2)))
+        noise[experiment.name] = max(experiment.objective.least_noise, rms)
+        sigma[rows] = noise[experiment.name] / scale[rows]
+    return noise, sigma
+
+
+def _along(
+    problem: FitProblem, law: HypoelasticLaw, reached: Array, covariance: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Strains and 1-sigma relative uncertainty of each modulus, from that of the unknowns."""
     p = problem.parameters
     moved = p.to_coefficients @ covariance[: p.size, : p.size] @ p.to_coefficients.T
-    strains, sigmas, words = {}, {}, []
+    strains, sigmas = {}, {}
     for name, (first, component) in MODULI.items():
         strain = np.linspace(0.0, reached[component], POINTS)
+        held = np.minimum(strain, law.strain_range[component])
         rows = np.zeros((POINTS, 12))
-        rows[:, first : first + 4] = np.vander(strain, 4)
+        own = None if p.breaks is None else p.breaks[component]
+        rows[:, first : first + 4] = coefficient_rows(held, own)
         rows = rows[:, p.places]
         sigma = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", rows, moved, rows), 0.0))
-        relative = sigma / law.modulus(name, strain)
-        strains[name], sigmas[name] = strain, relative
-        weak = np.flatnonzero(relative > UNCERTAIN)
-        if len(weak):
-            words.append(
-                f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma at "
-                f"{noise:.2g} mm noise), worst at strain {strain[relative.argmax()]:.3f}"
-            )
-    words += _limited(problem, best)
-    return Certainty(noise, strains, sigmas, tuple(words))
+        strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)
+    return strains, sigmas
 
 
-def _limited(problem: FieldProblem, best: Evaluation) -> list[str]:
+def _limited(problem: FitProblem, best: Evaluation) -> list[str]:
     """Moduli on their positivity margin and coefficients on their bounds."""
     p = problem.parameters
     grid, margin = p.positivity

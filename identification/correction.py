@@ -8,12 +8,15 @@ returned, is always the other solver's objective.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .fit import levenberg_marquardt
 from .optimum import Optimum
-from .problem import Evaluation, FieldProblem
+from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
 
@@ -23,7 +26,7 @@ MOST_SHORTENED = 3  # in a row
 
 
 def corrected_fit(
-    problem: FieldProblem, start: Array, tolerance: float, max_analyses: int, max_runs: int
+    problem: FitProblem, start: Array, tolerance: float, max_analyses: int, max_runs: int
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the other solver fails wherever the membrane leads.
 
@@ -34,7 +37,7 @@ def corrected_fit(
     """
     surrogate = problem.surrogate
     assert surrogate is not None
-    data = surrogate.objective
+    uncorrected = [experiment.objective for experiment in surrogate.experiments]
     best: Evaluation | None = None
     status, shortened = "runs used up", 0
     try:
@@ -63,18 +66,22 @@ def corrected_fit(
             if beside is None:
                 status = f"{surrogate.solver.name} failed"
                 break
-            surrogate.objective = data.shifted(
-                point.history.displacement - beside.history.displacement
-            )
+            _restore(surrogate, uncorrected)
+            surrogate.shift(point.histories, beside.histories)
             y = _led(surrogate, y, tolerance, max_analyses)
     finally:
-        surrogate.objective = data
+        _restore(surrogate, uncorrected)
     if best is None:
         return None
     return Optimum(best, status, problem.analyses + surrogate.analyses, problem.analyses)
 
 
-def _led(surrogate: FieldProblem, y: Array, tolerance: float, analyses: int) -> Array | None:
+def _restore(surrogate: FitProblem, objectives: Sequence[Any]) -> None:
+    for experiment, objective in zip(surrogate.experiments, objectives, strict=True):
+        experiment.objective = objective
+
+
+def _led(surrogate: FitProblem, y: Array, tolerance: float, analyses: int) -> Array | None:
     """Unknowns at the least of the surrogate's (corrected) objective."""
     surrogate.warm_starts = True
     found = levenberg_marquardt(surrogate, y, tolerance, surrogate.analyses + analyses)

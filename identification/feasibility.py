@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoFeasibleStart
-from .problem import FieldProblem
+from .problem import FitProblem
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ MOST_ANALYSES = 50
 BATCH = 500
 
 
-def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
+def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     """Unknowns of random start `number` of the study `seed`: the same on any machine.
 
     Coefficients are drawn evenly between their bounds until the moduli are positive over the
@@ -29,11 +29,10 @@ def feasible_start(problem: FieldProblem, seed: int, number: int) -> Array:
     problem = problem.surrogate or problem
     p = problem.parameters
     random = np.random.default_rng([seed, number])
-    grid, margin = p.positivity
     tried = 0
     for _ in range(MOST_DRAWS // BATCH):
-        draws = p.lower + (p.upper - p.lower) * random.random((BATCH, p.size))
-        for coefficients in draws[(draws @ grid.T >= margin).all(axis=1)]:
+        draws = p.draw(random, BATCH)
+        for coefficients in draws[p.allowed(draws)]:
             tried += 1
             y = p.unknowns(coefficients)
             point = problem.evaluate(y, False, warm=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .least_squares import bounded_step, descend
 from .optimum import Optimum
-from .problem import Evaluation, FieldProblem
+from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ STIFFER = (2.0, 4.0)  # shear moduli of the restarts away from instability
 
 
 def levenberg_marquardt(
-    problem: FieldProblem, start: Array, tolerance: float, max_analyses: int
+    problem: FitProblem, start: Array, tolerance: float, max_analyses: int
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
 
@@ -53,7 +53,7 @@ def levenberg_marquardt(
 
 
 def _both_stages(
-    problem: FieldProblem, point: Evaluation, tolerance: float, max_analyses: int
+    problem: FitProblem, point: Evaluation, tolerance: float, max_analyses: int
 ) -> tuple[Evaluation, str]:
     best, status = descend(problem, point, tolerance, max_analyses)
     if status == "settled":
@@ -63,7 +63,7 @@ def _both_stages(
 
 
 def _from_stiffer(
-    problem: FieldProblem, best: Evaluation, factor: float, tolerance: float, max_analyses: int
+    problem: FitProblem, best: Evaluation, factor: float, tolerance: float, max_analyses: int
 ) -> tuple[Evaluation, str]:
     """Again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
 

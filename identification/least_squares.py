@@ -13,7 +13,7 @@ import quadprog
 from numpy.typing import NDArray
 
 from ..materials.positivity import GRID
-from .problem import Evaluation, FieldProblem
+from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ PATIENCE = 3  # ... when it happens so often in a row
 
 
 def descend(
-    problem: FieldProblem,
+    problem: FitProblem,
     point: Evaluation,
     tolerance: float,
     max_analyses: int,
@@ -90,7 +90,7 @@ def descend(
             return point, "settled" if not reweighted else "converged"
 
 
-def _cut(problem: FieldProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
+def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
     """An inequality that keeps the next step half as far from G12's largest drop.
 
     A membrane loses its stability in shear: so a refused step says where G12 was too low, and
@@ -111,16 +111,16 @@ def _jacobian(point: Evaluation) -> Array:
     return point.jacobian
 
 
-def _block_weights(problem: FieldProblem, point: Evaluation, reweighted: bool) -> Array:
+def _block_weights(problem: FitProblem, point: Evaluation, reweighted: bool) -> Array:
     """Square roots of the weights of the squared residuals, (m,).
 
     1/norm of each block majorises e: its weighted sum of squares decreases only if e does.
     """
     if not reweighted:
         return np.ones_like(point.residual)
-    norms = problem.objective.block_norms(point.residual)
+    norms = problem.blocks.norms(point.residual)
     norms = np.maximum(norms, 1e-6 * norms.max())
-    return np.asarray(1.0 / np.sqrt(norms))[problem.objective.block]
+    return np.asarray(1.0 / np.sqrt(norms))[problem.blocks.of]
 
 
 def bounded_step(hessian: Array, gradient: Array, a: Array, c: Array, y: Array) -> Array | None:

@@ -12,7 +12,7 @@ from .correction import corrected_fit
 from .fit import levenberg_marquardt
 from .nonlinear import NloptOptions, nlopt_minimise
 from .optimum import Optimum
-from .problem import FieldProblem
+from .problem import FitProblem
 
 ALGORITHMS: dict[str, Literal["slsqp", "cobyla"]] = {"slsqp": "slsqp", "cobyla": "cobyla"}
 METHODS = ("lm", *ALGORITHMS)
@@ -33,7 +33,7 @@ class FitOptions:
     max_runs: int = 10
 
 
-def fit_from(problem: FieldProblem, start: NDArray, options: FitOptions) -> Optimum | None:
+def fit_from(problem: FitProblem, start: NDArray, options: FitOptions) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
 
     Raises

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .optimum import Optimum
-from .problem import Evaluation, FieldProblem
+from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class _Record:
 
     def __init__(
         self,
-        problem: FieldProblem,
+        problem: FitProblem,
         start: Evaluation,
         tolerance: float,
         max_analyses: int,
@@ -118,7 +118,7 @@ class _Record:
 
     def _slope(self, point: Evaluation, x: Array) -> Array:
         if point.jacobian is not None:
-            gradient = self.problem.objective.gradient(point.residual, point.jacobian)
+            gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
             return np.asarray(gradient @ self.basis)
         slope = np.zeros(len(x))
         for i in range(len(x)):
@@ -133,7 +133,7 @@ class _Record:
 
 
 def nlopt_minimise(
-    problem: FieldProblem,
+    problem: FitProblem,
     start: Array,
     tolerance: float,
     max_analyses: int,
@@ -201,14 +201,14 @@ def nlopt_minimise(
     return Optimum(record.best, status, problem.analyses)
 
 
-def _box(problem: FieldProblem, end: float) -> Array:
+def _box(problem: FitProblem, end: float) -> Array:
     """Unit box of the coefficients; nuisance parameters keep their own bounds."""
     p = problem.parameters
     low, high = p.nuisance_bounds
     return np.concatenate([np.full(p.size, end), low if end == 0.0 else high])
 
 
-def _limits(problem: FieldProblem, options: NloptOptions) -> tuple[Array | float, Array | float]:
+def _limits(problem: FitProblem, options: NloptOptions) -> tuple[Array | float, Array | float]:
     if options.constraints == "margin":
         return -np.inf, np.inf
     return _box(problem, 0.0), _box(problem, 1.0)

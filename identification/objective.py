@@ -1,4 +1,4 @@
-"""Residuals and objective of a bubble fit (Eqs 4.5-4.8).
+"""Residuals of a bubble test (Eqs 4.5-4.8).
 
 A residual block is one displacement direction at one pressure: (model - measured) / (largest
 measured |value| * sqrt(n)). The norm of a block is e_x/max(P_x) of Eq. 4.8, e is the sum of the
@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..solvers.base import History
 
 Array = NDArray[np.float64]
 
@@ -41,19 +42,29 @@ class FieldTarget:
 
 
 class FieldObjective:
-    """Residual blocks, objective e and its slope, for displacement fields at several pressures.
+    """Residual blocks for displacement fields at several pressures, x, y, z at each.
 
     Parameters
     ----------
     targets : one a reported pressure, in the order of the model's frames.
     normalise : "e" (Eq. 4.8) or "mm".
+    weight : of every block in e.
 
     Raises
     ------
     InputError : a direction without any displacement cannot be normalised by it.
     """
 
-    def __init__(self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e") -> None:
+    #: What the residuals are in after `scale`, and the least noise to reckon with where the data
+    #: are exact (computed): that of a good image correlation.
+    unit, least_noise = "mm", 0.05
+
+    def __init__(
+        self,
+        targets: Sequence[FieldTarget],
+        normalise: Literal["e", "mm"] = "e",
+        weight: float = 1.0,
+    ) -> None:
         self.targets = tuple(targets)
         self.scales = []
         for target in self.targets:
@@ -66,30 +77,36 @@ class FieldObjective:
                     f"d{axis} is zero everywhere: nothing to match (is a column mapped wrongly?)",
                 )
             count = np.sqrt(len(target.displacement))
-            self.scales.append(count * (largest if normalise == "e" else np.ones(3)))
-        sizes = np.repeat([len(t.displacement) for t in self.targets], 3)
-        self.starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-        self.block = np.repeat(np.arange(len(sizes)), sizes)
+            self.scales.append(count / weight * (largest if normalise == "e" else np.ones(3)))
+        self.sizes = tuple(len(t.displacement) for t in self.targets for _ in "xyz")
 
-    def shifted(self, by: Array) -> FieldObjective:
-        """The objective of displacement + `by` (frames, nodes, 3), with the same scales."""
+    @property
+    def scale(self) -> Array:
+        """(m,): millimetres in one unit of each residual."""
+        return np.repeat(np.concatenate(self.scales), self.sizes)
+
+    def shifted(self, here: History, there: History) -> FieldObjective:
+        """The objective of a model that moves as `here` where this one moves as `there`."""
         other = copy.copy(self)
+        by = here.displacement - there.displacement
         other.targets = tuple(
             replace(target, displacement=target.displacement - target.at(moved))
             for target, moved in zip(self.targets, by, strict=True)
         )
         return other
 
-    def residual(self, displacement: Array, offset: Array | None = None) -> Array:
-        """Blocks laid end to end, (m,), from model displacement (frames, nodes, 3)."""
+    def residual(self, history: History, offset: Array | None = None) -> Array:
+        """Blocks laid end to end, (m,); `offset` (3,) mm is added to the model's displacement."""
         shift = np.zeros(3) if offset is None else offset
         parts = [
             ((target.at(nodal) + shift - target.displacement) / scale).T.reshape(-1)
-            for target, nodal, scale in zip(self.targets, displacement, self.scales, strict=True)
+            for target, nodal, scale in zip(
+                self.targets, history.displacement, self.scales, strict=True
+            )
         ]
         return np.concatenate(parts)
 
-    def jacobian(self, slope: Array) -> Array:
+    def jacobian(self, history: History, slope: Array) -> Array:
         """(m, parameters) from d displacement (frames, nodes, 3, parameters)."""
         count = slope.shape[-1]
         parts = [
@@ -105,19 +122,6 @@ class FieldObjective:
             for target, scale in zip(self.targets, self.scales, strict=True)
         ]
         return np.concatenate(columns)
-
-    def block_norms(self, residual: Array) -> Array:
-        """(3 frames,): e_x/max(P_x), e_y/max(P_y), e_z/max(P_z), pressure by pressure."""
-        return np.sqrt(np.add.reduceat(residual**2, self.starts))
-
-    def value(self, residual: Array) -> float:
-        """e of Eq. 4.8."""
-        return float(self.block_norms(residual).sum())
-
-    def gradient(self, residual: Array, jacobian: Array) -> Array:
-        """Slope of e; a block that fits exactly contributes nothing."""
-        norms = np.maximum(self.block_norms(residual), 1e-14)
-        return np.asarray((residual / norms[self.block]) @ jacobian)
 
     def mean_absolute(self, displacement: Array, offset: Array | None = None) -> float:
         """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""

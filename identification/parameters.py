@@ -8,13 +8,14 @@ and positivity of the moduli are linear in either.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..materials.positivity import margins, modulus_grid
+from ..materials.positivity import GRID, margins, modulus_grid
 
 Array = NDArray[np.float64]
 
@@ -24,15 +25,19 @@ STRAIN_OF_BLOCK = (2, 1, 0)
 
 @dataclass(frozen=True, eq=False)
 class ModuliParameters:
-    """Coefficients of degree-`degree` moduli between bounds, and how the fit sees them.
+    """Coefficients of the moduli between bounds, and how the fit sees them.
 
     Parameters
     ----------
-    degree : 0 (linear orthotropic constants) to 3 (Eqs 4.1-4.3).
+    degree : 0 (linear orthotropic constants) to 3 (Eqs 4.1-4.3); 2 for a tri-linear law.
     lower, upper : (3 (degree + 1),) MPa bounds on the coefficients, G12, E2, E1, highest first.
     strain_range : ends (eps1, eps2, gamma12) over which the moduli must be positive.
     margin_E, margin_G : MPa, the least modulus allowed there.
     displacement_offset, pressure_offset : nuisance parameters switched on.
+    breaks : (3, 2) strains (eps1, eps2, gamma12) between the regions of a tri-linear law.
+    largest : (3,) MPa, the largest E1, E2, G12 allowed anywhere on the strain range; starts are
+        then drawn from modulus values between the margins and these, instead of from the box of
+        the coefficients.
     """
 
     degree: int
@@ -44,6 +49,27 @@ class ModuliParameters:
     displacement_offset: bool = False
     pressure_offset: bool = False
     least_pressure: float = 1.0
+    breaks: Array | None = None
+    largest: Array | None = None
+
+    @classmethod
+    def between(
+        cls, degree: int, strain_range: Sequence[float], least: Array, largest: Array, **other: Any
+    ) -> ModuliParameters:
+        """Bounds on the moduli E1, E2, G12 (3,) MPa instead of on their coefficients.
+
+        The box of the coefficients is the smallest that holds every modulus whose values at the
+        Chebyshev points lie between the bounds.
+        """
+        size = 3 * (degree + 1)
+        ones = np.ones(size)
+        margins = float(min(least[:2])), float(least[2])
+        draft = cls(degree, ones, ones, strain_range, *margins, **other)
+        t = draft.from_values
+        block = np.repeat(STRAIN_OF_BLOCK, degree + 1)
+        low, high = t * least[block], t * largest[block]
+        lower, upper = np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
+        return replace(draft, lower=lower, upper=upper, largest=np.asarray(largest, float))
 
     @property
     def places(self) -> NDArray[np.intp]:
@@ -62,9 +88,12 @@ class ModuliParameters:
         return (*names, "pressure_offset") if self.pressure_offset else names
 
     @cached_property
-    def to_coefficients(self) -> Array:
-        """(size, size): free coefficients = this @ values at the Chebyshev points."""
+    def from_values(self) -> Array:
+        """(size, size): free coefficients = this @ moduli (MPa) at the Chebyshev points, or in
+        the regions of a tri-linear law."""
         n = self.degree + 1
+        if self.breaks is not None:
+            return np.eye(self.size)
         whole = np.zeros((self.size, self.size))
         for block, strain in enumerate(STRAIN_OF_BLOCK):
             points = (
@@ -73,10 +102,16 @@ class ModuliParameters:
                 * (1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
             )
             part = slice(n * block, n * block + n)
-            # Values in units of the modulus' own size: G12 is a tenth of E.
-            size = np.sqrt(max(self.lower[part][-1], 1e-3) * max(self.upper[part][-1], 1e-3))
-            whole[part, part] = np.linalg.inv(np.vander(points, n)) * size
+            whole[part, part] = np.linalg.inv(np.vander(points, n))
         return whole
+
+    @cached_property
+    def to_coefficients(self) -> Array:
+        """(size, size): free coefficients = this @ unknowns."""
+        # Values in units of the modulus' own size: G12 is a tenth of E.
+        last = np.repeat(np.arange(3), self.degree + 1) * (self.degree + 1) + self.degree
+        ends = np.maximum(self.lower[last], 1e-3), np.maximum(self.upper[last], 1e-3)
+        return self.from_values * np.sqrt(ends[0] * ends[1])
 
     def beta(self, y: Array) -> Array:
         """Full beta (12,) MPa of the unknowns y (size + nuisance,)."""
@@ -92,7 +127,7 @@ class ModuliParameters:
     @cached_property
     def positivity(self) -> tuple[Array, Array]:
         """A, margin of `A @ coefficients >= margin`: moduli on a strain grid."""
-        grid = modulus_grid(self.strain_range)
+        grid = modulus_grid(self.strain_range, self.breaks)
         return grid[:, self.places], margins(self.margin_E, self.margin_G)
 
     @cached_property
@@ -107,6 +142,9 @@ class ModuliParameters:
         size = 1.0 / np.abs(moduli).max(axis=1)
         a = np.vstack([moduli * size[:, None], t / width[:, None], -t / width[:, None]])
         c = np.concatenate([margin * size, self.lower / width, -self.upper / width])
+        if self.largest is not None:
+            a = np.vstack([a, -moduli * size[:, None]])
+            c = np.append(c, -np.repeat(self.largest[list(STRAIN_OF_BLOCK)], GRID) * size)
         extra = len(self.nuisance)
         if extra:
             wide = np.zeros((len(a) + 2 * extra, self.size + extra))
@@ -133,6 +171,31 @@ class ModuliParameters:
         named = dict(zip(self.nuisance, y[self.size :], strict=True))
         shift = np.array([named.get(f"offset_{axis}", 0.0) for axis in "xyz"])
         return shift, 1e-3 * named.get("pressure_offset", 0.0)
+
+    def draw(self, random: np.random.Generator, count: int) -> Array:
+        """`count` random coefficients (count, size), not all of them feasible.
+
+        Even in the box of the bounds; where the moduli themselves are bounded, even in the
+        logarithm of their values at the Chebyshev points.
+        """
+        share = random.random((count, self.size))
+        if self.largest is None:
+            return np.asarray(self.lower + (self.upper - self.lower) * share)
+        least = np.array([self.margin_G, self.margin_E, self.margin_E])
+        ends = [
+            np.log(np.repeat(e, self.degree + 1))
+            for e in (least, self.largest[list(STRAIN_OF_BLOCK)])
+        ]
+        return np.asarray(np.exp(ends[0] + (ends[1] - ends[0]) * share) @ self.from_values.T)
+
+    def allowed(self, coefficients: Array) -> NDArray[np.bool_]:
+        """Which of the coefficients (n, size) have moduli inside their bounds, (n,)."""
+        grid, margin = self.positivity
+        moduli = coefficients @ grid.T
+        good = (moduli >= margin).all(axis=1)
+        if self.largest is not None:
+            good &= (moduli <= np.repeat(self.largest[list(STRAIN_OF_BLOCK)], GRID)).all(axis=1)
+        return np.asarray(good)
 
     def is_positive(self, coefficients: Array) -> bool:
         """The thesis' boolean flag (Eq. 4.9): every modulus above its margin on the grid."""

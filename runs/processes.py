@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
 from ..identification.methods import FitOptions
-from ..identification.problem import FieldProblem
+from ..identification.problem import FitProblem
 from .start import EvaluationRecord, StartRecord, run_start
 
 log = logging.getLogger(__name__)
@@ -23,7 +23,7 @@ WAIT_S = 0.5
 
 
 def run_starts(
-    build: Callable[[], FieldProblem],
+    build: Callable[[], FitProblem],
     options: FitOptions,
     seed: int,
     numbers: Sequence[int],
@@ -82,7 +82,7 @@ def run_starts(
 
 
 def _here(
-    build: Callable[[], FieldProblem], options: FitOptions, seed: int, numbers: Sequence[int]
+    build: Callable[[], FitProblem], options: FitOptions, seed: int, numbers: Sequence[int]
 ) -> Iterator[Record]:
     """Without other processes: the records of a start come when it has ended."""
     with threadpool_limits(1):
@@ -105,7 +105,7 @@ def _check(workers: Sequence[Any]) -> None:
 
 
 def _work(
-    build: Callable[[], FieldProblem],
+    build: Callable[[], FitProblem],
     options: FitOptions,
     seed: int,
     tasks: Any,

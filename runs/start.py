@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import NoFeasibleStart
 from ..identification.feasibility import feasible_start
 from ..identification.methods import FitOptions, fit_from
-from ..identification.problem import FieldProblem
+from ..identification.problem import FitProblem
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class StartRecord:
 
 
 def run_start(
-    problem: FieldProblem,
+    problem: FitProblem,
     options: FitOptions,
     seed: int,
     number: int,

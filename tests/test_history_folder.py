@@ -15,7 +15,7 @@ from bubblefit.errors import BubblefitError, InputError, OutputError, SolverFail
 from bubblefit.identification.methods import FitOptions
 from bubblefit.identification.objective import FieldObjective, FieldTarget
 from bubblefit.identification.parameters import ModuliParameters
-from bubblefit.identification.problem import FieldProblem
+from bubblefit.identification.problem import FitProblem
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
@@ -258,10 +258,10 @@ LINEAR = ModuliParameters(
 )
 
 
-def build(solver: MembraneSolver | None = None) -> FieldProblem:
+def build(solver: MembraneSolver | None = None) -> FitProblem:
     fields = MembraneSolver().run(MODEL, KNOWN).displacement
     data = [FieldTarget(p, u) for p, u in zip(MODEL.pressures, fields, strict=True)]
-    return FieldProblem(MODEL, solver or MembraneSolver(), KNOWN, FieldObjective(data), LINEAR)
+    return FitProblem.single(MODEL, solver or MembraneSolver(), KNOWN, FieldObjective(data), LINEAR)
 
 
 def study_with(jobs: int, numbers: list[int]) -> dict[int, tuple]:
@@ -295,15 +295,15 @@ class Broken(MembraneSolver):
         raise InputError("mesh.vtu", "quads", "made to fail")
 
 
-def build_dying() -> FieldProblem:
+def build_dying() -> FitProblem:
     return build(Dying())
 
 
-def build_broken() -> FieldProblem:
+def build_broken() -> FitProblem:
     return build(Broken())
 
 
-def build_failing() -> FieldProblem:
+def build_failing() -> FitProblem:
     raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
 
 
