@@ -45,16 +45,16 @@ def report(
     """Draw everything and write report.html and bubble.vtu."""
     figures = _figures(project, setup, found, folder)
     model = setup.model
-    strains = found.best.histories[0].displacement
+    strains = found.fit.best.histories[0].displacement
     write_vtu(model.mesh, strains[-1], folder.path / "bubble.vtu")
     result = found.result
     runs = result["external_runs"]
     external = [(f"of them by {project.solver}", runs)] if runs else []
     facts: list[tuple[str, object]] = [
-        ("objective " + result["objective_is"], found.best.value),
+        ("objective " + result["objective_is"], found.fit.best.value),
         ("mean |dx| + |dy| + |dz|, mm", found.mean_absolute),
         ("method", f"{project.method} on {project.solver}"),
-        ("starts", f"{len(found.ranked)} feasible of {len(found.records)}"),
+        ("starts", f"{len(found.fit.ranked)} feasible of {len(found.fit.records)}"),
         ("analyses", result["analyses"]),
         *external,
         ("wall time, s", result["wall_s"]),
@@ -70,12 +70,12 @@ def report(
     coefficients = [
         (f"beta_{place}", float(c / scale), float(low / scale), float(high / scale))
         for place, c, low, high in zip(
-            project.free, found.best.coefficients, project.lower, project.upper, strict=True
+            project.free, found.fit.best.coefficients, project.lower, project.upper, strict=True
         )
     ]
     page = Report(
         title=project.title,
-        summary=f"Best of {len(found.ranked)} starts: e = {found.best.value:.3g}, mean "
+        summary=f"Best of {len(found.fit.ranked)} starts: e = {found.fit.best.value:.3g}, mean "
         f"|dx| + |dy| + |dz| = {found.mean_absolute:.3g} mm.",
         facts=facts,
         coefficients=coefficients,
@@ -85,7 +85,7 @@ def report(
         warnings=result["warnings"],
         figures=figures,
         tables=_tables(project, setup, found),
-        starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in found.records],
+        starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in found.fit.records],
         files=[f for f in FILES if f[0] == RESULT or (folder.path / f[0]).exists()],
         versions=result["versions"],
     )
@@ -96,16 +96,16 @@ def _figures(
     project: BubbleProject, setup: BubbleSetup, found: Assessment, folder: OutputFolder
 ) -> list[tuple[str, str]]:
     problem = setup.problem
-    displacement = found.best.histories[0].displacement
+    displacement = found.fit.best.histories[0].displacement
     shown = displacement + found.offset
     label = "known solution" if setup.known is not None else "measured"
-    values = [np.nan if r.objective is None else r.objective for r in found.records]
+    values = [np.nan if r.objective is None else r.objective for r in found.fit.records]
     label_e = "objective e (Eq. 4.8)" if project.objective == "e" else "objective, sum of RMS, mm"
     plot_optima(folder.path / "optima.png", values, label=label_e)
-    strains = np.array([np.linspace(0, found.reached[c], 121) for _, c in MODULI.values()])
+    strains = np.array([np.linspace(0, found.fit.reached[c], 121) for _, c in MODULI.values()])
     laws = [
         problem.law.with_beta(project.full_beta(np.array(r.coefficients)))
-        for r in found.ranked[:BEST]
+        for r in found.fit.ranked[:BEST]
     ]
     known = _curves(setup.known, strains) if setup.known is not None else None
     curves = np.array([_curves(law, strains) for law in laws])
@@ -144,7 +144,7 @@ def _curves(law: HypoelasticLaw, strains: Array) -> Array:
 
 def _tables(project: BubbleProject, setup: BubbleSetup, found: Assessment) -> list[Table]:
     problem = setup.problem
-    norms = problem.blocks.norms(found.best.residual).reshape(-1, 3)
+    norms = problem.blocks.norms(found.fit.best.residual).reshape(-1, 3)
     kilo = [1e3 * p for p in project.pressures]
     header = ["pressure, kPa", "x", "y", "z"]
     note = (
@@ -163,8 +163,8 @@ def _tables(project: BubbleProject, setup: BubbleSetup, found: Assessment) -> li
         tables.append(
             Table(title, header, text, "" if project.match_by == "surfaces" else NOT_MATCHED)
         )
-    if found.certainty is not None:
-        sure = found.certainty
+    if found.fit.certainty is not None:
+        sure = found.fit.certainty
         body: list[list[object]] = [
             [name, f"{100 * float(np.median(s)):.2g} %", f"{100 * float(s.max()):.2g} %"]
             for name, s in sure.sigma.items()

@@ -19,15 +19,13 @@ from ..meshes.disk import disk_mesh
 from ..meshes.location import sampling_matrix
 from ..meshes.mesh import Mesh
 from ..models.bubble import BubbleModel
-from ..solvers.base import DifferentiatingSolver, Solver
-from ..solvers.registry import solver_named
+from ..solvers.base import Solver
+from .fit_setup import law_of, lead, parameters_of, project_solver
 from .project import BubbleProject
 from .project_data import KnownSolution, PointFiles
 
 Array = NDArray[np.float64]
 
-#: Leads the fit where the solver that counts gives no derivatives.
-SURROGATE = "membrane"
 #: Of the points on the disk, and of its radius covered: less is taken for a wrong unit.
 LEAST_SHARE = 0.1
 
@@ -67,33 +65,24 @@ def bubble_model(project: BubbleProject) -> BubbleModel:
     return BubbleModel(mesh, project.thickness, project.pressures, project.increments)
 
 
-def project_solver(project: BubbleProject) -> Solver:
-    """The solver that the project file or the command line names, with its options.
-
-    Raises
-    ------
-    InputError : there is no such solver (says in which file), or an option is wrong.
-    SolverFailure : it is not installed, or does not carry the law.
-    """
-    name = project.solver
-    try:
-        solver = solver_named(name, **project.solver_options.get(name, {}))
-    except InputError as error:
-        if error.field != "solver":
-            raise
-        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
-    # Once here, in one line, rather than as the failure of every analysis.
-    if solver.external:
-        found = solver.check()
-        if not (found.available and found.carries_law):
-            raise SolverFailure(found.advice or "is not usable", solver.name)
-    return solver
+def bubble_parameters(project: BubbleProject) -> ModuliParameters:
+    """The unknowns of a bubble fit, nuisance parameters included."""
+    return parameters_of(
+        project,
+        displacement_offset=project.displacement_offset,
+        pressure_offset=project.pressure_offset,
+        least_pressure=min(project.increments),
+    )
 
 
 def bubble_setup(
-    project: BubbleProject, fields: tuple[DisplacementField, ...] | None = None
+    project: BubbleProject,
+    fields: tuple[DisplacementField, ...] | None = None,
+    weight: float = 1.0,
 ) -> BubbleSetup:
     """Read or compute the data, unless `fields` are given, and set up the fit.
+
+    weight : of every block of the objective.
 
     Raises
     ------
@@ -101,9 +90,7 @@ def bubble_setup(
     """
     solver = project_solver(project)
     model = bubble_model(project)
-    law = HypoelasticLaw(
-        np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change
-    )
+    law = law_of(project)
     known = None
     if isinstance(project.data, KnownSolution):
         known = law.with_beta(project.data.beta)
@@ -121,24 +108,12 @@ def bubble_setup(
         outside = 0
     else:
         targets, outside = _at_points(project, folded, model.mesh)
-    parameters = ModuliParameters(
-        project.degree,
-        project.lower,
-        project.upper,
-        project.strain_range,
-        project.margin_E,
-        project.margin_G,
-        project.displacement_offset,
-        project.pressure_offset,
-        min(project.increments),
-    )
     try:
-        objective = FieldObjective(targets, project.objective)
+        objective = FieldObjective(targets, project.objective, weight)
     except InputError as error:
         raise InputError(project.path, error.field, error.problem) from None
-    problem = FitProblem.single(model, solver, law, objective, parameters)
-    if not isinstance(solver, DifferentiatingSolver):
-        problem.surrogate = problem.led_by([solver_named(SURROGATE)])
+    problem = FitProblem.single(model, solver, law, objective, bubble_parameters(project))
+    lead(problem)
     dropped = sum(f.dropped for f in fields)
     return BubbleSetup(problem, fields, known, surfaces, dropped, outside)
 

@@ -8,8 +8,8 @@ from dataclasses import fields
 import numpy as np
 
 from .. import __version__
-from .bubble_setup import BubbleSetup
-from .project import BubbleProject
+from ..identification.problem import FitProblem
+from .fit_project import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
 FREE = {"path", "title", "starts", "data", "solver_options"}
@@ -17,7 +17,7 @@ FREE = {"path", "title", "starts", "data", "solver_options"}
 DECK = ("element", "templates")
 
 
-def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
+def fingerprint(project: FitProject, problem: FitProblem) -> str:
     """SHA-256 over everything that a start's result depends on."""
     digest = hashlib.sha256(__version__.encode())
     for field in fields(project):
@@ -26,8 +26,9 @@ def fingerprint(project: BubbleProject, setup: BubbleSetup) -> str:
     options = project.solver_options.get(project.solver, {})
     for name in DECK:
         digest.update(f"{name}={options.get(name)};".encode())
-    for target in setup.objective.targets:
-        digest.update(np.ascontiguousarray(target.displacement).tobytes())
+    for experiment in problem.experiments:
+        for data in experiment.objective.data:
+            digest.update(np.ascontiguousarray(data).tobytes())
     return digest.hexdigest()
 
 

@@ -8,15 +8,16 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from ..errors import BubblefitError, InputError
 
 if TYPE_CHECKING:
-    from .project import BubbleProject
+    from .fit_project import FitProject
 
+Project = TypeVar("Project", bound="FitProject")
 INTERRUPTED = 130
 
 
@@ -74,7 +75,7 @@ def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
-def with_solver(project: BubbleProject, given: Mapping[str, Any]) -> BubbleProject:
+def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
     """The project with the solver and the solver's options of the command line.
 
     Raises

@@ -10,7 +10,6 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
-from .project_schema import ProjectFile
 
 
 def dotted(location: Sequence[str | int]) -> str:
@@ -21,22 +20,25 @@ def dotted(location: Sequence[str | int]) -> str:
     return text
 
 
-def first_error(path: Path, found: ValidationError) -> InputError:
-    """The first finding as an InputError; unknown keys first, as they explain missing ones."""
+def first_error(path: Path, found: ValidationError, file: type[BaseModel]) -> InputError:
+    """The first finding as an InputError; unknown keys first, as they explain missing ones.
+
+    file : the sections and keys there are.
+    """
     errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    problem = _problem(errors[0])
+    problem = _problem(errors[0], file)
     if len(errors) > 1:
         problem += f" ({len(errors) - 1} more)"
     return InputError(path, dotted(errors[0]["loc"]), problem)
 
 
-def _problem(error: Mapping[str, Any]) -> str:
+def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
     kind, location, given = error["type"], error["loc"], error.get("input")
     if kind == "missing":
         sort = "section" if len(location) == 1 else "key"
         return f"this {sort} is missing; add it"
     if kind == "extra_forbidden":
-        return _unknown(location)
+        return _unknown(location, file)
     if kind == "finite_number":
         return f"expected a finite number, got {given!r}"
     if kind in ("too_short", "too_long"):
@@ -47,16 +49,16 @@ def _problem(error: Mapping[str, Any]) -> str:
     return f"expected {expected}, got {_short(given)}"
 
 
-def _unknown(location: Sequence[str | int]) -> str:
-    known = _keys_beside(location)
+def _unknown(location: Sequence[str | int], file: type[BaseModel]) -> str:
+    known = _keys_beside(location, file)
     near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
     meant = f"did you mean {near[0]!r}? " if near else ""
     return f"unknown key; {meant}allowed here: {', '.join(known)}"
 
 
-def _keys_beside(location: Sequence[str | int]) -> list[str]:
+def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[str]:
     """Allowed keys of the table that holds `location`."""
-    table: type[BaseModel] = ProjectFile
+    table = file
     for part in location[:-1]:
         table = _table(table.model_fields[str(part)].annotation)
     return list(table.model_fields)

@@ -12,6 +12,8 @@ from ..meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
 PRESSURE_UNITS = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
 LENGTH_UNITS = {"mm": 1.0, "m": 1000.0}
+#: N per unit.
+LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
 
 #: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
 HUGE = 1e18
@@ -23,6 +25,13 @@ Strain = Annotated[float, Field(gt=0, le=2)]
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
 LengthUnit = Literal["mm", "m"]
+LoadUnit = Literal["N", "kN"]
+Method = Literal["lm", "slsqp", "cobyla"]
+#: Forms of the moduli by name: how many coefficients each has, less one.
+FORMS = {"constant": 0, "linear": 1, "quadratic": 2, "cubic": 3, "trilinear": 2}
+Form = Literal["constant", "linear", "quadratic", "cubic", "trilinear"]
+Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+StrainPair = Annotated[list[Strain], Field(min_length=2, max_length=2)]
 
 
 class Section(BaseModel):
@@ -32,7 +41,7 @@ class Section(BaseModel):
 
 
 class ProjectSection(Section):
-    kind: Literal["bubble"]
+    kind: Literal["bubble", "uniaxial", "joint"]
     title: str = ""
 
 
@@ -40,6 +49,7 @@ class UnitsSection(Section):
     modulus: Literal["GPa", "MPa", "Pa"] = "GPa"
     pressure: Literal["kPa", "MPa", "bar", "Pa"] = "kPa"
     length: LengthUnit = "mm"
+    load: LoadUnit = "N"
 
 
 class BubbleSection(Section):
@@ -52,16 +62,27 @@ class BubbleSection(Section):
     generator: Literal["blocks", "gmsh"] = "blocks"
 
 
+class BreaksSection(Section):
+    warp: StrainPair
+    fill: StrainPair
+    shear: StrainPair
+
+
 class MaterialSection(Section):
     nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
     thickness_change: Literal["constant", "incompressible"] = "constant"
-    degree: Annotated[int, Field(ge=0, le=3)] = 3
+    moduli: Form | None = None
+    degree: Annotated[int, Field(ge=0, le=3)] | None = None
     strain_range: Annotated[list[Strain], Field(min_length=3, max_length=3)] | None = None
+    breaks: BreaksSection | None = None
 
 
 class BoundsSection(Section):
-    lower: list[Number]
-    upper: list[Number]
+    lower: list[Number] | None = None
+    upper: list[Number] | None = None
+    E1: Pair | None = None
+    E2: Pair | None = None
+    G12: Pair | None = None
 
 
 class KnownSolutionSection(Section):
@@ -110,17 +131,20 @@ class NuisanceSection(Section):
     pressure_offset: bool = False
 
 
-class FitSection(Section):
+class CommonFitSection(Section):
     starts: Annotated[int, Field(ge=1)] = 50
     seed: Annotated[int, Field(ge=0)] = 1
-    method: Literal["lm", "slsqp", "cobyla"] = "lm"
+    method: Method = "lm"
     gradient: Literal["exact", "differences"] = "exact"
     constraints: Literal["margin", "boolean"] = "margin"
     margin: MarginSection | None = None
     solver: str = "membrane"
-    objective: Literal["e", "mm"] = "e"
     max_analyses: Annotated[int, Field(ge=1)] | None = None
     tolerance: Positive = 1e-7
+
+
+class FitSection(CommonFitSection):
+    objective: Literal["e", "mm"] = "e"
     nuisance: NuisanceSection = NuisanceSection()
 
 
@@ -138,15 +162,21 @@ class SolverSection(Section):
     calculix: CalculixSection = CalculixSection()
 
 
-class ProjectFile(Section):
-    """The whole file."""
+class CommonFile(Section):
+    """What the file of every fit has."""
 
     project: ProjectSection
     units: UnitsSection = UnitsSection()
-    bubble: BubbleSection
     material: MaterialSection = MaterialSection()
     bounds: BoundsSection
+    fit: CommonFitSection = CommonFitSection()
+    solver: SolverSection = SolverSection()
+
+
+class ProjectFile(CommonFile):
+    """The whole file of a bubble fit."""
+
+    bubble: BubbleSection
     data: DataSection
     match: MatchSection = MatchSection()
     fit: FitSection = FitSection()
-    solver: SolverSection = SolverSection()

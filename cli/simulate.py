@@ -16,8 +16,9 @@ from ..errors import OutputError
 from ..materials.card import read_card
 from ..reports import plot_profiles, write_vtu
 from ..writing import replacing
-from .bubble_results import UNSTABLE
-from .bubble_setup import bubble_model, project_solver
+from .bubble_setup import bubble_model
+from .fit_results import UNSTABLE
+from .fit_setup import project_solver
 from .options import default_folder, exits, solver_choice, with_solver
 from .progress import run_progress
 from .project import read_project

@@ -22,7 +22,7 @@ class Objective(Protocol):
     """Residual blocks of one test.
 
     sizes : length of each block; scale (m,) `unit`s in one unit of each residual; least_noise in
-    `unit`s.
+    `unit`s; data: all that was measured.
     """
 
     sizes: tuple[int, ...]
@@ -31,6 +31,9 @@ class Objective(Protocol):
 
     @property
     def scale(self) -> Array: ...
+
+    @property
+    def data(self) -> tuple[Array, ...]: ...
 
     def residual(self, history: History, offset: Array | None = None) -> Array: ...
 
@@ -44,7 +47,8 @@ class Experiment:
     """A test that a fit matches.
 
     name : for messages and reports. solver : its own, so that what the solver prepares for the
-    model is kept. offsets : whether the nuisance offsets (displacement, pressure) are its.
+    model is kept. objective : an `Objective`. offsets : whether the nuisance offsets
+    (displacement, pressure) are its.
     """
 
     name: str

@@ -61,6 +61,11 @@ class LoadObjective:
         """(n,): newtons in one unit of each residual."""
         return np.full(len(self.load), self._unit)
 
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Everything measured that the residual depends on."""
+        return self.elongation, self.load
+
     def shifted(self, here: History, there: History) -> LoadObjective:
         """The objective of a model that carries `here` where this one carries `there`."""
         other = copy.copy(self)

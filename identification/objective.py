@@ -85,6 +85,12 @@ class FieldObjective:
         """(m,): millimetres in one unit of each residual."""
         return np.repeat(np.concatenate(self.scales), self.sizes)
 
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Everything measured that the residual depends on."""
+        places = [t.sample.data for t in self.targets if t.sample is not None]
+        return (*(t.displacement for t in self.targets), *places)
+
     def shifted(self, here: History, there: History) -> FieldObjective:
         """The objective of a model that moves as `here` where this one moves as `there`."""
         other = copy.copy(self)

@@ -1,0 +1,174 @@
+"""What a finished study of any kind is worth: the best fit once more, and result.json."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import SolverFailure
+from ..identification.assessment import Certainty, certainty
+from ..identification.problem import Evaluation, FitProblem
+from ..materials.card import MaterialCard, write_card
+from ..materials.law import HypoelasticLaw
+from ..runs.folder import RESULT, OutputFolder
+from ..runs.start import StartRecord
+from .fit_project import FitProject
+from .study import ranking
+
+Array = NDArray[np.float64]
+
+UNSTABLE = "the equilibrium at the last pressure is unstable: no test could be held there"
+PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
+STRAINS = ("warp", "fill", "shear")
+
+
+@dataclass(frozen=True, eq=False)
+class BestFit:
+    """The best fit, run once more from the unloaded state.
+
+    differentiated : the same point by the solver that differentiates, where it could; reached
+    (3,) largest strain (eps1, eps2, gamma12).
+    """
+
+    best: Evaluation
+    differentiated: Evaluation | None
+    law: HypoelasticLaw
+    ranked: Sequence[StartRecord]
+    records: Sequence[StartRecord]
+    reached: Array
+    certainty: Certainty | None
+
+
+def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
+    """Run the best of the starts again.
+
+    Raises
+    ------
+    SolverFailure : the best fit does not run again (which would be a defect).
+    """
+    ranked = ranking(records)
+    problem.reset()
+    unknowns = np.array(ranked[0].unknowns)
+    # The derivatives behind what the data could not determine are the surrogate's, if there is one.
+    leading = problem.surrogate or problem
+    best = problem.evaluate(unknowns, leading is problem, warm=False)
+    if best is None:
+        raise SolverFailure("the best fit does not run again", problem.solver.name)
+    reached = np.full(3, 1e-6)
+    for history in best.histories:
+        shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
+        reached = np.maximum(reached, [history.strain_max[0], history.strain_max[1], shear])
+    law = problem.law.with_beta(problem.parameters.beta(unknowns))
+    slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)
+    sure = certainty(leading, slopes, law, reached) if slopes is not None else None
+    return BestFit(best, slopes, law, ranked, records, reached, sure)
+
+
+def common_result(
+    command: str, project: FitProject, found: BestFit, wall_s: float
+) -> dict[str, Any]:
+    """What result.json says of every fit."""
+    records, sure = found.records, found.certainty
+    result: dict[str, Any] = {
+        "command": command,
+        "title": project.title,
+        "solver": project.solver,
+        "method": project.method,
+        "objective": found.ranked[0].objective,
+        "moduli": project.moduli,
+        "beta": {
+            "unit": project.modulus_unit,
+            "values": (found.law.beta / project.modulus_scale).tolist(),
+        },
+        "nu12": found.law.nu12,
+        "strain_reached": dict(zip(STRAINS, found.reached.tolist(), strict=True)),
+        "seed": project.seed,
+        "starts": [
+            {
+                "start": r.number,
+                "seed": list(r.seed),
+                "objective": r.objective,
+                "status": r.status,
+                "analyses": r.analyses,
+                "external_runs": r.external_runs,
+            }
+            for r in records
+        ],
+        "analyses": sum(r.analyses for r in records),
+        "external_runs": sum(r.external_runs for r in records),
+        "warnings": _warnings(project, found),
+        "wall_s": wall_s,
+        "versions": _versions(),
+    }
+    if project.breaks is not None:
+        result["breaks"] = dict(zip(STRAINS, project.breaks.tolist(), strict=True))
+    if sure is not None:
+        result["uncertainty"] = {
+            "noise": sure.noise,
+            "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
+            "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+        }
+    return result
+
+
+def _warnings(project: FitProject, found: BestFit) -> list[str]:
+    words = list(found.certainty.undetermined) if found.certainty is not None else []
+    if not found.best.stable:
+        words.append(UNSTABLE)
+    for name, strain, end in zip(STRAINS, found.reached, project.strain_range, strict=True):
+        if strain > end * (1 + 1e-6):
+            words.append(
+                f"{name} strain reached {strain:.3f}, beyond material.strain_range {end:g}: the "
+                "modulus was held at its end value there; widen the range"
+            )
+    return words
+
+
+def _versions() -> dict[str, str]:
+    found = {name: importlib.metadata.version(name) for name in PACKAGES}
+    return {"bubblefit": __version__, "python": platform.python_version(), **found}
+
+
+def save_card(
+    project: FitProject, found: BestFit, folder: OutputFolder, command: str, quality: str
+) -> None:
+    """Write material.toml; it is valid for the strains reached."""
+    card = MaterialCard(
+        replace(found.law, strain_range=np.minimum(found.reached, project.strain_range)),
+        project.thickness,
+        project.title,
+        f"bubblefit {__version__} {command}, {project.path.name}, {quality}",
+    )
+    write_card(card, folder.path / "material.toml", project.modulus_unit)
+
+
+def write_result(result: dict[str, Any], folder: OutputFolder) -> None:
+    """result.json, after everything else: where it is, the output is complete."""
+    folder.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
+
+
+def summary_lines(
+    result: dict[str, Any], found: BestFit, details: Sequence[str], folder: Path
+) -> str:
+    """A few lines for the terminal: how good, `details`, what to know, where it is."""
+    runs = result["external_runs"]
+    external = f" ({runs} of {result['solver']})" if runs else ""
+    middle = float(np.median([r.objective for r in found.ranked if r.objective is not None]))
+    lines = [
+        f"best {result['objective_is']}: {found.best.value:.3g} (median {middle:.3g} of "
+        f"{len(found.ranked)} starts, {len(found.records)} asked), {result['analyses']} "
+        f"analyses{external}, {result['wall_s']:.0f} s",
+        *details,
+        *(f"note: {w}" for w in result["warnings"]),
+        f"written to {folder} (open report.html)",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,69 @@
+"""From the project of any fit to its solver, law and unknowns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, SolverFailure
+from ..identification.parameters import ModuliParameters
+from ..identification.problem import FitProblem
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import DifferentiatingSolver, Solver
+from ..solvers.registry import solver_named
+from .fit_project import FitProject
+
+#: Leads the fit where the solver that counts gives no derivatives.
+SURROGATE = "membrane"
+
+
+def project_solver(project: FitProject) -> Solver:
+    """A new solver, as the project file or the command line names it, with its options.
+
+    Raises
+    ------
+    InputError : there is no such solver (says in which file), or an option is wrong.
+    SolverFailure : it is not installed, or does not carry the law.
+    """
+    name = project.solver
+    try:
+        solver = solver_named(name, **project.solver_options.get(name, {}))
+    except InputError as error:
+        if error.field != "solver":
+            raise
+        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
+    # Once here, in one line, rather than as the failure of every analysis.
+    if solver.external:
+        found = solver.check()
+        if not (found.available and found.carries_law):
+            raise SolverFailure(found.advice or "is not usable", solver.name)
+    return solver
+
+
+def law_of(project: FitProject) -> HypoelasticLaw:
+    """The law that carries all but the coefficients, which are zero."""
+    return HypoelasticLaw(
+        np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change
+    )
+
+
+def parameters_of(project: FitProject, **nuisance: Any) -> ModuliParameters:
+    """The unknowns of a fit."""
+    return ModuliParameters(
+        project.degree,
+        project.lower,
+        project.upper,
+        project.strain_range,
+        project.margin_E,
+        project.margin_G,
+        breaks=project.breaks,
+        largest=project.largest,
+        **nuisance,
+    )
+
+
+def lead(problem: FitProblem) -> None:
+    """Give the problem a surrogate where its solver does not differentiate."""
+    if not isinstance(problem.solver, DifferentiatingSolver):
+        problem.surrogate = problem.led_by([solver_named(SURROGATE) for _ in problem.experiments])
