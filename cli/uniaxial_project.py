@@ -1,0 +1,103 @@
+"""The project file of a uniaxial fit, read and converted to mm, N, MPa."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from ..errors import InputError
+from ..models.uniaxial import GRIP_DISTANCE, WIDTH
+from .fit_project import FitProject, common_settings, parse
+from .project_schema import LENGTH_UNITS, CommonFile
+from .uniaxial_data import StripData, read_strips
+from .uniaxial_schema import UniaxialFile, UniaxialSection
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UniaxialProject(FitProject):
+    """What a uniaxial fit is asked to do. Lengths mm, loads N, moduli MPa, angles degrees.
+
+    `strips` and `weights` by direction (warp, fill, bias).
+    """
+
+    width: float
+    grip_distance: float
+    bias_angle: float
+    increments: int
+    strips: Mapping[str, StripData]
+    match_by: Literal["polynomial", "points"]
+    weights: Mapping[str, float]
+    objective: Literal["N", "relative"]
+
+
+def read_uniaxial(
+    path: Path, data_folder: Path | None = None, need_data: bool = True
+) -> UniaxialProject:
+    """Read a project file (TOML) and its load curves.
+
+    Parameters
+    ----------
+    data_folder : where measured files lie; replaces `uniaxial.data.folder`.
+    need_data : whether measured files must be there (a forward analysis does without).
+
+    Raises
+    ------
+    InputError : one line naming the file and the dotted key.
+    """
+    path = Path(path)
+    file = parse(path, {"uniaxial": UniaxialFile})
+    settings = uniaxial_settings(path, file, file.uniaxial, data_folder, need_data)
+    common = common_settings(path, file, default_range(settings["strips"], settings["bias_angle"]))
+    return UniaxialProject(**common, **settings, objective=file.fit.objective)
+
+
+def uniaxial_settings(
+    path: Path,
+    file: CommonFile,
+    section: UniaxialSection,
+    data_folder: Path | None,
+    need_data: bool,
+) -> dict[str, Any]:
+    """The fields of `UniaxialProject` that the strips' own section gives."""
+    length = LENGTH_UNITS[file.units.length]
+    width = WIDTH if section.width is None else section.width * length
+    grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
+    strips = read_strips(path, section, file.units, data_folder, need_data)
+    weights = section.weights.model_dump()
+    if not sum(weights[d] for d in strips) > 0:
+        raise InputError(path, "uniaxial.weights", "expected one above 0: nothing would be matched")
+    if "bias" in strips and not strips["bias"].gauge_length < grips:
+        problem = f"expected less than the distance of the grips, {grips:g} mm"
+        raise InputError(path, "uniaxial.bias.gauge_length", problem)
+    matched_points = section.match == "points"
+    if matched_points and need_data and not all(s.curves for s in strips.values()):
+        problem = "'points' needs measured points (data.files), not polynomials"
+        raise InputError(path, "uniaxial.match", problem)
+    return {
+        "thickness": section.thickness * length,
+        "width": width,
+        "grip_distance": grips,
+        "bias_angle": section.bias_angle,
+        "increments": section.increments,
+        "strips": strips,
+        "match_by": section.match,
+        "weights": weights,
+    }
+
+
+def default_range(
+    strips: Mapping[str, StripData], bias_angle: float
+) -> tuple[float, float, float] | None:
+    """Strains that the tests can reach, where all three directions are there.
+
+    Warp and fill: the logarithmic strain of their gauges at the end. Shear: that of a strip which
+    keeps its area, 2 sin(2 angle) ln(l_f/l_i).
+    """
+    if set(strips) != {"warp", "fill", "bias"}:
+        return None
+    ends = {d: math.log(s.final_length / s.gauge_length) for d, s in strips.items()}
+    shear = 2 * math.sin(math.radians(2 * bias_angle)) * ends["bias"]
+    return ends["warp"], ends["fill"], shear
