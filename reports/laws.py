@@ -67,30 +67,32 @@ def plot_laws(
     """
     if not rows:
         raise ValueError("plot_laws: no laws to draw")
-    figure = new_figure(max(5.5, 1.5 + 1.5 * len(rows)), 4.2)
+    width = max(5.5, 1.5 + 1.5 * len(rows))
+    figure = new_figure(width, 4.2)
     axes = figure.subplots()
     place = np.arange(len(rows), dtype=float)
     handles = {}
     folds = [np.asarray(row.folds, dtype=float).ravel() for row in rows]
-    for x, values in zip(place + ASIDE, folds, strict=True):
+    for a, values in zip((place + ASIDE).tolist(), folds, strict=True):
         ended = values[np.isfinite(values)]
         if len(ended):
-            axes.plot([x, x], [ended.min(), ended.max()], color=VERMILION, linewidth=1.2, alpha=0.6)
+            axes.plot([a, a], [ended.min(), ended.max()], color=VERMILION, linewidth=1.2, alpha=0.6)
             (handles["single folds"],) = axes.plot(
-                np.full(len(ended), x + FURTHER), ended, "o", color=VERMILION, markersize=3.5,
+                np.full(len(ended), a + FURTHER), ended, "o", color=VERMILION, markersize=3.5,
                 alpha=0.45, markeredgewidth=0,
             )  # fmt: skip
     dots: tuple[tuple[str, Array, list[float], str], ...] = (
         ("error of the fit", place - ASIDE, [r.fitted for r in rows], BLUE),
         ("cross-validated error", place + ASIDE, [r.validated for r in rows], VERMILION),
     )
-    for name, x, values, colour in dots:
-        (handles[name],) = axes.plot(x, values, "o", color=colour, markersize=8)
-        for a, value in zip(x, values, strict=True):
+    for name, x, errors, colour in dots:
+        (handles[name],) = axes.plot(x, errors, "o", color=colour, markersize=8)
+        for a, value in zip(x.tolist(), errors, strict=True):
             if np.isfinite(value):
                 axes.annotate(
                     f"{value:.3g}", (a, value), xytext=(-7, 0), textcoords="offset points",
                     ha="right", va="center", fontsize=8.5, color=colour,
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
                 )  # fmt: skip
     if scatter is not None:
         handles["scatter of specimens"] = axes.axhline(
@@ -106,7 +108,9 @@ def plot_laws(
     axes.set_xticks(place, [_label(row, values) for row, values in zip(rows, folds, strict=True)])
     axes.grid(False, axis="x")
     order = [*(name for name, *_ in dots), "single folds", "scatter of specimens"]
-    legend_above(figure, {name: handles[name] for name in order if name in handles}, 4)
+    legend_above(
+        figure, {name: handles[name] for name in order if name in handles}, int(width / 1.9)
+    )
     return save(figure, path)
 
 

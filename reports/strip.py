@@ -55,7 +55,7 @@ def plot_strip(
         raise ValueError(f"plot_strip: {gamma.size} shear strains for {len(cells)} quads")
     size = np.ptp(np.vstack([rest, now]), axis=0)
     # As tall as the strip asks for, with room for the colour bar beside and the legend beneath.
-    figure = new_figure(4.6, float(np.clip(1.6 + 2.3 * size[1] / size[0], 4.0, 8.5)))
+    figure = new_figure(3.8, float(np.clip(1.6 + 2.3 * size[1] / size[0], 4.0, 8.5)))
     axes = figure.subplots()
     colours, norm = _scale(gamma)
     faces = PolyCollection(now[cells], array=gamma, cmap=colours, norm=norm, edgecolor="face")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -71,9 +72,10 @@ def logarithmic(axes: Axes) -> None:
 def legend_above(figure: Figure, entries: Mapping[str, Any], columns: int) -> None:
     """One legend for all panels, above them, in the order of the entries (label: handle)."""
     if entries:
+        rows = ceil(len(entries) / columns)
         figure.legend(
             list(entries.values()), list(entries), loc="outside upper center",
-            ncols=min(columns, len(entries)), frameon=False, fontsize=9,
+            ncols=ceil(len(entries) / rows), frameon=False, fontsize=9,
         )  # fmt: skip
 
 
