@@ -13,6 +13,7 @@ from .style import (
     BLUE,
     GREY,
     VERMILION,
+    from_zero,
     legend_above,
     logarithmic,
     new_figure,
@@ -102,7 +103,7 @@ def plot_laws(
     if spans_a_decade(levels):
         logarithmic(axes)
     else:
-        axes.set_ylim(0.0, 1.1 * float(np.nanmax([*levels, 1e-12])))
+        from_zero(axes, levels)
     axes.set_xlim(-0.6, len(rows) - 0.4)
     quiet(axes, "form of the moduli (number of coefficients)", label)
     axes.set_xticks(place, [_label(row, values) for row, values in zip(rows, folds, strict=True)])

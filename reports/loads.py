@@ -110,7 +110,9 @@ def _loads(axes: Axes, strip: StripCurves, looks: Sequence[dict[str, Any]]) -> N
         axes.plot(*_from_zero(elongation, load), linewidth=1.5, **look)[0]
         for (_, elongation, load), look in zip(strip.models, looks, strict=True)
     ]
-    axes.set_xlim(left=0.0)
+    # From zero, unless a machine's slack was recorded before it.
+    before = np.min(np.asarray(strip.points[0], dtype=float), initial=0.0) if strip.points else 0.0
+    axes.set_xlim(left=float(before))
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     if len(strip.rms):
         index = INDEX.get(strip.direction, strip.direction)

@@ -16,6 +16,7 @@ from .loads import TITLES
 from .style import (
     BLUE,
     VERMILION,
+    from_zero,
     legend_above,
     logarithmic,
     new_figure,
@@ -68,7 +69,7 @@ def plot_orders(path: Path | str, directions: Sequence[OrderErrors]) -> Path:
         if spans_a_decade(errors):
             logarithmic(axes)
         else:
-            axes.set_ylim(0.0, 1.1 * float(np.nanmax(errors)))
+            from_zero(axes, errors)
         axes.set_xlim(min(row.orders) - 0.5, max(row.orders) + 0.5)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         title = f"{TITLES.get(row.direction, row.direction)}: order {row.chosen}"

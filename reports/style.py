@@ -69,6 +69,13 @@ def logarithmic(axes: Axes) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
+def from_zero(axes: Axes, values: ArrayLike) -> None:
+    """A linear y axis from zero with room above the largest finite value."""
+    flat = np.asarray(values, dtype=float).ravel()
+    largest = float(np.max(flat, where=np.isfinite(flat), initial=0.0))
+    axes.set_ylim(0.0, 1.1 * largest or 1.0)
+
+
 def legend_above(figure: Figure, entries: Mapping[str, Any], columns: int) -> None:
     """One legend for all panels, above them, in the order of the entries (label: handle)."""
     if entries:

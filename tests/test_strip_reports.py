@@ -135,6 +135,12 @@ def test_a_model_has_one_colour_in_all_panels(tmp_path: Path, drawn: list[Figure
     assert lines(drawn[0].axes[1], NAMED[0]) == []
 
 
+def test_points_before_zero_are_seen(tmp_path: Path, drawn: list[Figure]) -> None:
+    plot_loads(tmp_path / "l.png", [strip(points=([-0.2, 1.0], [1.0, 90.0])), strip()])
+    first, second = drawn[0].axes[:2]
+    assert (first.get_xlim()[0], second.get_xlim()[0]) == (-0.2, 0.0)
+
+
 def test_no_strips(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no strips"):
         plot_loads(tmp_path / "l.png", [])
@@ -345,5 +351,10 @@ def test_orders(tmp_path: Path, drawn: list[Figure]) -> None:
     bar = left.patches[0]
     assert bar.get_x() + 0.5 * bar.get_width() == pytest.approx(4)
     assert legend(drawn[0]) == ["RMSE of the fit", "leave-one-out error", "chosen order"]
+    # Leaving out the one point that an order hangs on has no finite error.
+    lost = [np.nan] * 5
+    plot_orders(tmp_path / "o.png", [OrderErrors("warp", orders, rmse, [*rmse[:4], np.inf], 4)])
+    plot_orders(tmp_path / "o.png", [OrderErrors("warp", orders, lost, lost, 4)])
+    assert [f.axes[0].get_ylim() for f in drawn[1:]] == [pytest.approx((0, 77)), (0, 1)]
     with pytest.raises(ValueError, match="no directions"):
         plot_orders(tmp_path / "o.png", [])
