@@ -1,21 +1,36 @@
 """Figures, the HTML report and VTU files."""
 
 from .html import Report, StartRow, Table, write_report
+from .laws import LawRow, plot_laws
+from .loads import StripCurves, plot_loads
 from .moduli import plot_moduli
+from .moduli_together import plot_moduli_together
 from .optima import PUBLISHED_OPTIMA, plot_optima
+from .orders import OrderErrors, plot_orders
+from .pinned import plot_pinned
 from .profiles import plot_profiles
 from .scatter import plot_heights
+from .strip import plot_strip
 from .vtu import write_vtu
 
 __all__ = [
     "PUBLISHED_OPTIMA",
+    "LawRow",
+    "OrderErrors",
     "Report",
     "StartRow",
+    "StripCurves",
     "Table",
     "plot_heights",
+    "plot_laws",
+    "plot_loads",
     "plot_moduli",
+    "plot_moduli_together",
     "plot_optima",
+    "plot_orders",
+    "plot_pinned",
     "plot_profiles",
+    "plot_strip",
     "write_report",
     "write_vtu",
 ]

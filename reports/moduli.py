@@ -1,15 +1,17 @@
-"""Moduli of the best fits beside the known solution (Fig. 4.9)."""
+"""Moduli of the best fits beside the known solution (Fig. 4.9), or of several named laws."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
-from .style import BLACK, SKY, VERMILION, new_figure, quiet, save
+from .style import BLACK, SKY, VERMILION, named_look, new_figure, quiet, save
 
 Array = NDArray[np.float64]
 
@@ -20,6 +22,7 @@ PANELS = (
 )
 #: Deviation (%) below which curves are the same to machine precision.
 SMALLEST = 1e-10
+SIGMA = r"$\pm$ 1 $\sigma$"
 
 
 def plot_moduli(
@@ -27,53 +30,86 @@ def plot_moduli(
     strains: ArrayLike,
     moduli: ArrayLike,
     known: ArrayLike | None = None,
+    names: Sequence[str] | None = None,
+    sigma: ArrayLike | None = None,
 ) -> Path:
     """Draw E1, E2 and G12 over the strain range reached.
 
     Parameters
     ----------
     path : PNG, SVG or PDF.
-    strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached.
+    strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached;
+        (fits, 3, k) where every law has a range of its own.
     moduli : (fits, 3, k) MPa, best fit first, in the same order.
     known : (3, k) MPa; a second row of panels then shows the deviation from it in percent.
+    names : of the fits, where they are laws to be told apart and not one's best and the next.
+    sigma : (3, k) MPa, one standard deviation of the first fit, drawn as a band about it and
+        left out where it is not finite.
 
     Raises
     ------
+    ValueError : not one name a fit, or strains of each law's own together with a known solution.
     OutputError : the file cannot be written.
     """
-    x, fits = np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
+    fits = np.asarray(moduli, dtype=float)
+    given = np.asarray(strains, dtype=float)
+    x = np.broadcast_to(given, fits.shape)
     truth = None if known is None else np.asarray(known, dtype=float)
+    if names is not None and len(names) != len(fits):
+        raise ValueError(f"plot_moduli: {len(names)} names for {len(fits)} fits")
+    if truth is not None and given.ndim == 3:
+        raise ValueError("plot_moduli: beside a known solution all fits need the same strains")
     rows = 1 if truth is None else 2
     figure = new_figure(10.5, 3.6 if rows == 1 else 5.6)
     heights = [1.0] if rows == 1 else [1.6, 1.0]
     axes = figure.subplots(rows, 3, squeeze=False, height_ratios=heights, sharex="col")
+    looks = _looks(len(fits), names)
     for m, (name, strain) in enumerate(PANELS):
         top = axes[0, m]
         if truth is not None:
             # Wide and pale beneath, so that a fit that lies on it is seen to do so.
-            top.plot(x[m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
-        for fit in fits[:0:-1]:
-            top.plot(x[m], fit[m], color=SKY, linewidth=1.2, label=f"next {len(fits) - 1}")
-        top.plot(x[m], fits[0, m], color=BLACK, linewidth=1.4, label="best")
+            top.plot(x[0, m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
+        if sigma is not None:
+            s = np.asarray(sigma, dtype=float)[m]
+            top.fill_between(
+                x[0, m], fits[0, m] - s, fits[0, m] + s, where=np.isfinite(s),
+                color=looks[0]["color"], alpha=0.18, linewidth=0, label=SIGMA,
+            )  # fmt: skip
+        for i in range(len(fits) - 1, -1, -1):
+            top.plot(x[i, m], fits[i, m], **looks[i])
         drawn = fits[:, m] if truth is None else np.vstack([fits[:, m], truth[m : m + 1]])
+        # By the curves alone: a band may be as wide as it likes, and is then cut off.
         top.set_ylim(min(0.0, float(drawn.min())), 1.08 * float(drawn.max()))
         label = "tangent modulus, MPa" if m == 0 else ""
         quiet(top, strain if rows == 1 else "", label, name)
         if truth is not None:
-            _deviation(axes[1, m], x[m], fits[:, m], truth[m], strain, first=m == 0)
+            _deviation(axes[1, m], x[0, m], fits[:, m], truth[m], strain, looks, first=m == 0)
     lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
-    order = [n for n in ("best", f"next {len(fits) - 1}", "known") if n in lines]
+    order = [look["label"] for look in looks[: 2 if names is None else None]]
+    shown = {n: lines[n] for n in dict.fromkeys([*order, "known", SIGMA]) if n in lines}
     figure.legend(
-        [lines[n] for n in order], order, loc="outside upper right", ncols=3, frameon=False
+        list(shown.values()), list(shown), loc="outside upper right", ncols=4, frameon=False
     )
     return save(figure, path)
 
 
-def _deviation(axes: Axes, x: Array, fits: Array, truth: Array, strain: str, first: bool) -> None:
+def _looks(fits: int, names: Sequence[str] | None) -> list[dict[str, Any]]:
+    """Of every fit: told apart by name, or the best before all others."""
+    if names is not None:
+        return [
+            {"linewidth": 1.5, **named_look(rank), "label": name} for rank, name in enumerate(names)
+        ]
+    best = {"color": BLACK, "linewidth": 1.4, "label": "best"}
+    return [best, *[{"color": SKY, "linewidth": 1.2, "label": f"next {fits - 1}"}] * (fits - 1)]
+
+
+def _deviation(
+    axes: Axes, x: Array, fits: Array, truth: Array, strain: str, looks: Sequence[dict[str, Any]],
+    first: bool,
+) -> None:  # fmt: skip
     percent = np.maximum(100 * np.abs(fits / truth - 1), SMALLEST)
-    for line in percent[:0:-1]:
-        axes.plot(x, line, color=SKY, linewidth=1.0)
-    axes.plot(x, percent[0], color=BLACK, linewidth=1.4)
+    for line, look in zip(percent[::-1], looks[::-1], strict=True):
+        axes.plot(x, line, **look)
     # Whole decades with room for the text above; dips where curves cross say nothing.
     high = np.ceil(np.log10(percent.max())) + 1
     low = np.floor(max(np.log10(percent.min()), high - 7))
@@ -82,7 +118,8 @@ def _deviation(axes: Axes, x: Array, fits: Array, truth: Array, strain: str, fir
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_locator(NullLocator())
     quiet(axes, strain, "deviation from known, %" if first else "")
+    worst = f"{looks[0]['label']}: at most {percent[0].max():.2g} %"
     axes.text(
-        0.98, 0.97, f"best: at most {percent[0].max():.2g} %", transform=axes.transAxes,
+        0.98, 0.97, worst, transform=axes.transAxes,
         ha="right", va="top", fontsize=8.5, color=BLACK,
     )  # fmt: skip
