@@ -24,15 +24,16 @@ class Table:
     """Cells as text, and where each row stood.
 
     path : the file. cells : one column a name of the header. lines : (rows,) line numbers in the
-    file, from 1.
+    file, from 1. decimal : the decimal mark, a point or a comma.
     """
 
     path: Path
     cells: pd.DataFrame
     lines: NDArray[np.intp]
+    decimal: str = "."
 
-    def numbers(self, column: str) -> NDArray[np.float64]:
-        """One column as finite numbers, (rows,).
+    def numbers(self, column: str, holes: bool = False) -> NDArray[np.float64]:
+        """One column as finite numbers, (rows,); with `holes`, empty cells and "nan" give NaN.
 
         Raises
         ------
@@ -41,8 +42,15 @@ class Table:
         import pandas as pd
 
         text = self.text(column)
-        value = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float)
+        plain = text
+        if self.decimal != ".":
+            # A point beside decimal commas marks thousands, or a mistake: no number either way.
+            plain = text.str.replace(".", "?", regex=False)
+            plain = plain.str.replace(self.decimal, ".", regex=False)
+        value = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
         bad = ~np.isfinite(value)
+        if holes:
+            bad &= ~text.str.strip().str.lower().isin(["", "nan"]).to_numpy(dtype=bool)
         if bad.any():
             first = int(np.argmax(bad))
             cell = text.iloc[first].strip()
@@ -83,7 +91,7 @@ class Table:
 
     def rows(self, keep: NDArray[np.bool_]) -> Table:
         """The table with only the rows where `keep` (rows,) is true."""
-        return Table(self.path, self.cells[keep], self.lines[keep])
+        return Table(self.path, self.cells[keep], self.lines[keep], self.decimal)
 
 
 def read_table(path: Path | str, comment: str = "#") -> Table:
@@ -96,7 +104,7 @@ def read_table(path: Path | str, comment: str = "#") -> Table:
     import pandas as pd
 
     path = Path(path)
-    numbered = _content(path, comment)
+    numbered = read_lines(path, comment)
     if len(numbered) < 2:
         found = "only a header line" if numbered else "nothing"
         problem = f"expected a header line and rows of numbers, found {found}"
@@ -119,9 +127,19 @@ def read_table(path: Path | str, comment: str = "#") -> Table:
     return Table(path, cells.iloc[1:].set_axis(header, axis=1), lines[1:])
 
 
-def _content(path: Path, comment: str) -> list[tuple[int, str]]:
+def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> list[tuple[int, str]]:
+    """Line numbers from 1 and text of the lines that are neither blank nor a comment.
+
+    any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit, as test
+        machines write them.
+
+    Raises
+    ------
+    InputError : no such file, not text.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        content = path.read_bytes()
+        text = content.decode(_encoding(content) if any_encoding else "utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except OSError as error:
@@ -133,6 +151,16 @@ def _content(path: Path, comment: str) -> list[tuple[int, str]]:
         raise InputError(path, "", "is not a text file; save it as a comma-separated table")
     kept = enumerate(re.split("\r\n|\r|\n", text), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
+
+
+def _encoding(content: bytes) -> str:
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    try:
+        content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
 
 
 def _where(error: Exception, lines: NDArray[np.intp]) -> str:

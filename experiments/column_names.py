@@ -1,0 +1,60 @@
+"""What the columns of a test machine's export are called, and the units they name."""
+
+from __future__ import annotations
+
+import re
+
+#: Words that make a column one of elongation or of load, in English and German exports.
+WORDS = {
+    "elongation": frozenset(
+        "elongation extension displacement disp crosshead stroke travel position"
+        " weg standardweg traversenweg verfahrweg kolbenweg längenänderung".split()
+    ),
+    "load": frozenset("load force kraft standardkraft prüfkraft".split()),
+}
+#: A column with one of these words is neither: "Tensile strain (Extension)", "Load rate".
+OTHERS = frozenset(
+    "strain stress rate speed velocity time cell cycle"
+    " dehnung spannung zeit geschwindigkeit".split()
+)
+#: Whole names of the columns that say which specimen and which direction a row belongs to.
+LABELS = {
+    "specimen": frozenset({"specimen", "sample", "specimen id", "specimen label", "sample id"})
+    | {"specimen name", "specimen number", "specimen no", "sample name", "probe"},
+    "direction": frozenset({"direction", "series", "test direction", "orientation", "richtung"}),
+}
+
+#: mm in one of each unit of length, N in one of each unit of load.
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
+LOAD_UNITS = {"N": 1.0, "kN": 1e3}
+
+_KNOWN = r"mm|cm|kN|kn|N|n|m"
+# "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
+_UNIT = r"[A-Za-zµμ°%][A-Za-z0-9µμ°%/^*·²-]{0,5}"
+_IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
+_AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A column's name without its unit, and the unit, "" when it names none.
+
+    >>> split_unit("Load (kN)"), split_unit("Weg in mm"), split_unit("load_N"), split_unit("Time")
+    (('Load', 'kN'), ('Weg', 'mm'), ('load', 'N'), ('Time', ''))
+    """
+    found = _IN_BRACKETS.match(name) or _AT_THE_END.match(name)
+    return (found[1].strip(), found[2].strip()) if found else (name, "")
+
+
+def means(name: str, quantity: str) -> bool:
+    """Whether a column of this name holds `quantity`: elongation, load, specimen or direction."""
+    plain = split_unit(name)[0].casefold()
+    if quantity in LABELS:
+        return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
+    words = set(re.split(r"[\W\d_]+", plain))
+    return bool(words & WORDS[quantity]) and not words & OTHERS
+
+
+def scale_of(unit: str, units: dict[str, float]) -> float | None:
+    """What one `unit` is in mm or N; None for a unit that is not in `units`."""
+    plain = {"n": "N", "kn": "kN", "KN": "kN"}.get(unit, unit)
+    return units.get(plain)

@@ -1,0 +1,215 @@
+"""Load over elongation of tensile specimens, as test machines export it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .column_names import LENGTH_UNITS, LOAD_UNITS, scale_of
+from .machine_tables import MachineTable, columns_of, find_table
+
+QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
+
+#: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
+#: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
+DIRECTION_ALIASES: Mapping[str, str] = {
+    "warp": "warp",
+    "fill": "fill",
+    "weft": "fill",
+    "bias": "bias",
+    "bias45": "bias",
+    "45bias": "bias",
+    "45": "bias",
+    "45deg": "bias",
+    "45degree": "bias",
+    "45degreebias": "bias",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCurve:
+    """Load against elongation of one specimen, or of several in one series.
+
+    Parameters
+    ----------
+    direction : warp, fill or bias.
+    specimen : its name in the file, else the series', else the file's.
+    elongation : (n,) mm, in the order of the file.
+    load : (n,) N, of the whole strip.
+    path : the file, None when the curve did not come from one.
+    time : (n,) in the file's unit, None unless asked for by name.
+    """
+
+    direction: str
+    specimen: str
+    elongation: NDArray[np.float64]
+    load: NDArray[np.float64]
+    path: Path | None
+    time: NDArray[np.float64] | None = None
+
+
+def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
+    """warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
+
+    Raises
+    ------
+    InputError : a name that is not among them.
+    """
+    plain = re.sub(r"[\W_]+", "", name.casefold())
+    if plain not in DIRECTION_ALIASES:
+        known = ", ".join(DIRECTION_ALIASES)
+        raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {known}")
+    return DIRECTION_ALIASES[plain]
+
+
+def read_load_curves(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    load_unit: Literal["N", "kN"] | None = None,
+    length_unit: Literal["mm", "cm", "m"] | None = None,
+    comment: str = "#",
+    direction: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+) -> tuple[LoadCurve, ...]:
+    """Read the curves of one export: one a direction and specimen, in the order of the file.
+
+    Lines before the row of names are passed over; names, unit row, separator and decimal mark are
+    found (see `machine_tables`).
+
+    Parameters
+    ----------
+    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with
+        or without the unit; needed where finding is ambiguous. `time` is read only when named.
+    load_unit, length_unit : needed where the file names none.
+    comment : lines that start so are skipped.
+    direction : of a file without a column of directions; in a file with one, the rows to keep.
+    decimal : needed where 1,234 may be a thousand or little more than one.
+
+    Raises
+    ------
+    InputError : naming file, line and the columns there are: nothing or several things found for
+        a quantity, no unit or a different one, no or an unknown direction, cells that are not
+        finite numbers.
+    """
+    path, named = Path(path), dict(columns or {})
+    unknown = [name for name in named if name not in QUANTITIES]
+    if unknown:
+        problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
+        raise InputError(None, "columns", problem)
+    if decimal not in (None, ".", ","):
+        raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
+    wanted = None if direction is None else direction_named(direction)
+    found = find_table(path, named, comment, decimal)
+    column = {quantity: _column(found, quantity, named) for quantity in QUANTITIES}
+    elongation = _measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
+    load = _measured(found, column["load"], "load", LOAD_UNITS, load_unit)
+    time = found.table.numbers(column["time"]) if column["time"] else None
+    labels = _labels(found, column, wanted)
+    curves = []
+    for key in dict.fromkeys(labels):
+        rows = np.array([label == key for label in labels])
+        if wanted in (None, key[0]):
+            taken = None if time is None else time[rows]
+            curves.append(LoadCurve(*key, elongation[rows], load[rows], path, taken))
+    if not curves:
+        there = ", ".join(dict.fromkeys(label[0] for label in labels))
+        raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
+    return tuple(curves)
+
+
+def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
+    """The specimens of a series that lists them one after the other without naming them.
+
+    A new specimen starts where the elongation falls below half of the largest before; so not for
+    tests that unload. They are called by the series' name and a number from 1.
+    """
+    u, starts, reached = curve.elongation, [0], 0.0
+    for i, value in enumerate(u):
+        if value < 0.5 * reached:
+            starts.append(i)
+            reached = 0.0
+        # Noise about zero, before the load comes on, is no restart.
+        reached = max(reached, value if value > 1e-2 * u.max() else 0.0)
+    parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
+    return tuple(
+        LoadCurve(
+            curve.direction,
+            f"{curve.specimen} {number}",
+            u[part],
+            curve.load[part],
+            curve.path,
+            None if curve.time is None else curve.time[part],
+        )
+        for number, part in enumerate(parts, start=1)
+    )
+
+
+def _column(found: MachineTable, quantity: str, named: Mapping[str, str]) -> str:
+    """The name of the one column that holds a quantity; "" where it may be absent and is."""
+    names = [str(name) for name in found.table.cells.columns]
+    if quantity == "time" and quantity not in named:
+        return ""
+    which = columns_of(names, quantity, named)
+    if len(which) == 1 or (not which and quantity not in (*named, "elongation", "load")):
+        return names[which[0]] if which else ""
+    there = ", ".join(name for name in names if name)[:300]
+    several = " or ".join(repr(names[i]) for i in which[:6])
+    what = f"may be {several}; name one with columns" if which else "is missing"
+    if quantity in named:
+        what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
+    problem = f"the column of {quantity} {what}; the file has: {there}"
+    raise InputError(found.table.path, f"line {found.header}", problem)
+
+
+def _measured(
+    found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
+) -> NDArray[np.float64]:
+    """One column in mm or N."""
+    path, at = found.table.path, f"line {found.header}, column {column!r}"
+    if asked is not None and asked not in units:
+        problem = f"expected one of {', '.join(units)}, got {asked!r}"
+        raise InputError(None, f"{kind}_unit", problem)
+    unit = found.units[column]
+    if not unit and asked is None:
+        problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
+        raise InputError(path, at, problem)
+    scale = scale_of(unit or asked or "", units)
+    if scale is None:
+        problem = f"unit {unit[:20]!r} is not one of {', '.join(units)}; convert the column"
+        raise InputError(path, at, problem)
+    if asked is not None and scale != units[asked]:
+        problem = f"the file says {unit!r}, {kind}_unit says {asked!r}; correct one of them"
+        raise InputError(path, at, problem)
+    with np.errstate(over="ignore"):
+        value = found.table.numbers(column) * scale
+    if not np.isfinite(value).all():
+        raise InputError(path, at, f"numbers too large; is the unit {unit or asked!r} right?")
+    return value
+
+
+def _labels(
+    found: MachineTable, column: Mapping[str, str], wanted: str | None
+) -> Sequence[tuple[str, str]]:
+    """Direction and specimen of each row."""
+    table = found.table
+    if not column["direction"] and wanted is None:
+        there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
+        problem = f"no column says the direction; say direction. The file has: {there}"
+        raise InputError(table.path, f"line {found.header}", problem)
+    series = list(table.text(column["direction"])) if column["direction"] else None
+    specimens = list(table.text(column["specimen"])) if column["specimen"] else None
+    labels = []
+    for i, line in enumerate(table.lines):
+        at = f"line {line}, column {column['direction']!r}"
+        way = direction_named(series[i], table.path, at) if series else str(wanted)
+        specimen = specimens[i] if specimens else series[i] if series else table.path.stem
+        labels.append((way, specimen))
+    return labels

@@ -1,0 +1,183 @@
+"""Finding the table in a test machine's export: header row, unit row, separator, decimal mark.
+
+The layouts that MTS TestSuite and TestWorks, Instron Bluehill and ZwickRoell testXpert write:
+some lines about the test and the specimen, one row of names, mostly one row of units, numbers;
+separated by commas, semicolons or tabs; the decimal mark a point or a comma.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .column_names import means, split_unit
+from .tables import Table, read_lines
+
+Rows = list[tuple[int, list[str]]]
+
+SEPARATORS = ("\t", ";", ",")
+NEEDED = ("elongation", "load")
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+
+
+@dataclass(frozen=True, eq=False)
+class MachineTable:
+    """A table as found.
+
+    table : the rows of numbers. units : for each column name the unit named in the header or in
+    the unit row. header : line number of the row of names.
+    """
+
+    table: Table
+    units: Mapping[str, str]
+    header: int
+
+
+def find_table(
+    path: Path, named: Mapping[str, str], comment: str = "#", decimal: str | None = None
+) -> MachineTable:
+    """Find the first table with a column of elongation and one of load.
+
+    Parameters
+    ----------
+    named : quantities whose column is known by name.
+    comment : lines that start so are skipped.
+    decimal : the decimal mark, "." or ","; None finds it.
+
+    Raises
+    ------
+    InputError : no such table, nothing below it, two units for one column, rows longer than the
+        header, a decimal mark that cannot be told from a mark of thousands.
+    """
+    import pandas as pd
+
+    lines = read_lines(path, comment, any_encoding=True)
+    found = []
+    for separator in SEPARATORS:
+        rows = [(number, _cells(text, separator)) for number, text in lines]
+        index = _header(rows, named)
+        if index is not None:
+            found.append((len(rows[index][1]), rows, index, separator))
+    if not found:
+        raise InputError(path, "", _nothing_found(lines, named))
+    _, rows, index, separator = max(found, key=lambda one: one[0])
+    header_line, names = rows[index]
+    needed = [i for quantity in NEEDED for i in columns_of(names, quantity, named)]
+    body = index + 1
+    units = {name: split_unit(name)[1] for name in names}
+    if body < len(rows) and _is_unit_row(rows[body][1], needed):
+        units |= _unit_row(path, rows[body], names, units)
+        body += 1
+    rest = [(n, row) for n, row in rows[body:] if any(row)]
+    if not rest:
+        raise InputError(path, f"line {header_line}", "no rows of numbers below these names")
+    for number, row in rest:
+        if any(row[len(names) :]):
+            count = len(row)
+            problem = f"expected {len(names)} cells as in line {header_line}, found {count}"
+            if separator == ",":
+                problem += "; decimal commas need another separator, or quotation marks"
+            raise InputError(path, f"line {number}", problem)
+    width = len(names)
+    cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
+    line_numbers = np.array([number for number, _ in rest])
+    decimal = decimal or _decimal(path, rest, needed)
+    return MachineTable(Table(path, cells, line_numbers, decimal), units, header_line)
+
+
+def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
+    """Which of the columns hold a quantity: by the name given for it, else by what names mean."""
+    if quantity not in named:
+        return [i for i, name in enumerate(names) if name and means(name, quantity)]
+    asked = named[quantity].strip()
+    exact = [i for i, name in enumerate(names) if name == asked]
+    plain = [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
+    return exact or plain
+
+
+def _cells(text: str, separator: str) -> list[str]:
+    # Line by line: a quotation mark left open must not swallow the rest of the file.
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(separator)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=separator))]
+    except csv.Error:
+        return [text]
+
+
+def _header(rows: Rows, named: Mapping[str, str]) -> int | None:
+    """The first row of names with numbers one or two rows below; else the first row of names."""
+    first = None
+    for index, (_, names) in enumerate(rows):
+        if len(names) < 2:
+            continue
+        columns = [columns_of(names, quantity, named) for quantity in NEEDED]
+        # A sentence that speaks of load and extension is one cell, and no header.
+        if not all(columns) or len({*columns[0], *columns[1]}) < 2:
+            continue
+        below = [row for _, row in rows[index + 1 : index + 3]]
+        if any(all(any(_is_number(row, i) for i in each) for each in columns) for row in below):
+            return index
+        first = index if first is None else first
+    return first
+
+
+def _is_number(row: list[str], column: int) -> bool:
+    return column < len(row) and bool(_NUMBER.fullmatch(row[column]))
+
+
+def _is_unit_row(row: list[str], needed: list[int]) -> bool:
+    cells = [row[i] for i in needed if i < len(row)]
+    letters = [cell for cell in cells if re.search("[^\\W\\d_]", cell)]
+    return bool(letters) and not any(_is_number(row, i) for i in needed)
+
+
+def _unit_row(
+    path: Path, row: tuple[int, list[str]], names: list[str], units: Mapping[str, str]
+) -> dict[str, str]:
+    number, cells = row
+    found = {}
+    for name, cell in zip(names, cells, strict=False):
+        unit = cell.strip("()[]<>{} ")
+        if unit and units[name] and unit != units[name]:
+            problem = f"unit {unit!r} here, but {units[name]!r} in the column's name; correct one"
+            raise InputError(path, f"line {number}, column {name!r}", problem)
+        if unit:
+            found[name] = unit
+    return found
+
+
+def _decimal(path: Path, rows: Rows, needed: list[int]) -> str:
+    cells = [(number, row[i]) for number, row in rows for i in needed if i < len(row)]
+    commas = [(number, cell) for number, cell in cells if _COMMA.fullmatch(cell)]
+    points = any("." in cell and _NUMBER.fullmatch(cell) for _, cell in cells)
+    if not commas or points:
+        return "."
+    if all(_GROUPED.fullmatch(cell) for _, cell in commas):
+        number, cell = commas[0]
+        problem = f"{cell!r}: is the comma a decimal mark or does it mark thousands? write a point"
+        raise InputError(path, f"line {number}", problem)
+    return ","
+
+
+def _nothing_found(lines: list[tuple[int, str]], named: Mapping[str, str]) -> str:
+    what = " and ".join(
+        repr(named[quantity]) if quantity in named else f"one of {quantity}" for quantity in NEEDED
+    )
+    problem = f"no header row with the columns {what}; name them with columns"
+    for (number, text), (_, below) in pairwise(lines):
+        for separator in SEPARATORS:
+            names, row = _cells(text, separator), _cells(below, separator)
+            if sum(_is_number(row, i) for i in range(len(row))) >= 2:
+                heads = ", ".join(name for name in names if name)[:200]
+                return f"{problem}; line {number}, above the first numbers, has: {heads}"
+    return f"{problem}; no line with two numbers was found either"
