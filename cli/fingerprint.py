@@ -12,7 +12,7 @@ from ..identification.problem import FitProblem
 from .fit_project import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
-FREE = {"path", "title", "starts", "data", "solver_options"}
+FREE = {"path", "title", "starts", "data", "strips", "solver_options"}
 # Of an external solver's options, what does.
 DECK = ("element", "templates")
 

@@ -10,14 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..experiments.curves import LoadCurve, read_load_curves
-from ..experiments.load_polynomials import (
-    LoadPolynomial,
-    PublishedCurve,
-    fit_load_polynomial,
-    read_published_polynomials,
-    specimen_scatter,
-)
+from ..experiments.curves import LoadCurve, read_load_curves, split_at_restarts
+from ..experiments.load_polynomials import LoadPolynomial, fit_load_polynomial, specimen_scatter
+from ..experiments.published_polynomials import read_published_polynomials
 from .project_schema import LENGTH_UNITS, UnitsSection
 from .uniaxial_schema import CurvesSection, GaugeSection, UniaxialSection
 
@@ -32,7 +27,7 @@ class StripData:
 
     polynomial : the load curve, given or fitted to the curves; None where a forward analysis does
     without data. curves : the specimens' points, empty where only the polynomial is given.
-    scatter : RMS of the points about the polynomial, N; None where it is not known.
+    scatter : standard deviation of the points about the polynomial, N; None where not known.
     """
 
     direction: str
@@ -114,15 +109,16 @@ def read_strips(
 def _published(
     path: Path, sections: Mapping[str, GaugeSection], file: Path, scale: float
 ) -> dict[str, StripData]:
-    curves: Mapping[str, PublishedCurve] = read_published_polynomials(file)
+    curves = read_published_polynomials(file)
     wanted = [d for d in DIRECTIONS if d in curves and (d in sections or not sections)]
     strips = {}
     for direction in wanted:
         curve, own = curves[direction], sections.get(direction) or GaugeSection()
         start = curve.gauge_length if own.gauge_length is None else own.gauge_length * scale
         end = curve.final_length if own.final_length is None else own.final_length * scale
+        scatter = None if np.isnan(curve.scatter) else curve.scatter
         strips[direction] = _strip(
-            path, direction, start, end, polynomial=curve.polynomial, scatter=curve.scatter
+            path, direction, start, end, polynomial=curve.polynomial, scatter=scatter
         )
     return strips
 
@@ -135,7 +131,6 @@ def _measured(
     scale: float,
 ) -> dict[str, StripData]:
     columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
-    # A file of one direction may say so in its name only.
     found: list[LoadCurve] = []
     for name in data.files or []:
         found += read_load_curves(
@@ -148,6 +143,8 @@ def _measured(
     strips = {}
     for direction in DIRECTIONS:
         curves = tuple(c for c in found if c.direction == direction)
+        if len(curves) == 1:  # perhaps several specimens, one after the other and not named
+            curves = split_at_restarts(curves[0])
         if not curves or (sections and direction not in sections):
             continue
         own = sections.get(direction) or GaugeSection()
@@ -160,7 +157,7 @@ def _measured(
         elongation = np.concatenate([c.elongation for c in curves])
         load = np.concatenate([c.load for c in curves])
         polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
-        scatter = specimen_scatter(curves, polynomial)
+        scatter = specimen_scatter(curves, polynomial).deviation
         strips[direction] = _strip(
             path, direction, start, end, polynomial=polynomial, curves=curves, scatter=scatter
         )

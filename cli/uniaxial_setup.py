@@ -47,9 +47,7 @@ def strip_models(project: UniaxialProject) -> dict[str, UniaxialModel]:
 def _model(project: UniaxialProject, strip: StripData) -> UniaxialModel:
     lengths = strip.gauge_length, strip.final_length, project.thickness, project.width
     if strip.direction == "bias":
-        return bias_strip(
-            *lengths, project.grip_distance, project.bias_angle, project.increments
-        )
+        return bias_strip(*lengths, project.grip_distance, project.bias_angle, project.increments)
     direction = "warp" if strip.direction == "warp" else "fill"
     return straight_strip(direction, *lengths, project.increments)  # type: ignore[arg-type]
 

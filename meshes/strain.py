@@ -1,0 +1,29 @@
+"""Logarithmic strain of a deformed mesh at the middle of its quads."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import Mesh
+
+Array = NDArray[np.float64]
+
+#: Slopes of the bilinear shape functions at the middle, (corner, direction).
+MIDDLE = 0.25 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
+    """(quads, 3) log strain (eps1, eps2, gamma12) of a mesh in the xy plane.
+
+    displacement : (nodes, 3) mm; warp : (3,) direction of the warp yarn in the plane, at rest.
+    """
+    rest, u = mesh.points[mesh.quads], displacement[mesh.quads]
+    jacobian = np.einsum("mni,nj->mij", rest[:, :, :2], MIDDLE)
+    # Columns of the gradient are the images of the unit warp and fill vectors.
+    yarns = np.array([[warp[0], -warp[1]], [warp[1], warp[0]]])
+    slopes = np.einsum("nj,mjk,kl->mnl", MIDDLE, np.linalg.inv(jacobian), yarns)
+    gradient = np.einsum("mni,mnl->mil", rest + u, slopes)
+    stretch, axes = np.linalg.eigh(np.einsum("mik,mil->mkl", gradient, gradient))
+    h = np.einsum("mka,ma,mla->mkl", axes, 0.5 * np.log(stretch), axes)
+    return np.stack([h[:, 0, 0], h[:, 1, 1], 2 * h[:, 0, 1]], axis=1)
