@@ -48,7 +48,7 @@ def assess(
     history = found.best.histories[0]
     mean = setup.objective.mean_absolute(history.displacement, offset)
     result = {
-        **common_result("bubble", project, found, wall_s),
+        **common_result("bubble", project, problem, found, wall_s),
         "objective_is": "e of Eq. 4.8" if project.objective == "e" else "sum of RMS errors, mm",
         "mean_abs_mm": mean,
         "nuisance": nuisance_result(project, offset, pressure_offset),

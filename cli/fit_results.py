@@ -21,6 +21,7 @@ from ..materials.card import MaterialCard, write_card
 from ..materials.law import HypoelasticLaw
 from ..runs.folder import RESULT, OutputFolder
 from ..runs.start import StartRecord
+from ..solvers.base import History
 from .fit_project import FitProject
 from .study import ranking
 
@@ -63,18 +64,30 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     best = problem.evaluate(unknowns, leading is problem, warm=False)
     if best is None:
         raise SolverFailure("the best fit does not run again", problem.solver.name)
-    reached = np.full(3, 1e-6)
-    for history in best.histories:
-        shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
-        reached = np.maximum(reached, [history.strain_max[0], history.strain_max[1], shear])
+    reached = np.maximum(np.max([strains_of(h) for h in best.histories], axis=0), 1e-6)
     law = problem.law.with_beta(problem.parameters.beta(unknowns))
     slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)
     sure = certainty(leading, slopes, law, reached) if slopes is not None else None
     return BestFit(best, slopes, law, ranked, records, reached, sure)
 
 
+def strains_of(history: History) -> Array:
+    """(3,) largest warp, fill and (either way) shear strain of an analysis."""
+    shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
+    return np.array([history.strain_max[0], history.strain_max[1], shear])
+
+
+def beyond_card(reached: Array, card: MaterialCard) -> list[str]:
+    """Where strains (3,) leave the range that a card is valid for."""
+    return [
+        f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there"
+        for name, s, end in zip(STRAINS, reached, card.law.strain_range, strict=True)
+        if s > end * (1 + 1e-6)
+    ]
+
+
 def common_result(
-    command: str, project: FitProject, found: BestFit, wall_s: float
+    command: str, project: FitProject, problem: FitProblem, found: BestFit, wall_s: float
 ) -> dict[str, Any]:
     """What result.json says of every fit."""
     records, sure = found.records, found.certainty
@@ -105,7 +118,7 @@ def common_result(
         ],
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
-        "warnings": _warnings(project, found),
+        "warnings": _warnings(project, problem, found),
         "wall_s": wall_s,
         "versions": _versions(),
     }
@@ -120,16 +133,22 @@ def common_result(
     return result
 
 
-def _warnings(project: FitProject, found: BestFit) -> list[str]:
+def _warnings(project: FitProject, problem: FitProblem, found: BestFit) -> list[str]:
     words = list(found.certainty.undetermined) if found.certainty is not None else []
     if not found.best.stable:
         words.append(UNSTABLE)
-    for name, strain, end in zip(STRAINS, found.reached, project.strain_range, strict=True):
-        if strain > end * (1 + 1e-6):
-            words.append(
-                f"{name} strain reached {strain:.3f}, beyond material.strain_range {end:g}: the "
-                "modulus was held at its end value there; widen the range"
-            )
+    several = len(problem.experiments) > 1
+    for experiment, history in zip(problem.experiments, found.best.histories, strict=True):
+        where = f" in the {experiment.name} test" if several else ""
+        for name, strain, end in zip(
+            STRAINS, strains_of(history), project.strain_range, strict=True
+        ):
+            if strain > end * (1 + 1e-6):
+                words.append(
+                    f"{name} strain reached {strain:.3f}{where}, beyond material.strain_range "
+                    f"{end:.4g}: the modulus was held at its end value there; "
+                    + ("a wider range would let it vary" if several else "widen the range")
+                )
     return words
 
 

@@ -43,7 +43,7 @@ def assess_uniaxial(
     """
     found = best_fit(setup.problem, records)
     result = {
-        **common_result("uniaxial", project, found, wall_s),
+        **common_result("uniaxial", project, setup.problem, found, wall_s),
         "objective_is": OBJECTIVES[project.objective],
         **strip_results(project, setup, found.best.histories),
     }

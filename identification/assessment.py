@@ -62,13 +62,12 @@ def certainty(
     inverse = np.linalg.pinv(j.T @ j, rcond=1e-13)
     estimator = inverse @ j.T * sigma
     strains, sigmas = _along(problem, law, reached, estimator @ estimator.T)
-    said = " and ".join(
-        f"{noise[e.name]:.2g} {e.objective.unit}"
-        + (f" ({e.name})" if len(problem.experiments) > 1 else "")
-        for e in problem.experiments
-    )
+    first = problem.experiments[0]
+    said = f"at {noise[first.name]:.2g} {first.objective.unit} noise"
+    if len(problem.experiments) > 1:
+        said = "with the tests' noise"
     words = [
-        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma at {said} noise), "
+        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {said}), "
         f"worst at strain {strains[name][relative.argmax()]:.3f}"
         for name, relative in sigmas.items()
         if relative.max() > UNCERTAIN
