@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import fields
 
 import numpy as np
@@ -20,9 +21,8 @@ DECK = ("element", "templates")
 def fingerprint(project: FitProject, problem: FitProblem) -> str:
     """SHA-256 over everything that a start's result depends on."""
     digest = hashlib.sha256(__version__.encode())
-    for field in fields(project):
-        if field.name not in FREE:
-            digest.update(f"{field.name}={_plain(getattr(project, field.name))};".encode())
+    for setting in _settings(project):
+        digest.update(setting.encode())
     options = project.solver_options.get(project.solver, {})
     for name in DECK:
         digest.update(f"{name}={options.get(name)};".encode())
@@ -30,6 +30,15 @@ def fingerprint(project: FitProject, problem: FitProblem) -> str:
         for data in experiment.objective.data:
             digest.update(np.ascontiguousarray(data).tobytes())
     return digest.hexdigest()
+
+
+def _settings(project: FitProject) -> Iterator[str]:
+    for field in fields(project):
+        value = getattr(project, field.name)
+        if isinstance(value, FitProject):  # a part of a joint fit
+            yield from (f"{field.name}.{setting}" for setting in _settings(value))
+        elif field.name not in FREE:
+            yield f"{field.name}={_plain(value)};"
 
 
 def _plain(value: object) -> str:

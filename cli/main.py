@@ -12,6 +12,7 @@ from .. import __version__
 COMMANDS = {
     "bubble": ("bubble", "Fit a material to a bubble inflation test."),
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests."),
+    "joint": ("joint", "Fit a material to a bubble and strips together."),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "init": ("init", "Write a commented example project."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,11 +94,18 @@ def uniaxial_setup(project: UniaxialProject) -> UniaxialSetup:
     InputError : in the project or its data. SolverFailure : no such solver here.
     """
     problem = uniaxial_problem(project)
+    return setup_of(project, problem, problem.experiments)
+
+
+def setup_of(
+    project: UniaxialProject, problem: FitProblem, tests: Sequence[Experiment]
+) -> UniaxialSetup:
+    """The strips among the tests of a problem."""
     return UniaxialSetup(
         problem,
-        tuple(project.strips[e.name] for e in problem.experiments),
-        tuple(e.objective for e in problem.experiments),
-        tuple(e.model for e in problem.experiments),
+        tuple(project.strips[e.name] for e in tests),
+        tuple(e.objective for e in tests),
+        tuple(e.model for e in tests),
     )
 
 
