@@ -394,7 +394,7 @@ LOWER, UPPER = (12.3, 20.1), (12.3, 40.122)
     stretches=st.lists(st.floats(0.95, 1.6), min_size=1, max_size=4),
     angle=st.floats(-1, 1),
     jitter=st.sampled_from([0.0, 0.1]),
-    spacing=st.sampled_from([0.7, 1.0, 2.0]),
+    spacing=st.sampled_from([1.0, 1.3, 2.0]),
 )
 def test_a_homogeneous_stretch_is_met_exactly(stretches, angle, jitter, spacing):
     points = grid(spacing, jitter)
@@ -777,9 +777,9 @@ def test_refitting_the_points_gives_what_was_published(shared_data):
         curve = points[direction]
         fitted = fit_load_polynomial(curve.elongation, curve.load)
         half = 0.5 * 10.0 ** -np.array(digits)
-        # Digitising adds an error of its own: a few units of the last digit.
+        # Digitising adds an error of its own: half a unit more of the last digit.
         off = np.abs(fitted.coefficients - published[direction].polynomial.coefficients)[1:]
-        assert (off < 20 * half).all()
+        assert (off < 2 * half).all()
         assert fitted.r_squared == pytest.approx(r_squared, abs=5e-4)
 
 
@@ -787,7 +787,7 @@ def test_one_fill_point_was_not_digitised(shared_data):
     """Fill gives R^2 0.9576 where Table 3.1 has 0.959, and coefficients 0.4 N/mm apart.
 
     One point more, near the origin, explains both: where is found from the published coefficients
-    alone, R^2 then follows. (Markers of five specimens overlap there in the figure.)
+    alone, R^2 then follows. (Markers of five specimens lie on each other there: one may hide another.)
     """
     published = read_published_polynomials(EXAMPLE)["fill"].polynomial
     curve = measured_points(shared_data)["fill"]
