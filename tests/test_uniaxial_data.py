@@ -787,7 +787,7 @@ def test_one_fill_point_was_not_digitised(shared_data):
     """Fill gives R^2 0.9576 where Table 3.1 has 0.959, and coefficients 0.4 N/mm apart.
 
     One point more, near the origin, explains both: where is found from the published coefficients
-    alone, R^2 then follows. (Markers of five specimens lie on each other there: one may hide another.)
+    alone, R^2 then follows. (Five specimens start there: one marker may hide another.)
     """
     published = read_published_polynomials(EXAMPLE)["fill"].polynomial
     curve = measured_points(shared_data)["fill"]
