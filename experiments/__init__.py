@@ -1,1 +1,1 @@
-"""What was measured: displacement fields and the polynomial surfaces fitted to them."""
+"""What was measured: displacement fields with surfaces, load curves with polynomials."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 #: Words that make a column one of elongation or of load, in English and German exports.
 WORDS = {
@@ -19,7 +20,7 @@ OTHERS = frozenset(
 )
 #: Whole names of the columns that say which specimen and which direction a row belongs to.
 LABELS = {
-    "specimen": frozenset({"specimen", "sample", "specimen id", "specimen label", "sample id"})
+    "specimen": frozenset({"specimen", "specimen id", "specimen label", "sample id"})
     | {"specimen name", "specimen number", "specimen no", "sample name", "probe"},
     "direction": frozenset({"direction", "series", "test direction", "orientation", "richtung"}),
 }
@@ -52,6 +53,16 @@ def means(name: str, quantity: str) -> bool:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
     words = set(re.split(r"[\W\d_]+", plain))
     return bool(words & WORDS[quantity]) and not words & OTHERS
+
+
+def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
+    """Which of the columns hold a quantity: by the name given for it, else by what names mean."""
+    if quantity not in named:
+        return [i for i, name in enumerate(names) if name and means(name, quantity)]
+    asked = named[quantity].strip()
+    exact = [i for i, name in enumerate(names) if name == asked]
+    plain = [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
+    return exact or plain
 
 
 def scale_of(unit: str, units: dict[str, float]) -> float | None:

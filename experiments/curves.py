@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .column_names import LENGTH_UNITS, LOAD_UNITS, scale_of
-from .machine_tables import MachineTable, columns_of, find_table
+from .column_names import LENGTH_UNITS, LOAD_UNITS
+from .machine_columns import column_of, measured
+from .machine_tables import MachineTable, find_table
 
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 
@@ -108,19 +109,21 @@ def read_load_curves(
         raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
     wanted = None if direction is None else direction_named(direction)
     found = find_table(path, named, comment, decimal)
-    column = {quantity: _column(found, quantity, named) for quantity in QUANTITIES}
-    elongation = _measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
-    load = _measured(found, column["load"], "load", LOAD_UNITS, load_unit)
+    column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
+    elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
+    load = measured(found, column["load"], "load", LOAD_UNITS, load_unit)
     time = found.table.numbers(column["time"]) if column["time"] else None
     labels = _labels(found, column, wanted)
+    places: dict[tuple[str, str], list[int]] = {}
+    for row, label in enumerate(labels):
+        places.setdefault(label, []).append(row)
     curves = []
-    for key in dict.fromkeys(labels):
-        rows = np.array([label == key for label in labels])
+    for key, rows in places.items():
         if wanted in (None, key[0]):
             taken = None if time is None else time[rows]
             curves.append(LoadCurve(*key, elongation[rows], load[rows], path, taken))
     if not curves:
-        there = ", ".join(dict.fromkeys(label[0] for label in labels))
+        there = ", ".join(dict.fromkeys(key[0] for key in places))
         raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
     return tuple(curves)
 
@@ -152,49 +155,6 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     )
 
 
-def _column(found: MachineTable, quantity: str, named: Mapping[str, str]) -> str:
-    """The name of the one column that holds a quantity; "" where it may be absent and is."""
-    names = [str(name) for name in found.table.cells.columns]
-    if quantity == "time" and quantity not in named:
-        return ""
-    which = columns_of(names, quantity, named)
-    if len(which) == 1 or (not which and quantity not in (*named, "elongation", "load")):
-        return names[which[0]] if which else ""
-    there = ", ".join(name for name in names if name)[:300]
-    several = " or ".join(repr(names[i]) for i in which[:6])
-    what = f"may be {several}; name one with columns" if which else "is missing"
-    if quantity in named:
-        what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
-    problem = f"the column of {quantity} {what}; the file has: {there}"
-    raise InputError(found.table.path, f"line {found.header}", problem)
-
-
-def _measured(
-    found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
-) -> NDArray[np.float64]:
-    """One column in mm or N."""
-    path, at = found.table.path, f"line {found.header}, column {column!r}"
-    if asked is not None and asked not in units:
-        problem = f"expected one of {', '.join(units)}, got {asked!r}"
-        raise InputError(None, f"{kind}_unit", problem)
-    unit = found.units[column]
-    if not unit and asked is None:
-        problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
-        raise InputError(path, at, problem)
-    scale = scale_of(unit or asked or "", units)
-    if scale is None:
-        problem = f"unit {unit[:20]!r} is not one of {', '.join(units)}; convert the column"
-        raise InputError(path, at, problem)
-    if asked is not None and scale != units[asked]:
-        problem = f"the file says {unit!r}, {kind}_unit says {asked!r}; correct one of them"
-        raise InputError(path, at, problem)
-    with np.errstate(over="ignore"):
-        value = found.table.numbers(column) * scale
-    if not np.isfinite(value).all():
-        raise InputError(path, at, f"numbers too large; is the unit {unit or asked!r} right?")
-    return value
-
-
 def _labels(
     found: MachineTable, column: Mapping[str, str], wanted: str | None
 ) -> Sequence[tuple[str, str]]:
@@ -211,5 +171,8 @@ def _labels(
         at = f"line {line}, column {column['direction']!r}"
         way = direction_named(series[i], table.path, at) if series else str(wanted)
         specimen = specimens[i] if specimens else series[i] if series else table.path.stem
+        if not specimen:
+            at = f"line {line}, column {column['specimen']!r}"
+            raise InputError(table.path, at, "expected the specimen's name, found nothing")
         labels.append((way, specimen))
     return labels

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from .curves import LoadCurve, direction_named
 from .gauge_frames import GaugeFrame
-
-if TYPE_CHECKING:
-    from scipy.spatial import Delaunay
+from .surface_points import place_of, triangulated, usual_edge
 
 Array = NDArray[np.float64]
 
@@ -75,10 +72,10 @@ def virtual_strain_gauge(
         raise InputError(None, "frames", "expected at least one, got none")
     if np.array_equal(ends[0], ends[1]):
         raise InputError(None, "gauge", "lower and upper are the same point; expected two")
-    seen = [_triangles(frame) for frame in frames]
-    spacing = [_usual_edge(corners) for _, corners, _ in seen if len(corners)]
+    seen = [triangulated(frame) for frame in frames]
+    spacing = [usual_edge(surface) for surface in seen if surface is not None]
     limit = max_gap * float(np.median(spacing)) if spacing else 0.0
-    places = [[_follow(*one, end, limit) for one in seen] for end in ends]
+    places = [[place_of(end, surface, limit) for surface in seen] for end in ends]
     warnings = []
     for name, end, per_frame in zip(("lower", "upper"), ends, places, strict=True):
         why = {i: place for i, place in enumerate(per_frame) if isinstance(place, str)}
@@ -128,52 +125,6 @@ def _end(point: ArrayLike, name: str) -> Array:
     if end.shape != (2,) or not np.isfinite(end).all():
         raise InputError(None, name, f"expected x and y in mm, got {point!r}")
     return end
-
-
-def _triangles(frame: GaugeFrame) -> tuple[Delaunay | None, Array, Array]:
-    """Triangles, the (triangles, 3, 2) corners, and the places (points, 2, 3) before and after."""
-    from scipy.spatial import Delaunay, QhullError
-
-    places = np.stack([frame.points, frame.points + frame.displacement], axis=1)
-    places = places[np.isfinite(places).all(axis=(1, 2))]
-    flat = places[:, 0, :2]
-    nothing = np.zeros((0, 3, 2))
-    if len(flat) < 3:
-        return None, nothing, places
-    try:
-        mesh = Delaunay(flat)
-    except QhullError:  # all on one line
-        return None, nothing, places
-    return mesh, flat[mesh.simplices], places
-
-
-def _longest_edge(corners: Array) -> Array:
-    """Longest edge (triangles,) of triangles with corners (triangles, 3, 2)."""
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1))
-
-
-def _usual_edge(corners: Array) -> float:
-    return float(np.median(_longest_edge(corners)))
-
-
-def _follow(
-    mesh: Delaunay | None, corners: Array, places: Array, end: Array, limit: float
-) -> Array | str:
-    """Place (2, 3) of one end before and after, or why there is none."""
-    if mesh is None:
-        return "no three correlated points that span a surface"
-    triangle = int(mesh.find_simplex(end))
-    if triangle < 0:
-        return "outside the correlated points"
-    widest = float(_longest_edge(corners[triangle : triangle + 1])[0])
-    if widest > limit:
-        return f"the points around it are {widest:.3g} mm apart, allowed {limit:.3g}"
-    slope = mesh.transform[triangle]
-    part = slope[:2] @ (end - slope[2])
-    if not np.isfinite(part).all():
-        return "the points around it lie on one line"
-    weights = np.append(part, 1.0 - part.sum())
-    return np.asarray(np.einsum("i,ijk->jk", weights, places[mesh.simplices[triangle]]))
 
 
 def gauge_load_curve(

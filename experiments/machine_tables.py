@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from .column_names import means, split_unit
+from .column_names import columns_of, split_unit
 from .tables import Table, read_lines
 
 Rows = list[tuple[int, list[str]]]
@@ -90,18 +90,8 @@ def find_table(
     width = len(names)
     cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
     line_numbers = np.array([number for number, _ in rest])
-    decimal = decimal or _decimal(path, rest, needed)
+    decimal = decimal or _decimal(path, rest, names, needed)
     return MachineTable(Table(path, cells, line_numbers, decimal), units, header_line)
-
-
-def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
-    """Which of the columns hold a quantity: by the name given for it, else by what names mean."""
-    if quantity not in named:
-        return [i for i, name in enumerate(names) if name and means(name, quantity)]
-    asked = named[quantity].strip()
-    exact = [i for i, name in enumerate(names) if name == asked]
-    plain = [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
-    return exact or plain
 
 
 def _cells(text: str, separator: str) -> list[str]:
@@ -156,16 +146,16 @@ def _unit_row(
     return found
 
 
-def _decimal(path: Path, rows: Rows, needed: list[int]) -> str:
-    cells = [(number, row[i]) for number, row in rows for i in needed if i < len(row)]
-    commas = [(number, cell) for number, cell in cells if _COMMA.fullmatch(cell)]
-    points = any("." in cell and _NUMBER.fullmatch(cell) for _, cell in cells)
+def _decimal(path: Path, rows: Rows, names: list[str], needed: list[int]) -> str:
+    cells = [(n, names[i], row[i]) for n, row in rows for i in needed if i < len(row)]
+    commas = [one for one in cells if _COMMA.fullmatch(one[2])]
+    points = any("." in cell and _NUMBER.fullmatch(cell) for _, _, cell in cells)
     if not commas or points:
         return "."
-    if all(_GROUPED.fullmatch(cell) for _, cell in commas):
-        number, cell = commas[0]
-        problem = f"{cell!r}: is the comma a decimal mark or does it mark thousands? write a point"
-        raise InputError(path, f"line {number}", problem)
+    if all(_GROUPED.fullmatch(cell) for _, _, cell in commas):
+        number, name, cell = commas[0]
+        problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
+        raise InputError(path, f"line {number}, column {name!r}", problem)
     return ","
 
 

@@ -32,7 +32,7 @@ class PublishedPolynomial:
 
 
 def read_published_polynomials(path: Path | str) -> dict[str, PublishedPolynomial]:
-    """Read direction, gauge_length_mm, final_length_mm, c1, c2 ...; by direction.
+    """Read a row a direction: direction, gauge_length_mm, final_length_mm, c1, c2 ...
 
     c0 and data_scatter_N may be there; load in N, elongation in mm, of the full strip.
 
