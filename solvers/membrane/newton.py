@@ -64,7 +64,7 @@ class Membrane:
         law, e = self.law, self.elements
         force = assemble(
             self.reference + u, self.quads, e.values, e.slopes, e.area, self.thickness, pressure,
-            law.beta, law.nu12, law.strain_range, law.area_power, self.strain_old,
+            law.beta, law.nu12, law.limits, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
         )  # fmt: skip
