@@ -1,4 +1,4 @@
-"""What a tangent modulus depends on: which strain, which coefficients, in either form of the law."""
+"""What a tangent modulus depends on: which strain and which coefficients, in either form."""
 
 from __future__ import annotations
 
