@@ -226,9 +226,7 @@ class HypoelasticLaw:
         zero = np.zeros((len(f), 3))
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
-        return _pull_backs(
-            self.beta, self.nu12, self.limits, self.area_power, right, old, stress
-        )
+        return _pull_backs(self.beta, self.nu12, self.limits, self.area_power, right, old, stress)
 
 
 @compiled()
