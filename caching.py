@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent
 #: Everything that compiled functions call: an edit of one must reach the compiled code of all,
 #: while numba's own cache looks only at the file a function stands in.
 KERNELS = (
+    "materials/point_moduli.py",
     "materials/point_law.py",
     "materials/law.py",
     "solvers/membrane/kernel.py",

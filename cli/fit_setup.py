@@ -44,7 +44,11 @@ def project_solver(project: FitProject) -> Solver:
 def law_of(project: FitProject) -> HypoelasticLaw:
     """The law that carries all but the coefficients, which are zero."""
     return HypoelasticLaw(
-        np.zeros(12), project.nu12, np.array(project.strain_range), project.thickness_change
+        np.zeros(12),
+        project.nu12,
+        np.array(project.strain_range),
+        project.thickness_change,
+        project.breaks,
     )
 
 

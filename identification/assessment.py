@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.law import MODULI, HypoelasticLaw
-from ..materials.positivity import GRID, coefficient_rows
+from ..materials.positivity import GRID
 from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
@@ -117,10 +117,8 @@ def _along(
     strains, sigmas = {}, {}
     for name, (first, component) in MODULI.items():
         strain = np.linspace(0.0, reached[component], POINTS)
-        held = np.minimum(strain, law.strain_range[component])
         rows = np.zeros((POINTS, 12))
-        own = None if p.breaks is None else p.breaks[component]
-        rows[:, first : first + 4] = coefficient_rows(held, own)
+        rows[:, first : first + 4] = law.modulus_rows(name, strain)
         rows = rows[:, p.places]
         sigma = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", rows, moved, rows), 0.0))
         strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..writing import replacing
@@ -32,7 +33,21 @@ KEYS = (
     "thickness_mm",
     "thickness_change",
     "valid_strain",
+    "breaks",
 )
+#: What the key `law` says; a tri-linear law has breaks.
+TEXTS = {
+    "polynomial": "hypoelastic orthotropic; tangent moduli of log strain; Cauchy stress",
+    "trilinear": "hypoelastic orthotropic; tri-linear: tangent moduli constant in three regions of "
+    "log strain; Cauchy stress",
+}
+HEADERS = {
+    "polynomial": "# beta_0..3: G12 of |gamma12|, beta_4..7: E2 of eps2, beta_8..11: E1 of eps1, "
+    "highest power first.\n# Outside valid_strain a modulus keeps its end value.\n",
+    "trilinear": "# Moduli beyond the second break, between the breaks, up to the first:\n"
+    "# beta_1..3: G12 of |gamma12|, beta_5..7: E2 of eps2, beta_9..11: E1 of eps1; the others "
+    "are 0.\n# Outside valid_strain a modulus keeps its end value.\n",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +69,7 @@ def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
     content: dict[str, Any] = {
         "name": card.name,
         "source": card.source,
-        "law": "hypoelastic orthotropic; tangent moduli of log strain; Cauchy stress",
+        "law": TEXTS[law.form],
         "unit": unit,
         "beta": [float(b) / scale for b in law.beta],
         "nu12": law.nu12,
@@ -62,12 +77,10 @@ def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
         "thickness_change": law.thickness_change,
         "valid_strain": valid,
     }
-    header = (
-        "# beta_0..3: G12 of |gamma12|, beta_4..7: E2 of eps2, beta_8..11: E1 of eps1, "
-        "highest power first.\n# Outside valid_strain a modulus keeps its end value.\n"
-    )
+    if law.breaks is not None:
+        content["breaks"] = dict(zip(DIRECTIONS, law.breaks.tolist(), strict=True))
     with replacing(path) as temporary:
-        temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
+        temporary.write_text(HEADERS[law.form] + tomli_w.dumps(content), encoding="utf-8")
 
 
 def read_card(path: Path) -> MaterialCard:
@@ -76,7 +89,8 @@ def read_card(path: Path) -> MaterialCard:
     Raises
     ------
     InputError : naming the file and the field: not TOML, a missing key, a unit that is not one
-        of GPa, MPa, Pa, not twelve finite coefficients, a range that is not [0, end].
+        of GPa, MPa, Pa, not twelve finite coefficients, a range that is not [0, end], breaks that
+        are not [first, second], coefficients that a tri-linear law does not have.
     """
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -101,11 +115,8 @@ def read_card(path: Path) -> MaterialCard:
     if not all(map(math.isfinite, mpa)):
         raise InputError(path, "beta", f"{max(beta, key=abs):g} {unit} is too large a coefficient")
     valid = _get(path, content, "valid_strain", dict, {})
+    _check_directions(path, "valid_strain", valid)
     ends = []
-    for name in valid:
-        if name not in DIRECTIONS:
-            problem = f"unknown direction; allowed: {', '.join(DIRECTIONS)}"
-            raise InputError(path, f"valid_strain.{name}", problem)
     for name in DIRECTIONS:
         limits = valid.get(name, [0.0, UNLIMITED])
         good = isinstance(limits, list) and len(limits) == 2 and all(map(_is_number, limits))
@@ -121,11 +132,36 @@ def read_card(path: Path) -> MaterialCard:
             _get(path, content, "nu12", (int, float)),
             np.array(ends),
             _get(path, content, "thickness_change", str, "constant"),
+            _breaks(path, content),
         )
     except InputError as error:
         raise InputError(path, error.field, error.problem) from None
     name = _get(path, content, "name", str, "")
     return MaterialCard(law, float(thickness), name, _get(path, content, "source", str, ""))
+
+
+def _breaks(path: Path, content: dict[str, Any]) -> NDArray[np.float64] | None:
+    text = _get(path, content, "law", str, "")
+    if "breaks" not in content:
+        if "tri-linear" in text:
+            raise InputError(path, "breaks", "this key is missing; `law` says tri-linear")
+        return None
+    given = _get(path, content, "breaks", dict)
+    _check_directions(path, "breaks", given)
+    for name in DIRECTIONS:
+        pair = given.get(name)
+        good = isinstance(pair, list) and len(pair) == 2 and all(map(_is_number, pair))
+        if not good or not 0 < pair[0] < pair[1]:
+            problem = f"expected [first, second], 0 < first < second, got {pair}"
+            raise InputError(path, f"breaks.{name}", problem)
+    return np.array([given[name] for name in DIRECTIONS], dtype=float)
+
+
+def _check_directions(path: Path, key: str, table: dict[str, Any]) -> None:
+    for name in table:
+        if name not in DIRECTIONS:
+            problem = f"unknown direction; allowed: {', '.join(DIRECTIONS)}"
+            raise InputError(path, f"{key}.{name}", problem)
 
 
 def _is_number(value: Any) -> bool:

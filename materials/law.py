@@ -3,14 +3,18 @@
 d sigma = D(eps) d eps in the convected warp/fill frame; tangent moduli are cubics of the
 logarithmic strain component in their own direction (Eqs 3.1-3.3):
 
-    G12 = b0 g^3 + b1 g^2 + b2 g + b3,  E2 = b4 e2^3 + ... + b7,  E1 = b8 e1^3 + ... + b11.
+    G12 = b0 g^3 + b1 g^2 + b2 g + b3,  E2 = b4 e2^3 + ... + b7,  E1 = b8 e1^3 + ... + b11,
+
+or constant in three regions of that strain each (tri-linear, after Ambroziak and Klosowski):
+G12 = b3 up to its first break, b2 up to its second, b1 beyond, b0 = 0; E2 and E1 likewise.
 
 g = |gamma12|; nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -18,14 +22,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..caching import compiled
 from ..errors import InputError
+from .moduli import (
+    MODULI,
+    UNLIMITED,
+    UNUSED,
+    Form,
+    coefficient_rows,
+    held_strain,
+    strain_breaks,
+)
 from .point_law import SLOPES, membrane_stress, stress_update
 
 Array = NDArray[np.float64]
 ThicknessChange = Literal["constant", "incompressible"]
 
-#: First coefficient of each modulus in beta, and the strain component it depends on.
-MODULI: dict[str, tuple[int, int]] = {"E1": (8, 0), "E2": (4, 1), "G12": (0, 2)}
-UNLIMITED = 1e9
+__all__ = ["MODULI", "UNLIMITED", "Form", "HypoelasticLaw", "ThicknessChange"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +51,24 @@ class HypoelasticLaw:
         them, and below zero, a modulus keeps its end value.
     thickness_change : "constant" (the thesis' shells) or "incompressible" (resultant
         sigma t0 / area ratio).
+    breaks : (3, 2) two positive, increasing strains for each of (eps1, eps2, gamma12): the law
+        is tri-linear then, with beta_3, beta_2, beta_1 for G12 up to the first break, between
+        the breaks and beyond, beta_7..5 for E2, beta_11..9 for E1; beta_0, 4 and 8 are zero.
+    limits : what the compiled kernels need to know of range and breaks (`point_moduli`); made
+        here.
 
     Raises
     ------
-    InputError : not twelve finite coefficients, or a range that is not positive.
+    InputError : not twelve finite coefficients, a range that is not positive, breaks that do not
+        increase, or a coefficient that a tri-linear law does not have.
     """
 
     beta: Array
     nu12: float = 0.24
     strain_range: Array = None  # type: ignore[assignment]
     thickness_change: ThicknessChange = "constant"
+    breaks: Array | None = None
+    limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         beta = np.array(self.beta, dtype=float)
@@ -57,8 +76,8 @@ class HypoelasticLaw:
             raise InputError(
                 None, "beta", f"expected 12 finite coefficients, got shape {beta.shape}"
             )
-        limits = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
-        ends = np.array(limits, dtype=float)
+        unlimited = [UNLIMITED] * 3
+        ends = np.array(unlimited if self.strain_range is None else self.strain_range, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
             raise InputError(
                 None, "strain_range", f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
@@ -71,9 +90,23 @@ class HypoelasticLaw:
                 "thickness_change",
                 f"expected 'constant' or 'incompressible', got {self.thickness_change!r}",
             )
-        beta.flags.writeable = ends.flags.writeable = False
-        object.__setattr__(self, "beta", beta)
-        object.__setattr__(self, "strain_range", ends)
+        limits, pairs = ends, None
+        if self.breaks is not None:
+            pairs = strain_breaks(self.breaks)
+            pairs.flags.writeable = False
+            if any(beta[i] != 0.0 for i in UNUSED):
+                problem = "a tri-linear law has no beta_0, beta_4 and beta_8: expected 0, got "
+                raise InputError(
+                    None, "beta", problem + ", ".join(f"{beta[i]:g}" for i in sorted(UNUSED))
+                )
+            # A modulus that is held at its end never reaches a break from there on.
+            reached = np.where(pairs < ends[:, None], pairs, UNLIMITED)
+            limits = np.concatenate([ends, reached.ravel()])
+        beta.flags.writeable = ends.flags.writeable = limits.flags.writeable = False
+        for name, value in (
+            ("beta", beta), ("strain_range", ends), ("breaks", pairs), ("limits", limits)
+        ):  # fmt: skip
+            object.__setattr__(self, name, value)
 
     @classmethod
     def linear(
@@ -89,6 +122,37 @@ class HypoelasticLaw:
         beta[[3, 7, 11]] = g12, e2, e1
         return cls(beta, nu12, None, thickness_change)  # type: ignore[arg-type]
 
+    @classmethod
+    def trilinear(
+        cls,
+        e1: Sequence[float],
+        e2: Sequence[float],
+        g12: Sequence[float],
+        breaks: ArrayLike,
+        nu12: float = 0.24,
+        strain_range: ArrayLike | None = None,
+        thickness_change: ThicknessChange = "constant",
+    ) -> HypoelasticLaw:
+        """Moduli (MPa) that are constant in three regions of their strain.
+
+        Parameters
+        ----------
+        e1, e2, g12 : (3,) moduli up to the first break, between the breaks, beyond the second.
+        breaks : (3, 2) two strains for each of (eps1, eps2, gamma12).
+        """
+        beta = np.zeros(12)
+        for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
+            if np.shape(values) != (3,):
+                raise InputError(None, name, f"expected 3 moduli, got {values}")
+            first = MODULI[name][0]
+            beta[[first + 3, first + 2, first + 1]] = values
+        return cls(beta, nu12, strain_range, thickness_change, breaks)  # type: ignore[arg-type]
+
+    @property
+    def form(self) -> Form:
+        """How the moduli depend on strain: "polynomial" or "trilinear"."""
+        return "polynomial" if self.breaks is None else "trilinear"
+
     @property
     def area_power(self) -> float:
         """Power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
@@ -101,10 +165,18 @@ class HypoelasticLaw:
     def modulus(self, name: str, strain: ArrayLike) -> Array:
         """Tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape."""
         first, component = MODULI[name]
-        x = np.asarray(strain, dtype=float)
-        x = np.abs(x) if name == "G12" else x
-        held = np.clip(x, 0.0, self.strain_range[component])
-        return np.asarray(np.polyval(self.beta[first : first + 4], held))
+        coefficients = self.beta[first : first + 4]
+        if self.breaks is not None:
+            rows = self.modulus_rows(name, np.ravel(strain))
+            return np.asarray((rows @ coefficients).reshape(np.shape(strain)))
+        held = held_strain(name, strain, self.strain_range[component])
+        return np.asarray(np.polyval(coefficients, held))
+
+    def modulus_rows(self, name: str, strain: ArrayLike) -> Array:
+        """d modulus / d (its four coefficients) at strains (n,), (n, 4), held ones included."""
+        _, component = MODULI[name]
+        held = held_strain(name, strain, self.strain_range[component])
+        return coefficient_rows(held, None if self.breaks is None else self.breaks[component])
 
     def E1(self, strain: ArrayLike) -> Array:
         """Warp tangent modulus (MPa), Eq. 3.3."""
@@ -129,7 +201,7 @@ class HypoelasticLaw:
             np.ascontiguousarray(np.atleast_2d(a), dtype=float)
             for a in (strain_old, strain_new, stress_old)
         )
-        return _increments(self.beta, self.nu12, self.strain_range, old, new, stress)
+        return _increments(self.beta, self.nu12, self.limits, old, new, stress)
 
     def second_piola_kirchhoff(
         self,
@@ -154,38 +226,36 @@ class HypoelasticLaw:
         zero = np.zeros((len(f), 3))
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
-        return _pull_backs(
-            self.beta, self.nu12, self.strain_range, self.area_power, right, old, stress
-        )
+        return _pull_backs(self.beta, self.nu12, self.limits, self.area_power, right, old, stress)
 
 
 @compiled()
-def _increments(beta, nu, end, old, new, stress_old):  # type: ignore[no-untyped-def]
+def _increments(beta, nu, limits, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
     stress, tangent = np.empty((n, 3)), np.empty((n, 3, 3))
-    slopes, held = np.empty(SLOPES), np.empty(3)
+    slopes = np.empty(SLOPES)
     for i in range(n):
         if not stress_update(
-            beta, nu, end, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes, held
+            beta, nu, limits, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
         ):
             stress[i], tangent[i] = np.nan, np.nan
     return stress, tangent
 
 
 @compiled()
-def _pull_backs(beta, nu, end, power, right, old, stress_old):  # type: ignore[no-untyped-def]
+def _pull_backs(beta, nu, limits, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))
     strain, stress = np.empty((n, 3)), np.empty((n, 3))
     p, law, pull, work = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    slopes, held = np.empty(SLOPES), np.empty(3)
+    slopes = np.empty(SLOPES)
     for i in range(n):
         m = 0.5 * (right[i, 0, 0] + right[i, 1, 1])
         q = 0.5 * (right[i, 0, 0] - right[i, 1, 1])
         c = right[i, 0, 1]
         if not membrane_stress(
-            m, q, c, beta, nu, end, power, old[i], stress_old[i], strain[i], stress[i],
-            pk2[i], stiffness[i], p, law, slopes, held, pull, work,
+            m, q, c, beta, nu, limits, power, old[i], stress_old[i], strain[i], stress[i],
+            pk2[i], stiffness[i], p, law, slopes, pull, work,
         ):  # fmt: skip
             pk2[i], stiffness[i], strain[i], stress[i] = np.nan, np.nan, np.nan, np.nan
     return pk2, stiffness, strain, stress

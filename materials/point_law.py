@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..caching import compiled
+from .point_moduli import increment_modulus
 
 Array = NDArray[np.float64]
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities.
 SLOPES = 13
-(D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, SLOPE1, SLOPE2, SLOPE3, D11_NU, D22_NU) = (
+(D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU) = (
     range(SLOPES)
 )
 # NaN must stay visible (a failed iterate is recognised by it), so no "nnan"/"ninf".
@@ -113,57 +114,33 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
 
 
 @compiled()
-def _cubic(beta: Array, first: int, x: float) -> float:
-    return ((beta[first] * x + beta[first + 1]) * x + beta[first + 2]) * x + beta[first + 3]
-
-
-@compiled()
-def _cubic_slope(beta: Array, first: int, x: float) -> float:
-    return (3.0 * beta[first] * x + 2.0 * beta[first + 1]) * x + beta[first + 2]
-
-
-@compiled()
 def stress_update(
     beta: Array,
     nu: float,
-    end: Array,
+    limits: Array,
     h: Array,
     h_old: Array,
     s_old: Array,
     s_new: Array,
     tangent: Array,
     slopes: Array,
-    held: Array,
 ) -> bool:
-    """One increment of d sigma = D(eps) d eps with the moduli at the midpoint strain.
+    """One increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
-    beta (12,) MPa, end (3,) the ends of the valid strain range; h, h_old (3,) strain, s_old (3,)
-    stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3), slopes (SLOPES,) and
-    held (3,) = the strains at which the moduli were taken. False when a modulus, or
+    beta (12,) MPa, limits (3,) or (9,) as in `point_moduli`; h, h_old (3,) strain, s_old (3,)
+    stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3) and slopes (SLOPES,);
+    BEFORE1.. are the derivatives of the moduli by h_old. False when a modulus, or
     1 - nu12 nu21, is not positive.
     """
-    x1 = 0.5 * (h[0] + h_old[0])
-    x2 = 0.5 * (h[1] + h_old[1])
-    x3 = 0.5 * (h[2] + h_old[2])
-    # Outside the range the coefficients were fitted for, the modulus keeps its end value.
-    e1 = min(max(x1, 0.0), end[0])
-    e2 = min(max(x2, 0.0), end[1])
-    size = abs(x3)
-    e3 = min(size, end[2])
-    shear = _cubic(beta, 0, e3)
-    fill = _cubic(beta, 4, e2)
-    warp = _cubic(beta, 8, e1)
+    warp, warp_slope, warp_before = increment_modulus(beta, limits, 0, h[0], h_old[0])
+    fill, fill_slope, fill_before = increment_modulus(beta, limits, 1, h[1], h_old[1])
+    shear, shear_slope, shear_before = increment_modulus(beta, limits, 2, h[2], h_old[2])
     if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
         return False
     nu_nu = nu * nu * fill / warp
     den = 1.0 - nu_nu
     if not den > 1e-3:
         return False
-    warp_slope = _cubic_slope(beta, 8, e1) if e1 == x1 else 0.0
-    fill_slope = _cubic_slope(beta, 4, e2) if e2 == x2 else 0.0
-    shear_slope = 0.0
-    if e3 == size:
-        shear_slope = _cubic_slope(beta, 0, e3) * (1.0 if x3 >= 0.0 else -1.0)
     inv = 1.0 / den
     d11, d22 = warp * inv, fill * inv
     d12 = nu * d22
@@ -177,19 +154,18 @@ def stress_update(
     s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
     s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
     s_new[2] = s_old[2] + shear * dh2
-    tangent[0, 0] = d11 + 0.5 * warp_slope * (d11_e1 * dh0 + nu * d22_e1 * dh1)
-    tangent[0, 1] = d12 + 0.5 * fill_slope * (d11_e2 * dh0 + nu * d22_e2 * dh1)
-    tangent[1, 0] = d12 + 0.5 * warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
-    tangent[1, 1] = d22 + 0.5 * fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
-    tangent[2, 2] = shear + 0.5 * shear_slope * dh2
+    tangent[0, 0] = d11 + warp_slope * (d11_e1 * dh0 + nu * d22_e1 * dh1)
+    tangent[0, 1] = d12 + fill_slope * (d11_e2 * dh0 + nu * d22_e2 * dh1)
+    tangent[1, 0] = d12 + warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
+    tangent[1, 1] = d22 + fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
+    tangent[2, 2] = shear + shear_slope * dh2
     tangent[0, 2] = tangent[1, 2] = tangent[2, 0] = tangent[2, 1] = 0.0
     slopes[D11], slopes[D12], slopes[D22], slopes[G12] = d11, d12, d22, shear
     slopes[D11_E1], slopes[D11_E2] = d11_e1, d11_e2
     slopes[D22_E1], slopes[D22_E2] = d22_e1, d22_e2
-    slopes[SLOPE1], slopes[SLOPE2], slopes[SLOPE3] = warp_slope, fill_slope, shear_slope
+    slopes[BEFORE1], slopes[BEFORE2], slopes[BEFORE3] = warp_before, fill_before, shear_before
     den_nu = 2.0 * nu * fill / warp * inv2
     slopes[D11_NU], slopes[D22_NU] = warp * den_nu, fill * den_nu
-    held[0], held[1], held[2] = e1, e2, e3
     return True
 
 
@@ -200,7 +176,7 @@ def membrane_stress(
     c: float,
     beta: Array,
     nu: float,
-    end: Array,
+    limits: Array,
     area_power: float,
     h_old: Array,
     s_old: Array,
@@ -211,7 +187,6 @@ def membrane_stress(
     p: Array,
     law_tangent: Array,
     slopes: Array,
-    held: Array,
     pull: Array,
     work: Array,
 ) -> bool:
@@ -223,7 +198,7 @@ def membrane_stress(
     """
     if not log_strain(m, q, c, h, p):
         return False
-    if not stress_update(beta, nu, end, h, h_old, s_old, s_new, law_tangent, slopes, held):
+    if not stress_update(beta, nu, limits, h, h_old, s_old, s_new, law_tangent, slopes):
         return False
     ratio = math.exp(area_power * (h[0] + h[1]))
     t0, t1, t2 = s_new[0], s_new[1], s_new[2]

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .moduli import coefficient_rows
+
 Array = NDArray[np.float64]
 
 #: Strains a modulus. Between two of them a cubic that is positive there can dip by no more than
@@ -17,28 +19,24 @@ GRID = 31
 def modulus_grid(strain_range: Sequence[float], breaks: Array | None = None) -> Array:
     """(3 * GRID, 12): rows times beta are G12, E2, E1 on their strain grids.
 
-    strain_range : ends (eps1, eps2, gamma12); every grid starts at zero strain. breaks : (3, 2) of
-    a tri-linear law.
+    strain_range : ends (eps1, eps2, gamma12); every grid starts at zero strain.
+    breaks : (3, 2) of a tri-linear law: every region that the range reaches is in the grid.
     """
     rows = np.zeros((3 * GRID, 12))
-    for block, end in enumerate(reversed(list(strain_range))):
-        strain = np.linspace(0.0, end, GRID)
-        own = None if breaks is None else breaks[2 - block]
-        part = slice(GRID * block, GRID * (block + 1)), slice(4 * block, 4 * block + 4)
-        rows[part] = coefficient_rows(strain, own)
+    for block, component in enumerate((2, 1, 0)):
+        own = None if breaks is None else breaks[component]
+        part = coefficient_rows(_grid(strain_range[component], own), own)
+        rows[GRID * block : GRID * (block + 1), 4 * block : 4 * block + 4] = part
     return rows
 
 
-def coefficient_rows(strain: Array, breaks: Array | None = None) -> Array:
-    """(n, 4): rows times the four coefficients of a modulus are its values at `strain` (n,) >= 0.
-
-    breaks : (2,) ends of the first two regions of a tri-linear law; its coefficients are nothing,
-    and the moduli of the third, second and first region.
-    """
+def _grid(end: float, breaks: Array | None) -> Array:
     if breaks is None:
-        return np.vander(strain, 4)
-    region = np.searchsorted(breaks, strain, side="right")
-    return np.asarray(np.eye(4)[3 - region])
+        return np.linspace(0.0, end, GRID)
+    # As many strains in a narrow region as in a wide one.
+    knots = np.concatenate([[0.0], breaks[breaks < end], [end]])
+    at = np.linspace(0.0, len(knots) - 1, GRID)
+    return np.interp(at, np.arange(len(knots)), knots)
 
 
 def margins(margin_e: float, margin_g: float) -> Array:

@@ -57,9 +57,9 @@ def test_an_edit_reaches_code_compiled_from_another_file(tmp_path: Path) -> None
         ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
     )
     before = run(tmp_path / "cache", package.parent)
-    law = package / "materials" / "point_law.py"
+    law = package / "materials" / "point_moduli.py"
     text = law.read_text()
-    edited = text.replace("* x + beta[first + 3]", "* x + 2.0 * beta[first + 3]")
+    edited = text.replace("value += beta[first + 3]", "value += 2.0 * beta[first + 3]")
     assert edited != text
     law.write_text(edited)
     assert run(tmp_path / "cache", package.parent) != before

@@ -28,6 +28,10 @@ GPA = [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830
 BETA = 1e3 * np.array([*GPA, -479.622, 212.650, -20.2028, 0.806350])
 CUBIC = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
 LINEAR = HypoelasticLaw.linear(800.0, 400.0, 20.0)
+TRILINEAR = HypoelasticLaw.trilinear(
+    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (40.0, 30.0, 60.0),
+    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
+)  # fmt: skip
 PRESSURES = (0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.3)
 AGREEMENT = 0.003  # of the apex height
 
@@ -54,10 +58,11 @@ def differences(element, model, law):
     [
         ("S8R", 432, CUBIC, PRESSURES),
         ("S8R", 432, LINEAR, PRESSURES),
+        ("S8R", 432, TRILINEAR, PRESSURES),
         ("S4", 1728, LINEAR, PRESSURES),
         ("S4", 3072, CUBIC, PRESSURES[:-1]),
     ],
-    ids=["S8R-cubic", "S8R-linear", "S4-linear", "S4-cubic"],
+    ids=["S8R-cubic", "S8R-linear", "S8R-trilinear", "S4-linear", "S4-cubic"],
 )
 def test_agrees_with_the_membrane(ccx, element, elements, law, pressures):
     apex, field, found, expected = differences(element, bubble(elements, "quarter", pressures), law)

@@ -16,6 +16,7 @@ from bubblefit.solvers.calculix import library
 from bubblefit.solvers.calculix.library import (
     CONSTANTS,
     STATE_VARIABLES,
+    TRILINEAR_CONSTANTS,
     constants,
     material_library,
 )
@@ -31,6 +32,20 @@ LAWS = {
     "incompressible": HypoelasticLaw(BETA, 0.3, np.full(3, 0.13), "incompressible"),
     "linear": HypoelasticLaw.linear(800.0, 140.0, 20.0),
 }
+TRILINEAR = {
+    "moduli": ((800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0)),
+    "breaks": [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
+}
+
+
+def trilinear(**options):
+    return HypoelasticLaw.trilinear(*TRILINEAR["moduli"], TRILINEAR["breaks"], **options)
+
+
+LAWS["tri-linear"] = trilinear()
+# The fill range ends before its second break, the shear range before its first.
+LAWS["tri-linear, held"] = trilinear(strain_range=[0.13, 0.05, 0.008])
+LAWS["tri-linear, incompressible"] = trilinear(thickness_change="incompressible")
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -319,6 +334,30 @@ def test_constants_are_in_the_documented_order():
     assert constants(LAWS["linear"])[16:19] == (1.0, 800.0, 20.0)
 
 
+def test_breaks_come_after_all_the_other_constants():
+    found = constants(LAWS["tri-linear"], 300.0, 25.0, 45.0, 1, True)
+    assert len(found) == TRILINEAR_CONSTANTS and TRILINEAR_CONSTANTS % 8
+    assert found[12:22] == (0.24, 1e9, 1e9, 1e9, 1.0, 300.0, 25.0, 45.0, 1.0, 1.0)
+    assert found[22:] == (0.01, 0.03, 0.02, 0.06, 0.01, 0.04)
+    # What the range ends before is never reached.
+    assert constants(LAWS["tri-linear, held"])[22:] == (0.01, 0.03, 0.02, 1e9, 1e9, 1e9)
+
+
+def test_a_trilinear_path_passes_its_breaks(function):
+    """Otherwise the comparison of random paths would say little."""
+    law = LAWS["tri-linear"]
+    straddled = 0
+    for seed in range(5):
+        point = Point(function, constants(law))
+        for gradient in path(seed):
+            before, state = point.committed[2, 1].copy(), point.call(gradient)[2]
+            regions = [np.searchsorted(b, [abs(before[i]), abs(state[i])])
+                       for i, b in enumerate(law.breaks)]  # fmt: skip
+            straddled += sum(a != b for a, b in regions)
+            point.commit(state)
+    assert straddled > 10
+
+
 def test_constants_that_cannot_be_are_refused():
     with pytest.raises(InputError, match="normal_axis"):
         constants(LAWS["linear"], normal_axis=2)
@@ -414,10 +453,10 @@ def patch_deck(element, law, gradient, increments, angle, orientation):
         ", ".join(map(str, [1, *range(1, len(nodes) + 1)])),
         *orientation.splitlines(),
         f"*MATERIAL, NAME={name}",
-        f"*USER MATERIAL, CONSTANTS={CONSTANTS}",
     ]
     written = [f"{v:.12e}" for v in constants(law, angle=angle)]
-    lines += [", ".join(written[i : i + 8]) for i in range(0, CONSTANTS, 8)]
+    lines.append(f"*USER MATERIAL, CONSTANTS={len(written)}")
+    lines += [", ".join(written[i : i + 8]) for i in range(0, len(written), 8)]
     lines += ["*DEPVAR", str(STATE_VARIABLES)]
     section = f"*{'SOLID' if solid else 'SHELL'} SECTION, ELSET=PATCH, MATERIAL={name}"
     lines.append(section + (", ORIENTATION=WARP" if orientation else ""))
@@ -436,7 +475,15 @@ def patch_deck(element, law, gradient, increments, angle, orientation):
 @pytest.mark.parametrize("element", PATCHES)
 @pytest.mark.parametrize("how", ORIENTATIONS)
 def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element, how):
-    law, increments = LAWS["cubic"], 10
+    check_patch(ccx, tmp_path, element, how, LAWS["cubic"])
+
+
+@pytest.mark.parametrize("element", PATCHES)
+def test_a_patch_in_ccx_under_a_trilinear_law(ccx, tmp_path, element):
+    check_patch(ccx, tmp_path, element, "angle", LAWS["tri-linear"])
+
+
+def check_patch(ccx, tmp_path, element, how, law, increments=10):
     angle, orientation, warp_at = ORIENTATIONS[how]
     gradient = np.eye(3)
     gradient[:2, :2] = [[1.06, 0.03], [0.05, 1.04]]

@@ -66,6 +66,39 @@ def test_round_trip_in_every_unit(
     assert (again.thickness, again.name, again.source) == (thickness, name, source)
 
 
+pairs = arrays(float, (3, 2), elements=st.floats(1e-6, 1.0))
+
+
+@given(
+    moduli=arrays(float, (3, 3), elements=finite),
+    breaks=pairs.filter(lambda b: (b[:, 0] < b[:, 1]).all()),
+    ends=arrays(float, 3, elements=st.floats(1e-3, 10.0)),
+    change=st.sampled_from(["constant", "incompressible"]),
+    unit=st.sampled_from(sorted(UNITS)),
+)
+@settings(max_examples=60, deadline=None)
+def test_a_trilinear_card_goes_round_in_every_unit(
+    moduli: np.ndarray, breaks: np.ndarray, ends: np.ndarray, change: Any, unit: str
+) -> None:
+    law = HypoelasticLaw.trilinear(*moduli, breaks, 0.3, ends, change)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "material.toml"
+        write_card(MaterialCard(law, 0.81), path, unit)
+        text, again = path.read_text(), read_card(path).law
+    assert "tri-linear" in text and "breaks" in text
+    assert again.form == "trilinear"
+    assert (again.breaks == breaks).all() and (again.strain_range == ends).all()
+    assert again.beta == pytest.approx(law.beta, rel=1e-14, abs=0.0)
+    assert (again.nu12, again.thickness_change) == (0.3, change)
+
+
+def test_a_polynomial_card_has_no_breaks(tmp_path: Path) -> None:
+    write_card(MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.81), tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text()
+    assert "breaks" not in text and "tri-linear" not in text
+    assert read_card(tmp_path / "m.toml").law.form == "polynomial"
+
+
 def test_an_unlimited_range_stays_unlimited(tmp_path: Path) -> None:
     write_card(MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.81), tmp_path / "m.toml")
     assert (read_card(tmp_path / "m.toml").law.strain_range == UNLIMITED).all()
@@ -85,12 +118,27 @@ def test_the_good_card_is_good(tmp_path: Path) -> None:
     assert card.law.beta[11] == pytest.approx(800.0)
 
 
+def test_a_good_trilinear_card(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(tomli_w.dumps(with_breaks()))
+    law = read_card(tmp_path / "m.toml").law
+    assert law.form == "trilinear" and law.breaks.tolist() == list(BREAKS.values())
+    assert (law.E1(0.005), law.E1(0.02)) == (800.0, 0.0)
+
+
 def without(key: str) -> dict[str, Any]:
     return {k: v for k, v in GOOD.items() if k != key}
 
 
 def with_coefficient(value: Any) -> dict[str, Any]:
     return {**GOOD, "beta": [*GOOD["beta"][:11], value]}
+
+
+BREAKS = {"warp": [0.01, 0.03], "fill": [0.02, 0.06], "shear": [0.01, 0.04]}
+
+
+def with_breaks(**change: Any) -> dict[str, Any]:
+    kept = {name: pair for name, pair in {**BREAKS, **change}.items() if pair is not None}
+    return {**GOOD, "breaks": kept}
 
 
 BAD = [
@@ -134,6 +182,24 @@ BAD = [
     ({**GOOD, "valid_strain": {"fill": [0.02, 0.1]}}, "valid_strain.fill"),
     ({**GOOD, "valid_strain": {"shear": [0.0, float("nan")]}}, "valid_strain.shear"),
     ({**GOOD, "valid_strain": {"shear": 0.1}}, "valid_strain.shear"),
+    ({**GOOD, "law": 1}, "law"),
+    ({**GOOD, "law": "hypoelastic orthotropic; tri-linear"}, "breaks"),
+    ({**GOOD, "breaks": [0.01, 0.03]}, "breaks"),
+    ({**GOOD, "breaks": {}}, "breaks.warp"),
+    (with_breaks(weft=[0.01, 0.02]), "breaks.weft"),
+    (with_breaks(fill=None), "breaks.fill"),
+    (with_breaks(fill=0.02), "breaks.fill"),
+    (with_breaks(fill=[0.02]), "breaks.fill"),
+    (with_breaks(fill=[0.02, 0.04, 0.06]), "breaks.fill"),
+    (with_breaks(fill=[0.02, "0.04"]), "breaks.fill"),
+    (with_breaks(warp=[0.03, 0.01]), "breaks.warp"),
+    (with_breaks(warp=[0.03, 0.03]), "breaks.warp"),
+    (with_breaks(shear=[0.0, 0.03]), "breaks.shear"),
+    (with_breaks(shear=[-0.01, 0.03]), "breaks.shear"),
+    (with_breaks(shear=[0.01, float("nan")]), "breaks.shear"),
+    (with_breaks(shear=[0.01, float("inf")]), "breaks.shear"),
+    (with_breaks(shear=[10**300, 10**300 + 1]), "breaks"),
+    ({**with_breaks(), "beta": [0.1, *GOOD["beta"][1:]]}, "beta"),
 ]
 
 
@@ -206,7 +272,7 @@ values = st.recursive(
 )  # fmt: skip
 
 
-@given(st.sampled_from(sorted(GOOD)), values)
+@given(st.sampled_from([*sorted(GOOD), "law", "breaks"]), values)
 @settings(max_examples=200, deadline=None)
 def test_any_value_at_any_key_is_read_or_refused(key: str, value: Any) -> None:
     read_bytes(tomli_w.dumps({**GOOD, key: value}).encode())

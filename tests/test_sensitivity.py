@@ -80,6 +80,39 @@ def test_where_the_moduli_are_held() -> None:
         assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
+TRILINEAR = HypoelasticLaw.trilinear(
+    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
+    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
+)  # fmt: skip
+USED = [name for i, name in enumerate(PARAMETERS) if i % 4 or i > 11]
+
+
+@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
+@pytest.mark.parametrize("name", USED)
+def test_each_parameter_of_a_trilinear_law(name: str, thickness_change: str) -> None:
+    """Nine increments: points pass breaks inside of them. A small move, as for held moduli."""
+    law = replace(TRILINEAR, thickness_change=thickness_change)
+    _, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
+    expected = differences(law, name, slope, 1e-4)
+    assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_a_trilinear_law_has_no_derivative_by_what_it_does_not_have() -> None:
+    _, slope = MembraneSolver().run_with_sensitivity(MODEL, TRILINEAR, ["beta_0", "beta_3"])
+    assert not slope[..., 0].any() and slope[..., 1].any()
+
+
+def test_a_trilinear_bubble_hardly_depends_on_the_increments() -> None:
+    few = MembraneSolver(TIGHT).run(MODEL, TRILINEAR)
+    assert len(MODEL.increments) == 9
+    levels = np.interp(np.linspace(0, 9, 73)[1:], range(10), [0, *MODEL.increments])
+    many = MembraneSolver(TIGHT).run(replace(MODEL, increments=levels), TRILINEAR)
+    reached = many.strain_max
+    assert (reached > TRILINEAR.breaks[:, 1]).all()
+    apex = MODEL.mesh.node_sets["apex"][0]
+    assert few.displacement[:, apex, 2] == pytest.approx(many.displacement[:, apex, 2], rel=1e-4)
+
+
 def test_all_at_once_equals_one_by_one() -> None:
     solver = MembraneSolver(TIGHT)
     assert isinstance(solver, DifferentiatingSolver)

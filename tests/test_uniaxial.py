@@ -18,6 +18,7 @@ from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
 from bubblefit.solvers.base import PARAMETERS
 from bubblefit.solvers.calculix.proof import BARS, bar_law
+from bubblefit.solvers.membrane import newton
 from bubblefit.solvers.membrane.driven import Pull
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -32,6 +33,11 @@ LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2))
 WARP, FILL, BIAS = (20.022, 23.329), (22.780, 28.721), (19.767, 30.734)
 WIDTH, THICKNESS = 25.0, 0.81
 TIGHT = 1e-11
+# Three regions of every strain, with breaks that the strips pass.
+TRILINEAR = HypoelasticLaw.trilinear(
+    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
+    [[0.01, 0.03], [0.02, 0.06], [0.05, 0.2]],
+)  # fmt: skip
 BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
 STRAIGHT = pytest.mark.parametrize("direction", ["warp", "fill"])
 
@@ -186,6 +192,27 @@ def test_increments_converge_to_the_integral_with_second_order(direction: str) -
     assert orders == pytest.approx(2.0, abs=0.1)
 
 
+@STRAIGHT
+@BOTH
+@pytest.mark.parametrize("increments", [1, 2, 9, 100])
+def test_a_trilinear_strip_is_exact_in_any_number_of_increments(
+    direction: str, thickness_change: str, increments: int
+) -> None:
+    law = replace(TRILINEAR, thickness_change=thickness_change)
+    model = straight(direction, increments)
+    name, first = ("E1", 8) if direction == "warp" else ("E2", 4)
+    a, b = law.breaks[0 if direction == "warp" else 1]
+    low, middle, high = law.beta[first + 3], law.beta[first + 2], law.beta[first + 1]
+    strain = np.log1p(np.array(model.elongations) / model.gauge_length)
+    assert strain[-1] > b and law.modulus(name, strain[-1]) == high
+    stress = low * np.minimum(strain, a) + middle * (np.clip(strain, a, b) - a)
+    stress += high * np.maximum(strain - b, 0.0)
+    across = -law.nu12 * (strain if direction == "warp" else stress / law.E1(0.0))
+    section = -strain if thickness_change == "incompressible" else across
+    load = stress * WIDTH * THICKNESS * np.exp(section)
+    assert MembraneSolver(TIGHT).run(model, law).load == pytest.approx(load, rel=1e-9)
+
+
 @pytest.mark.parametrize("bar", BARS, ids=lambda bar: f"{bar.model}-{bar.direction}")
 def test_the_end_stresses_of_marc(bar) -> None:
     """Cauchy stress from the load of the strip and its width at the end; published to 5 digits."""
@@ -302,9 +329,12 @@ def test_a_fine_strip_fails_where_its_corners_leave_the_modulus_positive() -> No
 
 
 def differences(
-    model: UniaxialModel, law: HypoelasticLaw, name: str, scale: float
+    model: UniaxialModel, law: HypoelasticLaw, name: str, scale: float, move: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Extrapolated central differences of load and displacement; `scale` is N per MPa."""
+    """Extrapolated central differences of load and displacement; `scale` is N per MPa.
+
+    The step moves the load by `move` N.
+    """
 
     def central(step: float) -> list[np.ndarray]:
         ends = []
@@ -321,19 +351,21 @@ def differences(
             for field in ("load", "displacement")
         ]
 
-    step = 0.05 / scale
+    step = move / scale
     fine, coarse = central(step / 2), central(step)
     load, displacement = ((4 * a - b) / 3 for a, b in zip(fine, coarse, strict=True))
     return load, displacement
 
 
-def check_derivatives(model: UniaxialModel, law: HypoelasticLaw, names: list[str]) -> None:
+def check_derivatives(
+    model: UniaxialModel, law: HypoelasticLaw, names: list[str], move: float = 0.05
+) -> None:
     history, slope = MembraneSolver(1e-12).run_with_sensitivity(model, law, names)
     assert history.load_slope is not None
     assert history.load_slope.shape == (len(model.elongations), len(names))
     for j, name in enumerate(names):
         largest = np.abs(history.load_slope[:, j]).max()
-        load, displacement = differences(model, law, name, largest)
+        load, displacement = differences(model, law, name, largest, move)
         assert np.abs(history.load_slope[:, j] - load).max() < 1e-5 * largest, name
         size = np.abs(displacement).max()
         # Where a parameter moves next to nothing, differences are rounding.
@@ -360,6 +392,23 @@ def test_derivatives_of_the_bias_strip(name: str) -> None:
 def test_derivatives_of_an_incompressible_bias_strip() -> None:
     law = replace(LAW, thickness_change="incompressible")
     check_derivatives(bias(8, across=4, along=12), law, ["beta_1", "beta_5", "beta_11", "nu12"])
+
+
+@STRAIGHT
+def test_derivatives_of_the_trilinear_strips(direction: str) -> None:
+    own = [f"beta_{i}" for i in (range(9, 12) if direction == "warp" else range(5, 8))]
+    check_derivatives(straight(direction, 10), TRILINEAR, [*own, "nu12"])
+
+
+@pytest.mark.parametrize(
+    "name", [name for i, name in enumerate(PARAMETERS[:13]) if i % 4 or i > 11]
+)
+def test_derivatives_of_the_trilinear_bias_strip(name: str) -> None:
+    """In eight increments most points pass a break inside of one.
+
+    A small move, so that next to no point passes from one side of a break to the other.
+    """
+    check_derivatives(bias(8, across=4, along=12), TRILINEAR, [name], 0.001)
 
 
 def test_the_gauge_does_not_move_with_the_parameters() -> None:
@@ -425,6 +474,22 @@ def test_cut_back_does_not_change_the_result(
     found = MembraneSolver(TIGHT).run(model, LAW)
     assert len(set(calls)) > len(model.elongations)
     assert found.load == pytest.approx(expected.load, rel=1e-8)
+
+
+#: Full steps of Newton go to and fro between two sides of a break.
+RESTLESS = HypoelasticLaw.trilinear(
+    (1421.0, 379.0, 817.0), (61.0, 123.0, 447.0), (64.0, 46.0, 20.0),
+    [[0.0032, 0.0567], [0.0719, 0.0722], [0.0619, 0.0653]],
+)  # fmt: skip
+
+
+def test_newton_gets_past_moduli_that_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = bias(20)
+    history = MembraneSolver(TIGHT).run(model, RESTLESS)
+    assert (np.diff(history.load) > 0).all()
+    monkeypatch.setattr(newton, "MOST_FRUITLESS", newton.MOST_ITERATIONS + 1)
+    with pytest.raises(SolverFailure, match="no equilibrium"):
+        MembraneSolver(TIGHT).run(model, RESTLESS)
 
 
 def test_one_solver_for_strips_and_bubble() -> None:

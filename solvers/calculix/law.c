@@ -3,7 +3,7 @@
  * materials/point_law.py, function by function; tests/test_calculix_law.py compares the two.
  *
  * One increment goes from the committed state (*DEPVAR) to the end of the increment:
- *   F -> C = F'F in the material frame -> log strain -> d sigma = D(midpoint) d eps
+ *   F -> C = F'F in the material frame -> log strain -> d sigma = D d eps (moduli: `modulus`)
  *     -> S = J2^power U^-1 sigma U^-1 and dS/dE (CalculiX takes the symmetric part only).
  * The normal direction and the transverse shears are linear and do not couple (nu13 = nu23 = 0),
  * so that an expanded shell behaves in its plane as the membrane does and keeps its thickness.
@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { /* *USER MATERIAL, CONSTANTS=22: the order of library.py */
+enum { /* *USER MATERIAL, CONSTANTS=22, or 28 for a tri-linear law: the order of library.py */
     BETA = 0,           /* 12 coefficients, MPa: G12, E2, E1, highest power first (Eqs 3.1-3.3) */
     NU12 = 12,
     RANGE_END = 13,     /* 3: eps1, eps2, gamma12, where the moduli are held */
@@ -24,11 +24,15 @@ enum { /* *USER MATERIAL, CONSTANTS=22: the order of library.py */
     ANGLE = 19,         /* degrees from the first in-plane axis to warp, about the normal */
     NORMAL_AXIS = 20,   /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
     WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number */
-    CONSTANTS = 22
+    CONSTANTS = 22,
+    BREAKS = 22,        /* 6, tri-linear: two strains each of eps1, eps2, gamma12, where the
+                           modulus changes from coefficient 4 of its block to 3 and to 2 */
+    TRILINEAR_CONSTANTS = 28
 };
 enum { STATES = 6 };    /* *DEPVAR: eps1, eps2, gamma12, sigma1, sigma2, tau12 (material frame) */
 
 static const double SMALLER_INCREMENT = 0.5;
+static const double TINY = 1e-12; /* a change of strain that is rounding */
 
 static double dot(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -120,21 +124,62 @@ static int log_strain(double m, double q, double c, double *h, double p[3][3]) {
     return 1;
 }
 
-/* A cubic (highest power first) at x held to [0, end]; its slope is nothing where held. */
-static double modulus(const double *b, double x, double end, double *slope) {
-    double held = x < 0 ? 0 : x > end ? end : x;
-    *slope = held == x ? (3 * b[0] * x + 2 * b[1]) * x + b[2] : 0;
-    return ((b[0] * held + b[1]) * held + b[2]) * held + b[3];
+/* A modulus over one increment, and its slope by the strain at the end of it. */
+typedef struct {
+    double value, slope;
+} Modulus;
+
+/* A cubic (highest power first) at the midpoint, held to [0, end]; no slope where held. */
+static Modulus cubic(const double *b, double x, double x_old, double end, int even) {
+    double mid = 0.5 * (x + x_old), size = even ? fabs(mid) : mid;
+    double held = size < 0 ? 0 : size > end ? end : size;
+    Modulus m = {((b[0] * held + b[1]) * held + b[2]) * held + b[3], 0};
+    if (held == size) m.slope = 0.5 * ((3 * b[0] * held + 2 * b[1]) * held + b[2]);
+    if (even && mid < 0) m.slope = -m.slope;
+    return m;
 }
 
-/* s = s_old + D(midpoint) (h - h_old) and d = ds/dh; 0 when a modulus or 1 - nu12 nu21 is not
- * positive. */
-static int stress_update(const double *k, const double *h, const double *h_old,
-                         const double *s_old, double *s, double d[3][3]) {
-    double nu = k[NU12], slope1, slope2, slope3, mid = 0.5 * (h[2] + h_old[2]);
-    double shear = modulus(k + BETA, fabs(mid), k[RANGE_END + 2], &slope3);
-    double fill = modulus(k + BETA + 4, 0.5 * (h[1] + h_old[1]), k[RANGE_END + 1], &slope2);
-    double warp = modulus(k + BETA + 8, 0.5 * (h[0] + h_old[0]), k[RANGE_END], &slope1);
+/* A tri-linear modulus at a strain: b[3] up to the first break, then b[2], then b[1]. */
+static double in_region(const double *b, double x, const double *breaks, int even) {
+    double size = even ? fabs(x) : x;
+    return size <= breaks[0] ? b[3] : size <= breaks[1] ? b[2] : b[1];
+}
+
+/* Part of the way from x_old to x that is below a break (in size, where even). */
+static double way_below(double at, double x, double x_old, int even) {
+    double low = even ? -at : -HUGE_VAL;
+    return (fmin(fmax(x, low), at) - fmin(fmax(x_old, low), at)) / (x - x_old);
+}
+
+/* Its mean over the increment: continuous in x, where the value at the midpoint would jump. */
+static Modulus mean(const double *b, double x, double x_old, const double *breaks, int even) {
+    double change = x - x_old;
+    Modulus m = {in_region(b, 0.5 * (x + x_old), breaks, even), 0};
+    if (fabs(change) < TINY) return m;
+    double below = way_below(breaks[0], x, x_old, even);
+    double within = way_below(breaks[1], x, x_old, even);
+    m.value = below * b[3] + (within - below) * b[2] + (1 - within) * b[1];
+    m.slope = (in_region(b, x, breaks, even) - m.value) / change;
+    return m;
+}
+
+/* E1, E2 or G12: component 0, 1, 2. */
+static Modulus modulus(const double *k, const double *breaks, int component, const double *h,
+                       const double *h_old) {
+    const double *b = k + BETA + 8 - 4 * component;
+    double x = h[component], x_old = h_old[component];
+    if (breaks) return mean(b, x, x_old, breaks + 2 * component, component == 2);
+    return cubic(b, x, x_old, k[RANGE_END + component], component == 2);
+}
+
+/* s = s_old + D (h - h_old) and d = ds/dh; 0 when a modulus or 1 - nu12 nu21 is not positive. */
+static int stress_update(const double *k, const double *breaks, const double *h,
+                         const double *h_old, const double *s_old, double *s, double d[3][3]) {
+    double nu = k[NU12];
+    Modulus e1 = modulus(k, breaks, 0, h, h_old), e2 = modulus(k, breaks, 1, h, h_old);
+    Modulus g12 = modulus(k, breaks, 2, h, h_old);
+    double warp = e1.value, fill = e2.value, shear = g12.value;
+    double slope1 = e1.slope, slope2 = e2.slope, slope3 = g12.slope;
     if (!(shear > 0 && fill > 0 && warp > 0)) return 0;
     double ratio = nu * nu / warp, den = 1 - ratio * fill;
     if (!(den > 1e-3)) return 0;
@@ -146,11 +191,11 @@ static int stress_update(const double *k, const double *h, const double *h_old,
     s[0] = s_old[0] + d11 * dh[0] + d12 * dh[1];
     s[1] = s_old[1] + d12 * dh[0] + d22 * dh[1];
     s[2] = s_old[2] + shear * dh[2];
-    d[0][0] = d11 + 0.5 * slope1 * (d11_warp * dh[0] + nu * d22_warp * dh[1]);
-    d[0][1] = d12 + 0.5 * slope2 * (d11_fill * dh[0] + nu * d22_fill * dh[1]);
-    d[1][0] = d12 + 0.5 * slope1 * (nu * d22_warp * dh[0] + d22_warp * dh[1]);
-    d[1][1] = d22 + 0.5 * slope2 * (nu * d22_fill * dh[0] + d22_fill * dh[1]);
-    d[2][2] = shear + 0.5 * slope3 * (mid < 0 ? -1 : 1) * dh[2];
+    d[0][0] = d11 + slope1 * (d11_warp * dh[0] + nu * d22_warp * dh[1]);
+    d[0][1] = d12 + slope2 * (d11_fill * dh[0] + nu * d22_fill * dh[1]);
+    d[1][0] = d12 + slope1 * (nu * d22_warp * dh[0] + d22_warp * dh[1]);
+    d[1][1] = d22 + slope2 * (nu * d22_fill * dh[0] + d22_fill * dh[1]);
+    d[2][2] = shear + slope3 * dh[2];
     d[0][2] = d[1][2] = d[2][0] = d[2][1] = 0;
     return 1;
 }
@@ -178,12 +223,13 @@ static void pull_back(double m, double q, double c, const double *t, double *s, 
 }
 
 /* In-plane S = (S11, S22, S12), g = dS/dE with engineering shear, and the new state. */
-static int membrane_stress(const double *k, double c11, double c22, double c12, const double *old,
-                           double *state, double *s, double g[3][3]) {
+static int membrane_stress(const double *k, const double *breaks, double c11, double c22,
+                           double c12, const double *old, double *state, double *s,
+                           double g[3][3]) {
     double m = 0.5 * (c11 + c22), q = 0.5 * (c11 - c22), p[3][3], d[3][3], w[3][3], t[3];
     double *h = state, *sigma = state + 3;
     if (!log_strain(m, q, c12, h, p)) return 0;
-    if (!stress_update(k, h, old, old + 3, sigma, d)) return 0;
+    if (!stress_update(k, breaks, h, old, old + 3, sigma, d)) return 0;
     double power = k[AREA_POWER], ratio = exp(power * (h[0] + h[1]));
     for (int i = 0; i < 3; i++) t[i] = ratio * sigma[i];
     pull_back(m, q, c12, t, s, w, g);
@@ -213,12 +259,14 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
     (void)amat, (void)emec, (void)emec0, (void)beta, (void)xokl, (void)voj, (void)vj;
     (void)ithermal, (void)t1l, (void)dtime, (void)ielas, (void)ipkon;
     (void)size;
-    if (*kode != -100 - CONSTANTS || *nstate < STATES) {
-        printf(" *ERROR in HYPOELASTIC: %d constants and *DEPVAR %d are needed, not %d and %d\n",
-               CONSTANTS, STATES, -100 - *kode, *nstate);
+    int given = -100 - *kode;
+    if ((given != CONSTANTS && given != TRILINEAR_CONSTANTS) || *nstate < STATES) {
+        printf(" *ERROR in HYPOELASTIC: %d or %d constants and *DEPVAR %d are needed, "
+               "not %d and %d\n", CONSTANTS, TRILINEAR_CONSTANTS, STATES, given, *nstate);
         exit(201);
     }
     const double *const k = constants, e3 = k[NORMAL_MODULUS], g3 = k[TRANSVERSE_SHEAR];
+    const double *breaks = given == TRILINEAR_CONSTANTS ? k + BREAKS : 0;
     size_t place = (size_t)*nstate * ((size_t)mi[0] * (*iel - 1) + (*iint - 1));
     const double *old = xstateini + place;
     double a[3][3], f[3][3], state[STATES] = {0}, plane[3], g[3][3];
@@ -228,7 +276,7 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
         for (int i = 0; i < 3; i++)
             f[n][i] = xkl[i] * a[n][0] + xkl[i + 3] * a[n][1] + xkl[i + 6] * a[n][2];
     double c11 = dot(f[0], f[0]), c22 = dot(f[1], f[1]), c12 = dot(f[0], f[1]);
-    int good = membrane_stress(k, c11, c22, c12, old, state, plane, g);
+    int good = membrane_stress(k, breaks, c11, c22, c12, old, state, plane, g);
     double normal = 0.5 * (dot(f[2], f[2]) - 1);
     double shear1 = dot(f[0], f[2]), shear2 = dot(f[1], f[2]);
     good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);

@@ -25,6 +25,8 @@ STATE_VARIABLES = 6
 LEAST = 1e-3
 #: `*USER MATERIAL, CONSTANTS=`. Never a multiple of 8: CalculiX reads one more line then.
 CONSTANTS = 22
+#: The same and the breaks of a tri-linear law.
+TRILINEAR_CONSTANTS = 28
 
 SOURCE = Path(__file__).with_name("law.c")
 # No contraction: the same rounding on every machine.
@@ -39,10 +41,11 @@ def constants(
     normal_axis: int = 3,
     whole_times: bool = False,
 ) -> tuple[float, ...]:
-    """The constants of `*USER MATERIAL` (22,), in the order of `law.c`.
+    """The constants of `*USER MATERIAL`, (22,) or (28,) for a tri-linear law, as `law.c` has them.
 
     beta (12, MPa), nu12, ends of the strain range (3), area power, normal modulus (MPa),
-    transverse shear modulus (MPa), angle (degrees), normal axis, whole times.
+    transverse shear modulus (MPa), angle (degrees), normal axis, whole times; then, tri-linear,
+    the breaks of eps1, eps2, gamma12 (6; 1e9 where the modulus is held before it).
 
     Parameters
     ----------
@@ -75,7 +78,8 @@ def constants(
     ends = (float(end) for end in law.strain_range)
     coefficients = (float(b) for b in law.beta)
     through = (law.area_power, normal_modulus, transverse_shear, float(angle), float(normal_axis))
-    return (*coefficients, law.nu12, *ends, *through, float(whole_times))
+    breaks = (float(strain) for strain in law.limits[3:])
+    return (*coefficients, law.nu12, *ends, *through, float(whole_times), *breaks)
 
 
 def compiler() -> list[str]:

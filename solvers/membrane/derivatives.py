@@ -35,7 +35,7 @@ class Derivatives:
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         explicit(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.thickness, law.beta, law.nu12,
-            law.strain_range, law.area_power, m.strain_old, m.stress_old, self.which,
+            law.limits, law.area_power, m.strain_old, m.stress_old, self.which,
             self.strain, self.stress, self.fresh, self.point, self.rate,
         )  # fmt: skip
         return self.rate

@@ -41,7 +41,7 @@ def metric(f):  # type: ignore[no-untyped-def]
 @compiled(fastmath=FAST)
 def assemble(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure,
-    beta, nu, end, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
+    beta, nu, limits, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
 ):  # fmt: skip
     """Internal minus pressure forces at `position`, and the tangent.
 
@@ -57,7 +57,7 @@ def assemble(  # type: ignore[no-untyped-def]
         data[:] = 0.0
     p, law = np.empty((3, 3)), np.empty((3, 3))
     pull, work, stiff = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    pk2, held, steep = np.empty(3), np.empty(3), np.empty(SLOPES)
+    pk2, steep = np.empty(3), np.empty(SLOPES)
     x, f = np.empty((4, 3)), np.empty((2, 3))
     left = np.empty((3, 12))  # rows: a_m K00 + d_m K01
     right = np.empty((3, 12))
@@ -78,8 +78,8 @@ def assemble(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             if not membrane_stress(
-                m, q, c, beta, nu, end, power, h_old[e, g], s_old[e, g], h_new[e, g],
-                s_new[e, g], pk2, stiff, p, law, steep, held, pull, work,
+                m, q, c, beta, nu, limits, power, h_old[e, g], s_old[e, g], h_new[e, g],
+                s_new[e, g], pk2, stiff, p, law, steep, pull, work,
             ):  # fmt: skip
                 return -1.0
             wt = area[e, g] * thickness

@@ -25,6 +25,9 @@ CHORD_GAIN = 0.15
 # rounding (fine meshes at low pressure reach 1e-8): the iterate is as good as it gets.
 ROUNDING_BELOW = 1e-6
 MOST_IDLE = 3
+# The tangent of a tri-linear law jumps where a point passes a break, and full steps can go to and
+# fro between two sides for ever. After this many without progress every step has to make some.
+MOST_FRUITLESS = 3
 
 
 @dataclass(eq=False)
@@ -64,7 +67,7 @@ class Membrane:
         law, e = self.law, self.elements
         force = assemble(
             self.reference + u, self.quads, e.values, e.slopes, e.area, self.thickness, pressure,
-            law.beta, law.nu12, law.strain_range, law.area_power, self.strain_old,
+            law.beta, law.nu12, law.limits, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
         )  # fmt: skip
@@ -100,6 +103,7 @@ class Membrane:
         step = before = np.empty(0)
         last, scale, backtracks, chord = np.inf, 1.0, 0, False
         least, idle = np.inf, 0
+        jumps, fruitless = self.law.breaks is not None, 0
         for _ in range(MOST_ITERATIONS):
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             if norm < self.tolerance:
@@ -107,8 +111,9 @@ class Membrane:
             idle = idle + 1 if 0.5 * least < norm < ROUNDING_BELOW else 0
             if idle >= MOST_IDLE:
                 return u
+            fruitless = fruitless + 1 if jumps and norm > 0.5 * least else 0
             least = min(least, norm)
-            worse = norm > 20.0 * last + 1e-3
+            worse = norm > (20.0 * last + 1e-3 if fruitless < MOST_FRUITLESS else last)
             if len(step) and worse and backtracks < MOST_BACKTRACKS:
                 scale, backtracks, chord = 0.35 * scale, backtracks + 1, False
                 flat[self.free] = before + scale * step

@@ -11,6 +11,9 @@ import numpy as np
 
 from ...caching import compiled
 from ...materials.point_law import (
+    BEFORE1,
+    BEFORE2,
+    BEFORE3,
     D11,
     D11_E1,
     D11_E2,
@@ -22,12 +25,10 @@ from ...materials.point_law import (
     D22_NU,
     FAST,
     G12,
-    SLOPE1,
-    SLOPE2,
-    SLOPE3,
     SLOPES,
     membrane_stress,
 )
+from ...materials.point_moduli import by_coefficients
 from .kernel import base_vectors, metric
 
 #: Column numbers of solvers.base.PARAMETERS.
@@ -38,7 +39,7 @@ POINT = 24
 
 @compiled(fastmath=FAST)
 def explicit(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, beta, nu, end, power,
+    position, quads, values, slopes, area, thickness, beta, nu, limits, power,
     h_old, s_old, which, dh_old, ds_old, ds_new, point, rate,
 ):  # fmt: skip
     """Derivative of the residual at fixed displacement.
@@ -50,7 +51,7 @@ def explicit(  # type: ignore[no-untyped-def]
     count = len(which)
     rate[:] = 0.0
     h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
-    held, steep = np.empty(3), np.empty(SLOPES)
+    row, steep = np.empty(12), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))
     x, f = np.empty((4, 3)), np.empty((2, 3))
@@ -75,17 +76,13 @@ def explicit(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, beta, nu, end, power, h_old[e, g], s_old[e, g], h, s_new,
-                pk2, stiff, p, law, steep, held, pull, work,
+                m, q, c, beta, nu, limits, power, h_old[e, g], s_old[e, g], h, s_new,
+                pk2, stiff, p, law, steep, pull, work,
             )  # fmt: skip
+            by_coefficients(limits, h, h_old[e, g], row)
             for j in range(count):
-                b = which[j]
-                if b < 4:
-                    own[2, j] = held[2] ** (3 - b)
-                elif b < 8:
-                    own[1, j] = held[1] ** (7 - b)
-                elif b < 12:
-                    own[0, j] = held[0] ** (11 - b)
+                if which[j] < 12:
+                    own[2 - which[j] // 4, j] = row[which[j]]
             dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
             wt = area[e, g] * thickness
             for i in range(3):
@@ -95,9 +92,9 @@ def explicit(  # type: ignore[no-untyped-def]
             after = ds_new[e, g]
             for j in range(count):
                 o0, o1, o2 = old[0, j], old[1, j], old[2, j]
-                warp = own[0, j] + 0.5 * o0 * steep[SLOPE1]
-                fill = own[1, j] + 0.5 * o1 * steep[SLOPE2]
-                shear = own[2, j] + 0.5 * o2 * steep[SLOPE3]
+                warp = own[0, j] + o0 * steep[BEFORE1]
+                fill = own[1, j] + o1 * steep[BEFORE2]
+                shear = own[2, j] + o2 * steep[BEFORE3]
                 d11 = steep[D11_E1] * warp + steep[D11_E2] * fill + by_nu[j] * steep[D11_NU]
                 d22 = steep[D22_E1] * warp + steep[D22_E2] * fill + by_nu[j] * steep[D22_NU]
                 d12 = nu * d22 + by_nu[j] * steep[D22]
