@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
+from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
 from ..base import History
 from ..membrane.element import reference_elements
@@ -26,10 +27,7 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
     ------
     SolverFailure : the file is not there, damaged, or does not hold every increment.
     """
-    try:
-        u, nodal = _steps(path, len(model.increments), len(shells.points))
-    except InputError as error:
-        raise SolverFailure(f"no usable results: {error}", "calculix") from None
+    u, nodal = whole_times(path, len(model.increments), len(shells.points))
     keep, levels = model.reported, np.array(model.increments)
     reactions: dict[str, Array] = {
         name: np.zeros((len(keep), 3)) for name in model.supports if name in shells.node_sets
@@ -40,30 +38,53 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
         for name, sums in reactions.items():
             sums[frame] = support[shells.node_sets[name]].sum(axis=0)
     corners = np.ascontiguousarray(u[:, : shells.corners])
-    strain = np.array([log_strain(model, moved) for moved in corners])
     return History(
         levels[keep],
         corners[keep],
-        np.minimum(strain.min(axis=(0, 1, 2)), 0.0),
-        np.maximum(strain.max(axis=(0, 1, 2)), 0.0),
+        *extremes(log_strain(model.mesh, corners)),
         reactions,
         iterations=iterations,
         path=corners,
     )
 
 
-def log_strain(model: BubbleModel, displacement: Array) -> Array:
-    """(quads, 4, 3) log strain (eps1, eps2, gamma12) at the Gauss points of the four-node mesh."""
-    points, quads = np.asarray(model.mesh.points, float), np.asarray(model.mesh.quads)
-    slopes = reference_elements(points, quads).slopes
-    gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])
-    values, axes = np.linalg.eigh(np.einsum("mpki,mpkj->mpij", gradient, gradient))
-    h = np.einsum("mpia,mpa,mpja->mpij", axes, 0.5 * np.log(values), axes)
-    return np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1)
+def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> Array:
+    """(frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
+
+    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; x unless given.
+    """
+    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
+    slopes = reference_elements(points, quads, yarn).slopes
+    frames = []
+    for displacement in displacements:
+        gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])
+        values, axes = np.linalg.eigh(np.einsum("mpki,mpkj->mpij", gradient, gradient))
+        h = np.einsum("mpia,mpa,mpja->mpij", axes, 0.5 * np.log(values), axes)
+        frames.append(np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1))
+    return np.array(frames)
 
 
-def _steps(path: Path, steps: int, nodes: int) -> tuple[Array, Array]:
-    """Displacement and nodal force at the end of every step, (steps, nodes, 3) each."""
+def extremes(strain: Array) -> tuple[Array, Array]:
+    """Least and largest of each of the last axis' components, the unstrained start included."""
+    flat = strain.reshape(-1, strain.shape[-1])
+    return np.minimum(flat.min(axis=0), 0.0), np.maximum(flat.max(axis=0), 0.0)
+
+
+def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
+    """Displacement and nodal force at the total times 1 to `count`, (count, nodes, 3) each.
+
+    Raises
+    ------
+    SolverFailure : the file is not there, damaged, or does not hold every one of them.
+    """
+    try:
+        return _whole_times(path, count, nodes)
+    except InputError as error:
+        raise SolverFailure(f"no usable results: {error}", "calculix") from None
+
+
+def _whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
     file = FrdFile(path)
     place = np.searchsorted(file.mesh.numbers, np.arange(1, nodes + 1))
     place = np.minimum(place, len(file.mesh.numbers) - 1)
@@ -71,11 +92,11 @@ def _steps(path: Path, steps: int, nodes: int) -> tuple[Array, Array]:
         raise InputError(path, "nodes", f"are not the deck's {nodes}")
     frames = {round(f.time): f for f in file.frames() if abs(f.time - round(f.time)) < NEAR}
     found = []
-    for step in range(1, steps + 1):
+    for step in range(1, count + 1):
         for name in ("DISP", "FORC"):
             values = frames[step].fields.get(name) if step in frames else None
             if values is None or not np.isfinite(values[place]).all():
-                raise InputError(path, f"step {step} of {steps}", f"holds no {name} at every node")
+                raise InputError(path, f"step {step} of {count}", f"holds no {name} at every node")
             found.append(values[place])
-    whole = np.array(found).reshape(steps, 2, nodes, 3)
+    whole = np.array(found).reshape(count, 2, nodes, 3)
     return whole[:, 0], whole[:, 1]

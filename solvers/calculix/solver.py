@@ -5,15 +5,17 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
+from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
 from ..process import log_tail, run_process
 from ..scratch import fresh_folder, put_aside, remove
-from .bubble import decks
+from . import bubble, strip
 from .executable import ADVICE, Executable, find_ccx
 from .library import material_library
 from .reasons import Increment, increments, reason
@@ -24,6 +26,10 @@ log = logging.getLogger(__name__)
 
 JOB = "job"
 TIMEOUT_S = 3600.0
+Model = BubbleModel | UniaxialModel
+T = TypeVar("T")
+#: Makes something of the .frd file and the number of iterations.
+Reader = Callable[[Path, int], T]
 
 
 class CalculixSolver:
@@ -87,29 +93,41 @@ class CalculixSolver:
 
     def run(
         self,
-        model: BubbleModel,
+        model: Model,
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate the model.
+        """Inflate or pull the model.
 
         Parameters
         ----------
         scratch : the folder below which the run's own is made.
-        timeout : s.
+        timeout : s, of one run of ccx.
 
         Raises
         ------
         SolverFailure : it did not end well; the scratch folder is kept and named.
         InputError : a template that cannot be used, a ccx that cannot be started.
         """
-        program, library = self.executable().path, material_library()
         shells = self._shell_mesh(model)
-        files = decks(model, law, shells, self.element, self.templates)
-        folder = fresh_folder("ccx", scratch or self.scratch)
+
+        def once(files: dict[str, str], read: Reader[T]) -> T:
+            return self._once(files, read, scratch or self.scratch, timeout or self.timeout)
+
+        if isinstance(model, UniaxialModel):
+            return strip.analyse(model, law, shells, self.element, self.templates, once)
+        files = bubble.decks(model, law, shells, self.element, self.templates)
+        return once(files, lambda frd, n: bubble_history(frd, model, shells, n))
+
+    def _once(
+        self, files: dict[str, str], read: Reader[T], parent: Path | None, timeout: float
+    ) -> T:
+        """One run in a fresh scratch folder; what `read` makes of it."""
+        program, library = self.executable().path, material_library()
+        folder = fresh_folder("ccx", parent)
         try:
-            history = self._in(folder, program, library, files, timeout or self.timeout, model)
+            found = self._in(folder, program, library, files, timeout, read)
         except SolverFailure as failure:
             kept = put_aside(folder)
             log.info("failed run kept in %s", kept)
@@ -124,7 +142,7 @@ class CalculixSolver:
             log.info("run kept in %s", folder)
         else:
             remove(folder)
-        return history
+        return found
 
     def _in(
         self,
@@ -133,8 +151,8 @@ class CalculixSolver:
         library: Path,
         files: dict[str, str],
         timeout: float,
-        model: BubbleModel,
-    ) -> History:
+        read: Reader[T],
+    ) -> T:
         """One run in a folder that is empty at its start."""
         try:
             for name, text in files.items():
@@ -161,9 +179,9 @@ class CalculixSolver:
         if problem is not None:
             raise SolverFailure(problem, self.name, outcome.exit_code)
         iterations = sum(i.iterations for i in increments(sta))
-        return bubble_history(folder / f"{JOB}.frd", model, self._shell_mesh(model), iterations)
+        return read(folder / f"{JOB}.frd", iterations)
 
-    def _shell_mesh(self, model: BubbleModel) -> ShellMesh:
+    def _shell_mesh(self, model: Model) -> ShellMesh:
         if self._shells is None or self._shells[0] is not model.mesh:
             self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
         return self._shells[1]
