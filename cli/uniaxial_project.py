@@ -34,7 +34,11 @@ class UniaxialProject(FitProject):
 
 
 def read_uniaxial(
-    path: Path, data_folder: Path | None = None, need_data: bool = True
+    path: Path,
+    data_folder: Path | None = None,
+    need_data: bool = True,
+    moduli: str | None = None,
+    match: Literal["polynomial", "points"] | None = None,
 ) -> UniaxialProject:
     """Read a project file (TOML) and its load curves.
 
@@ -42,6 +46,7 @@ def read_uniaxial(
     ----------
     data_folder : where measured files lie; replaces `uniaxial.data.folder`.
     need_data : whether measured files must be there (a forward analysis does without).
+    moduli, match : in the place of `material.moduli` and `uniaxial.match`.
 
     Raises
     ------
@@ -49,6 +54,12 @@ def read_uniaxial(
     """
     path = Path(path)
     file = parse(path, {"uniaxial": UniaxialFile})
+    if moduli is not None:
+        kept = file.material.breaks if moduli == "trilinear" else None
+        changed = {"moduli": moduli, "degree": None, "breaks": kept}
+        file.material = file.material.model_copy(update=changed)
+    if match is not None:
+        file.uniaxial = file.uniaxial.model_copy(update={"match": match})
     settings = uniaxial_settings(path, file, file.uniaxial, data_folder, need_data)
     common = common_settings(path, file, default_range(settings["strips"], settings["bias_angle"]))
     return UniaxialProject(**common, **settings, objective=file.fit.objective)
