@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -131,11 +131,15 @@ def parse(path: Path, kinds: Mapping[str, type[File]]) -> File:
 
 
 def common_settings(
-    path: Path, file: CommonFile, default_range: tuple[float, float, float] | None = None
+    path: Path,
+    file: CommonFile,
+    default_range: tuple[float, float, float] | None = None,
+    default_breaks: Callable[[tuple[float, float, float]], Array] | None = None,
 ) -> dict[str, Any]:
     """The fields of `FitProject` (all but the thickness) from a file.
 
-    default_range : strain range where the file gives none.
+    default_range : strain range where the file gives none. default_breaks : breaks of a
+    tri-linear law where the file gives none, from its strain range; thirds of it unless given.
     """
     fit, material = file.fit, file.material
     modulus = MODULUS_UNITS[file.units.modulus]
@@ -147,7 +151,7 @@ def common_settings(
         "nu12": material.nu12,
         "thickness_change": material.thickness_change,
         "moduli": moduli,
-        "breaks": _breaks(path, file, moduli, ends),
+        "breaks": _breaks(path, file, moduli, ends, default_breaks or _thirds),
         "strain_range": ends,
         **read_bounds(path, file, moduli, ends, modulus),
         "starts": fit.starts,
@@ -190,7 +194,11 @@ def _strain_range(
 
 
 def _breaks(
-    path: Path, file: CommonFile, moduli: str, ends: tuple[float, float, float]
+    path: Path,
+    file: CommonFile,
+    moduli: str,
+    ends: tuple[float, float, float],
+    default: Callable[[tuple[float, float, float]], Array],
 ) -> Array | None:
     given = file.material.breaks
     if moduli != "trilinear":
@@ -198,14 +206,18 @@ def _breaks(
             problem = f"only a trilinear law has breaks, not {moduli} moduli; leave this out"
             raise InputError(path, "material.breaks", problem)
         return None
-    if given is None:  # three regions of the same length
-        return np.outer(ends, [1 / 3, 2 / 3])
+    if given is None:
+        return default(ends)
     breaks = np.array([given.warp, given.fill, given.shear])
     for name, (first, second), end in zip(("warp", "fill", "shear"), breaks, ends, strict=True):
         if not first < second < end:
             problem = f"expected increasing strains below the end of the range, {end:g}"
             raise InputError(path, f"material.breaks.{name}", problem)
     return breaks
+
+
+def _thirds(ends: tuple[float, float, float]) -> Array:
+    return np.outer(ends, [1 / 3, 2 / 3])
 
 
 def _calculix(path: Path, section: CalculixSection) -> dict[str, Any]:

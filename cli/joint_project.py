@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from .fit_project import FitProject, common_settings, parse
 from .project import BubbleProject, bubble_settings
-from .uniaxial_project import UniaxialProject, default_range, uniaxial_settings
+from .uniaxial_project import UniaxialProject, default_breaks, default_range, uniaxial_settings
 from .uniaxial_schema import JointFile
 
 
@@ -59,7 +60,9 @@ def read_joint(
     if not (weights.bubble > 0 and weights.uniaxial > 0):
         problem = "expected weights above 0; to fit one alone run `bubblefit bubble` or `uniaxial`"
         raise InputError(path, "joint", problem)
-    common = common_settings(path, file, default_range(strips["strips"], strips["bias_angle"]))
+    ends = default_range(strips["strips"], strips["bias_angle"])
+    breaks = functools.partial(default_breaks, strips["strips"])
+    common = common_settings(path, file, ends, breaks)
     return JointProject(
         **common,
         thickness=bubble["thickness"],

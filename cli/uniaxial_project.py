@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError
+from ..experiments.regions import strain_regions
 from ..models.uniaxial import GRIP_DISTANCE, WIDTH
 from .fit_project import FitProject, common_settings, parse
 from .project_schema import LENGTH_UNITS, CommonFile
 from .uniaxial_data import StripData, read_strips
 from .uniaxial_schema import UniaxialFile, UniaxialSection
+
+PLACES = 200  # at which a polynomial is asked for its regions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,7 +68,9 @@ def read_uniaxial(
     if match is not None:
         file.uniaxial = file.uniaxial.model_copy(update={"match": match})
     settings = uniaxial_settings(path, file, file.uniaxial, data_folder, need_data)
-    common = common_settings(path, file, default_range(settings["strips"], settings["bias_angle"]))
+    strips = settings["strips"]
+    ends = default_range(strips, settings["bias_angle"])
+    common = common_settings(path, file, ends, functools.partial(default_breaks, strips))
     return UniaxialProject(**common, **settings, objective=file.fit.objective)
 
 
@@ -112,3 +121,22 @@ def default_range(
     ends = {d: math.log(s.final_length / s.gauge_length) for d, s in strips.items()}
     shear = 2 * math.sin(math.radians(2 * bias_angle)) * ends["bias"]
     return ends["warp"], ends["fill"], shear
+
+
+def default_breaks(
+    strips: Mapping[str, StripData], ends: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """(3, 2) breaks of a tri-linear law: where three lines follow each load curve best.
+
+    In the shares of the logarithmic strain of its gauge, taken from the strain range `ends`;
+    thirds of it where a test is not there.
+    """
+    breaks = np.outer(ends, [1 / 3, 2 / 3])
+    for row, direction in enumerate(("warp", "fill", "bias")):
+        strip = strips.get(direction)
+        if strip is not None and strip.polynomial is not None:
+            u = np.linspace(0.0, strip.final_length - strip.gauge_length, PLACES)[1:]
+            strain = np.log1p(u / strip.gauge_length)
+            regions = strain_regions(strain, strip.polynomial(u))
+            breaks[row] = ends[row] * np.array(regions) / strain[-1]
+    return breaks
