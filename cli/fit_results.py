@@ -48,6 +48,11 @@ class BestFit:
     reached: Array
     certainty: Certainty | None
 
+    @property
+    def valid(self) -> Array:
+        """(3,) ends of the strains for which the moduli are fitted, not held."""
+        return np.minimum(self.reached, self.law.strain_range)
+
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     """Run the best of the starts again.
@@ -67,7 +72,8 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     reached = np.maximum(np.max([strains_of(h) for h in best.histories], axis=0), 1e-6)
     law = problem.law.with_beta(problem.parameters.beta(unknowns))
     slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)
-    sure = certainty(leading, slopes, law, reached) if slopes is not None else None
+    valid = np.minimum(reached, law.strain_range)
+    sure = certainty(leading, slopes, law, valid) if slopes is not None else None
     return BestFit(best, slopes, law, ranked, records, reached, sure)
 
 
@@ -162,7 +168,7 @@ def save_card(
 ) -> None:
     """Write material.toml; it is valid for the strains reached."""
     card = MaterialCard(
-        replace(found.law, strain_range=np.minimum(found.reached, project.strain_range)),
+        replace(found.law, strain_range=found.valid),
         project.thickness,
         project.title,
         f"bubblefit {__version__} {command}, {project.path.name}, {quality}",

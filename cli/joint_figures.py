@@ -51,8 +51,8 @@ def report_joint(
 
 
 def _strains(found: JointAssessment, count: int) -> np.ndarray:
-    reached = found.fit.reached
-    return np.array([np.linspace(0.0, reached[c], count) for _, c in MODULI.values()])
+    ends = found.fit.valid
+    return np.array([np.linspace(0.0, ends[c], count) for _, c in MODULI.values()])
 
 
 def _pinned(found: JointAssessment, folder: OutputFolder) -> list[tuple[str, str]]:
@@ -90,4 +90,4 @@ def _moduli(
         known = moduli_curves(setup.bubble.known, strains)
     laws = np.array([moduli_curves(law, strains) for law in best_laws(project, found.fit)])
     plot_moduli(folder.path / "moduli.png", strains, laws, known)
-    return "moduli.png", "Tangent moduli of the best fits over the strain reached"
+    return "moduli.png", "Tangent moduli of the best fits over the strains they are fitted to"

@@ -94,7 +94,7 @@ def _pinned(setup: JointSetup, found: BestFit) -> dict[str, dict[str, Array]]:
     strips = range(1, len(setup.problem.experiments))
     sets = {"bubble": [0], "uniaxial": [*strips], "both": [0, *strips]}
     return {
-        source: pinned_by(leading, found.differentiated, found.law, found.reached, tests)
+        source: pinned_by(leading, found.differentiated, found.law, found.valid, tests)
         for source, tests in sets.items()
     }
 

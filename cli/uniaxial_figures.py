@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 SMOOTH = 200  # places at which a polynomial is drawn
 ORDERS = range(1, 9)
+MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 FILES = (
     (RESULT, "all numbers of this page, for programs"),
     ("material.toml", "the material card"),
@@ -57,7 +58,7 @@ def report_uniaxial(
         folder,
         summary=f"Best of {len(fit.ranked)} starts: e = {fit.best.value:.4g}; RMS errors in N: "
         f"{errors}, together {result['e_uniaxial_N']:.4g}.",
-        facts=[("matched", "the " + result["matched_by"] + (" curves" * _curves(project)))],
+        facts=[("matched", MATCHED[project.match_by])],
         figures=[
             *strip_figures(setup, fit.best.histories, folder.path),
             *_moduli(project, setup, found, folder.path),
@@ -74,10 +75,6 @@ def report_uniaxial(
         ],
         files=FILES,
     )
-
-
-def _curves(project: UniaxialProject) -> bool:
-    return project.match_by == "polynomial"
 
 
 def strip_figures(
@@ -142,7 +139,7 @@ def _moduli(
 ) -> list[tuple[str, str]]:
     """Moduli up to each direction's failure strain (Fig. 3.8), one axes and one panel each."""
     fit = found.fit
-    ends = failure_strains(setup, fit.best.histories, np.minimum(fit.reached, project.strain_range))
+    ends = failure_strains(setup, fit.best.histories, fit.valid)
     strains = np.array([np.linspace(0.0, ends[c], 121) for _, c in MODULI.values()])
     best = moduli_curves(fit.law, strains)
     plot_moduli_together(folder / "failure.png", strains, best)
