@@ -149,7 +149,7 @@ def test_a_modulus_that_runs_out_makes_ccx_cut_its_increments(ccx, tmp_path):
 def test_a_deck_with_another_number_of_constants_is_refused(ccx, tmp_path):
     done, _ = run_deck(ccx, tmp_path, bar_deck().replace("*DEPVAR\n6", "*DEPVAR\n3"))
     assert done.returncode == 201
-    assert "*ERROR in HYPOELASTIC: 22 constants and *DEPVAR 6 are needed" in done.stdout
+    assert "*ERROR in HYPOELASTIC: 22 or 28 constants and *DEPVAR 6 are needed" in done.stdout
 
 
 def test_every_ccx_by_preference(bare, monkeypatch):
