@@ -12,8 +12,6 @@ from ..meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
 PRESSURE_UNITS = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
 LENGTH_UNITS = {"mm": 1.0, "m": 1000.0}
-#: N per unit.
-LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
 
 #: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
 HUGE = 1e18
@@ -49,7 +47,6 @@ class UnitsSection(Section):
     modulus: Literal["GPa", "MPa", "Pa"] = "GPa"
     pressure: Literal["kPa", "MPa", "bar", "Pa"] = "kPa"
     length: LengthUnit = "mm"
-    load: LoadUnit = "N"
 
 
 class BubbleSection(Section):

@@ -162,7 +162,10 @@ def _labels(
     table = found.table
     if not column["direction"] and wanted is None:
         there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
-        problem = f"no column says the direction; say direction. The file has: {there}"
+        problem = (
+            "no column says the direction; say direction, in a project files = { warp = [...] }."
+            f" The file has: {there}"
+        )
         raise InputError(table.path, f"line {found.header}", problem)
     series = list(table.text(column["direction"])) if column["direction"] else None
     specimens = list(table.text(column["specimen"])) if column["specimen"] else None
