@@ -46,6 +46,7 @@ class LoadCurve:
     load : (n,) N, of the whole strip.
     path : the file, None when the curve did not come from one.
     time : (n,) in the file's unit, None unless asked for by name.
+    frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
     """
 
     direction: str
@@ -54,6 +55,7 @@ class LoadCurve:
     load: NDArray[np.float64]
     path: Path | None
     time: NDArray[np.float64] | None = None
+    frame: NDArray[np.intp] | None = None
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:

@@ -170,13 +170,16 @@ def gauge_load_curve(
         load, inside = _at_times(load, np.asarray(frame_times), np.asarray(load_times), count, path)
     early = int((~inside).sum())
     if early:
-        log.warning("%s: %d of %d frames have no load at their time", specimen, early, count)
+        which = ", ".join(map(str, np.flatnonzero(~inside)))
+        problem = "%s: %d of %d frames have no load at their time: %s"
+        log.warning(problem, specimen, early, count, which)
     kept = inside & np.isfinite(record.elongation)
     if kept.sum() < 2:
         problem = f"only {kept.sum()} of {count} frames have both length and load; expected two"
         raise InputError(path, f"specimen {specimen!r}", problem)
     times = None if frame_times is None else np.asarray(frame_times, dtype=float)[kept]
-    return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times)
+    frame = np.flatnonzero(kept)
+    return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times, frame)
 
 
 def _at_times(
