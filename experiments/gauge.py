@@ -65,7 +65,8 @@ def virtual_strain_gauge(
 
     Raises
     ------
-    InputError : no frames, ends that are no points or coincide, an end lost in every frame.
+    InputError : no frames, ends that are no points or coincide, an end lost in every frame,
+        a gauge within one triangle of points.
     """
     ends = [_end(lower, "lower"), _end(upper, "upper")]
     if not frames:
@@ -74,7 +75,15 @@ def virtual_strain_gauge(
         raise InputError(None, "gauge", "lower and upper are the same point; expected two")
     seen = [triangulated(frame) for frame in frames]
     spacing = [usual_edge(surface) for surface in seen if surface is not None]
-    limit = max_gap * float(np.median(spacing)) if spacing else 0.0
+    usual = float(np.median(spacing)) if spacing else 0.0
+    apart = float(np.linalg.norm(ends[1] - ends[0]))
+    if apart < usual:
+        problem = (
+            f"the ends are {apart:.4g} mm apart, the points {usual:.4g} mm: a gauge must span"
+            " several points; is the length unit right?"
+        )
+        raise InputError(frames[0].path, "gauge", problem)
+    limit = max_gap * usual
     places = [[place_of(end, surface, limit) for surface in seen] for end in ends]
     warnings = []
     for name, end, per_frame in zip(("lower", "upper"), ends, places, strict=True):
