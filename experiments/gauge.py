@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from .curves import LoadCurve, direction_named
 from .gauge_frames import GaugeFrame
-from .surface_points import place_of, triangulated, usual_edge
+from .surface_points import Surface, place_of, triangulated, usual_edge
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,11 @@ def virtual_strain_gauge(
         raise InputError(None, "frames", "expected at least one, got none")
     if np.array_equal(ends[0], ends[1]):
         raise InputError(None, "gauge", "lower and upper are the same point; expected two")
-    seen = [triangulated(frame) for frame in frames]
+    seen: list[Surface | None] = []
+    whole: Surface | None = None
+    for frame in frames:
+        seen.append(triangulated(frame, whole))
+        whole = seen[-1] or whole
     spacing = [usual_edge(surface) for surface in seen if surface is not None]
     usual = float(np.median(spacing)) if spacing else 0.0
     apart = float(np.linalg.norm(ends[1] - ends[0]))
