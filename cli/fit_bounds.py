@@ -19,7 +19,7 @@ DEFAULT_MARGIN_E, DEFAULT_MARGIN_G = 5.0, 0.5
 def read_bounds(
     path: Path, file: CommonFile, moduli: str, ends: Sequence[float], modulus: float
 ) -> dict[str, Any]:
-    """lower, upper, largest, margin_E, margin_G of a `FitProject`, MPa.
+    """lower, upper, least, largest, margin_E, margin_G of a `FitProject`, MPa.
 
     Raises
     ------
@@ -32,6 +32,9 @@ def read_bounds(
     if of_moduli and any(v is not None for v in listed.values()):
         problem = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
         raise InputError(path, "bounds", problem)
+    if not of_moduli and all(v is None for v in listed.values()):
+        problem = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
+        raise InputError(path, "bounds", problem)
     wanted: dict[str, Any] = ranges if of_moduli else listed
     for name, value in wanted.items():
         if value is None:
@@ -39,6 +42,7 @@ def read_bounds(
     if not of_moduli:
         return {
             **_of_coefficients(path, file, moduli, modulus),
+            "least": None,
             "largest": None,
             "margin_E": margin.E * modulus if margin else DEFAULT_MARGIN_E,
             "margin_G": margin.G12 * modulus if margin else DEFAULT_MARGIN_G,
@@ -57,6 +61,7 @@ def read_bounds(
     return {
         "lower": p.lower,
         "upper": p.upper,
+        "least": least,
         "largest": largest,
         "margin_E": p.margin_E,
         "margin_G": p.margin_G,

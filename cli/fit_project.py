@@ -34,7 +34,8 @@ class FitProject:
 
     `moduli` : "constant" to "cubic", or "trilinear" with its `breaks` (3, 2) strains
     (eps1, eps2, gamma12). `lower`, `upper` : bounds in the order of Table 4.2 (G12, E2, E1,
-    highest power first); `largest` (3,) E1, E2, G12 where the file bounds the moduli instead.
+    highest power first); `least`, `largest` (3,) E1, E2, G12 where the file bounds the moduli
+    instead.
     `strain_range` : ends (eps1, eps2, gamma12). `margin_E`, `margin_G` : smallest modulus allowed
     on that range. `solver_options` : by name of a solver, what its constructor is given.
     `modulus_unit`, `modulus_scale` : unit of the file and MPa per unit, for output in kind.
@@ -54,6 +55,7 @@ class FitProject:
     strain_range: tuple[float, float, float]
     lower: Array
     upper: Array
+    least: Array | None
     largest: Array | None
     margin_E: float
     margin_G: float
@@ -117,9 +119,9 @@ def parse(path: Path, kinds: Mapping[str, type[File]]) -> File:
         raise InputError(path, "TOML syntax", str(error)) from None
     section = content.get("project")
     kind = section.get("kind") if isinstance(section, dict) else None
-    if kind is not None and kind not in kinds:
+    if kind is not None and kind not in list(kinds):  # a list: what is not text has no hash
         known = " or ".join(repr(k) for k in kinds)
-        other = isinstance(kind, str) and kind in ("bubble", "uniaxial", "joint")
+        other = kind in ["bubble", "uniaxial", "joint"]
         advice = f"; run `bubblefit {kind}`" if other else ""
         raise InputError(path, "project.kind", f"expected {known}, got {kind!r}{advice}")
     file = kinds.get(kind) if isinstance(kind, str) else None
@@ -225,7 +227,7 @@ def _calculix(path: Path, section: CalculixSection) -> dict[str, Any]:
     options = section.model_dump()
     for name in ("templates", "scratch"):
         if options[name] is not None:
-            options[name] = path.parent / options[name]
+            options[name] = path.parent / os.path.expanduser(options[name])
     # A bare name is a program on the PATH.
     if options["ccx"] is not None and os.sep in options["ccx"]:
         options["ccx"] = path.parent / os.path.expanduser(options["ccx"])

@@ -11,7 +11,13 @@ from ..errors import InputError, OutputError
 from .options import exits
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-KINDS = {"known": "bubble-known-solution", "measured": "bubble-valmex7318"}
+#: By name: the folder of the example, and what to type next (in the folder that was written).
+KINDS = {
+    "known": ("bubble-known-solution", "bubblefit bubble {}", "project.toml"),
+    "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
+    "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
+    "joint": ("joint-valmex7318", "bubblefit joint {} --data DIR", "test1.toml"),
+}
 
 
 @click.command("init")
@@ -21,12 +27,13 @@ KINDS = {"known": "bubble-known-solution", "measured": "bubble-valmex7318"}
     type=click.Choice(list(KINDS)),
     default="known",
     show_default=True,
-    help="known: data made from a known solution; measured: files of DIC displacements.",
+    help="A bubble from a known solution; from measured DIC files; strip tests; both together.",
 )
 @exits
 def command(folder: Path, example: str) -> None:
     """Write a commented example project into FOLDER (nothing there is written over)."""
-    source = EXAMPLES / KINDS[example]
+    name, advice, project = KINDS[example]
+    source = EXAMPLES / name
     files = sorted(f for f in source.iterdir() if f.is_file())
     for file in files:
         if (folder / file.name).exists():
@@ -44,6 +51,5 @@ def command(folder: Path, example: str) -> None:
         raise OutputError(
             f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
         ) from None
-    project = folder / ("project.toml" if example == "known" else "test1-linear.toml")
     click.echo(f"wrote {', '.join(f.name for f in files)} to {folder}")
-    click.echo(f"next: bubblefit bubble {project}" + (" --data DIR" if example != "known" else ""))
+    click.echo(f"next: {advice.format(folder / project)}")

@@ -51,15 +51,16 @@ def read_joint(
     """
     path = Path(path)
     file = parse(path, {"joint": JointFile})
-    strips = uniaxial_settings(path, file, file.uniaxial, strip_folder, True)
+    strips = uniaxial_settings(path, file, file.uniaxial, strip_folder, True, "--strip-data")
     bubble = bubble_settings(path, file, data_folder, True)
     if not np.isclose(strips["thickness"], bubble["thickness"], rtol=1e-9):
         problem = "expected the same thickness as bubble.thickness: it is one material"
         raise InputError(path, "uniaxial.thickness", problem)
     weights = file.joint
-    if not (weights.bubble > 0 and weights.uniaxial > 0):
-        problem = "expected weights above 0; to fit one alone run `bubblefit bubble` or `uniaxial`"
-        raise InputError(path, "joint", problem)
+    for name, weight in weights.model_dump().items():
+        if not weight > 0:
+            problem = "expected above 0; to fit one alone run `bubblefit bubble` or `uniaxial`"
+            raise InputError(path, f"joint.{name}", problem)
     ends = default_range(strips["strips"], strips["bias_angle"])
     breaks = functools.partial(default_breaks, strips["strips"])
     common = common_settings(path, file, ends, breaks)

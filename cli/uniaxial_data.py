@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..experiments.curves import LoadCurve, read_load_curves, split_at_restarts
+from ..experiments.curves import LoadCurve
 from ..experiments.load_polynomials import LoadPolynomial, fit_load_polynomial, specimen_scatter
 from ..experiments.published_polynomials import read_published_polynomials
 from .project_schema import LENGTH_UNITS, UnitsSection
+from .uniaxial_files import DIRECTIONS, ListedFile, listed_files, measured_curves
 from .uniaxial_schema import CurvesSection, GaugeSection, UniaxialSection
 
 Array = NDArray[np.float64]
 
-DIRECTIONS = ("warp", "fill", "bias")
+#: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
+#: breaks between two readings.
+EXTRAPOLATED = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +48,7 @@ class StripData:
             return np.empty(0), np.empty(0)
         elongation = np.concatenate([c.elongation for c in self.curves])
         load = np.concatenate([c.load for c in self.curves])
-        end = (self.final_length - self.gauge_length) * (1 + 1e-9)
-        order = np.argsort(elongation, kind="stable")
-        order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
+        order = self._order
         return elongation[order], load[order]
 
     @property
@@ -54,12 +56,15 @@ class StripData:
         """Number of the specimen of each of the `points`."""
         if not self.curves:
             return np.empty(0, np.intp)
-        elongation = np.concatenate([c.elongation for c in self.curves])
         whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
+        return whose[self._order].astype(np.intp)
+
+    @property
+    def _order(self) -> NDArray[np.intp]:
+        elongation = np.concatenate([c.elongation for c in self.curves])
         end = (self.final_length - self.gauge_length) * (1 + 1e-9)
         order = np.argsort(elongation, kind="stable")
-        order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
-        return whose[order].astype(np.intp)
+        return order[(elongation[order] >= 0) & (elongation[order] <= end)]
 
 
 def read_strips(
@@ -68,12 +73,20 @@ def read_strips(
     units: UnitsSection,
     data_folder: Path | None,
     need_data: bool,
+    option: str = "--data",
 ) -> dict[str, StripData]:
     """The strips of [uniaxial], by direction: those whose section or whose data are there.
 
+    Parameters
+    ----------
+    data_folder : where the files lie; replaces `uniaxial.data.folder`.
+    need_data : without, files that are not there are done without where all lengths are given.
+    option : of the command line, that names the folder.
+
     Raises
     ------
-    InputError : no data, no gauge length, a final length that is not longer.
+    InputError : naming the project and the key, or the data file: no data, no gauge length, a
+        final length that is not longer or beyond the data, points that settle no polynomial.
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):
@@ -82,28 +95,33 @@ def read_strips(
     folder = Path(data_folder) if data_folder is not None else path.parent / data.folder
     scale = LENGTH_UNITS[units.length]
     sections = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
-    names = [data.polynomials] if data.polynomials is not None else data.files or []
-    there = all((folder / name).is_file() for name in names)
-    complete = sections and all(
-        s.gauge_length is not None and s.final_length is not None for s in sections.values()
-    )
-    if not there and not need_data and complete:
+    listed = listed_files(path, data, folder)
+    missing = next((file for file in listed if not file.path.is_file()), None)
+    if missing is not None:
+        if need_data or not _complete(sections):
+            problem = f"there is no file {missing.path}; {option} DIR names another folder"
+            raise InputError(path, missing.field, problem)
         return {
             d: _strip(path, d, s.gauge_length * scale, s.final_length * scale)
             for d, s in sections.items()
         }
     if data.polynomials is not None:
-        strips = _published(path, sections, folder / data.polynomials, scale)
+        strips = _published(path, sections, listed[0].path, scale)
     else:
-        strips = _measured(path, data, sections, folder, scale)
+        strips = _measured(path, data, sections, listed, scale)
     if not strips:
-        problem = f"hold none of the directions {', '.join(sections or DIRECTIONS)}"
+        problem = f"these data hold none of the directions {', '.join(sections or DIRECTIONS)}"
         raise InputError(path, "uniaxial.data", problem)
-    missing = [d for d in sections if d not in strips]
-    if missing:
-        problem = f"the data hold no {missing[0]} test; leave this section out or add its data"
-        raise InputError(path, f"uniaxial.{missing[0]}", problem)
+    for direction in sections:
+        if direction not in strips:
+            problem = f"the data hold no {direction} test; leave this section out or add its data"
+            raise InputError(path, f"uniaxial.{direction}", problem)
     return strips
+
+
+def _complete(sections: Mapping[str, GaugeSection]) -> bool:
+    lengths = [(s.gauge_length, s.final_length) for s in sections.values()]
+    return bool(lengths) and all(a is not None and b is not None for a, b in lengths)
 
 
 def _published(
@@ -127,45 +145,52 @@ def _measured(
     path: Path,
     data: CurvesSection,
     sections: Mapping[str, GaugeSection],
-    folder: Path,
+    listed: Sequence[ListedFile],
     scale: float,
 ) -> dict[str, StripData]:
-    columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
-    found: list[LoadCurve] = []
-    for name in data.files or []:
-        found += read_load_curves(
-            folder / name,
-            columns=columns or None,
-            load_unit=data.load_unit,
-            length_unit=data.length_unit,
-            comment=data.comment,
-        )
+    found = measured_curves(path, data, listed)
+    said = {file.direction for file in listed}
     strips = {}
-    for direction in DIRECTIONS:
-        curves = tuple(c for c in found if c.direction == direction)
-        if len(curves) == 1:  # perhaps several specimens, one after the other and not named
-            curves = split_at_restarts(curves[0])
-        if not curves or (sections and direction not in sections):
+    for direction, curves in found.items():
+        # A section picks among what a file holds; a file listed for a direction is meant.
+        if sections and direction not in sections and direction not in said:
             continue
         own = sections.get(direction) or GaugeSection()
         if own.gauge_length is None:
             field = f"uniaxial.{direction}.gauge_length"
             raise InputError(path, field, "this key is missing; the strain follows from it")
         start = own.gauge_length * scale
-        longest = start + max(float(c.elongation.max()) for c in curves)
-        end = longest if own.final_length is None else own.final_length * scale
         elongation = np.concatenate([c.elongation for c in curves])
         load = np.concatenate([c.load for c in curves])
-        polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
-        scatter = specimen_scatter(curves, polynomial).deviation
+        try:
+            polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+            scatter = specimen_scatter(curves, polynomial).deviation
+        except InputError as error:
+            problem = f"no load curve through the {direction} points: {error.problem}"
+            raise InputError(path, f"uniaxial.data, {error.field}", problem) from None
+        end = start + polynomial.end if own.final_length is None else own.final_length * scale
         strips[direction] = _strip(
             path, direction, start, end, polynomial=polynomial, curves=curves, scatter=scatter
         )
     return strips
 
 
-def _strip(path: Path, direction: str, start: float, end: float, **data: object) -> StripData:
+def _strip(
+    path: Path,
+    direction: str,
+    start: float,
+    end: float,
+    polynomial: LoadPolynomial | None = None,
+    **data: Any,
+) -> StripData:
+    field = f"uniaxial.{direction}.final_length"
     if not end > start:
         problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"
-        raise InputError(path, f"uniaxial.{direction}.final_length", problem)
-    return StripData(direction, start, end, **data)  # type: ignore[arg-type]
+        raise InputError(path, field, problem)
+    if polynomial is not None and end - start > polynomial.end * (1 + EXTRAPOLATED):
+        problem = (
+            f"the data end at an elongation of {polynomial.end:.5g} mm; expected up to"
+            f" {start + polynomial.end:.5g} mm, got {end:g} mm"
+        )
+        raise InputError(path, field, problem)
+    return StripData(direction, start, end, polynomial, **data)

@@ -80,12 +80,13 @@ def uniaxial_settings(
     section: UniaxialSection,
     data_folder: Path | None,
     need_data: bool,
+    option: str = "--data",
 ) -> dict[str, Any]:
     """The fields of `UniaxialProject` that the strips' own section gives."""
     length = LENGTH_UNITS[file.units.length]
     width = WIDTH if section.width is None else section.width * length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
-    strips = read_strips(path, section, file.units, data_folder, need_data)
+    strips = read_strips(path, section, file.units, data_folder, need_data, option)
     weights = section.weights.model_dump()
     if not sum(weights[d] for d in strips) > 0:
         raise InputError(path, "uniaxial.weights", "expected one above 0: nothing would be matched")
@@ -96,6 +97,10 @@ def uniaxial_settings(
     if matched_points and need_data and not all(s.curves for s in strips.values()):
         problem = "'points' needs measured points (data.files), not polynomials"
         raise InputError(path, "uniaxial.match", problem)
+    for direction, strip in strips.items():
+        if matched_points and strip.curves and not len(strip.points[0]):
+            problem = "no measured point lies between the gauge length and this one"
+            raise InputError(path, f"uniaxial.{direction}.final_length", problem)
     return {
         "thickness": section.thickness * length,
         "width": width,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from .project_schema import (
     CommonFile,
     CommonFitSection,
-    LengthUnit,
     LoadUnit,
     NuisanceSection,
     Positive,
@@ -32,13 +31,32 @@ class CurveColumnsSection(Section):
     direction: str | None = None
 
 
+FileNames = Annotated[list[str], Field(min_length=1)]
+
+
+class FilesSection(Section):
+    """Files that do not name their direction, by direction."""
+
+    warp: FileNames | None = None
+    fill: FileNames | None = None
+    bias: FileNames | None = None
+
+
+def _files(given: Any) -> Any:
+    # Either form is checked here and not as a union: complaints then name the key, not the form.
+    if isinstance(given, dict):
+        return FilesSection.model_validate(given)
+    return given if given is None else TypeAdapter(FileNames).validate_python(given, strict=True)
+
+
 class CurvesSection(Section):
     polynomials: str | None = None
-    files: Annotated[list[str], Field(min_length=1)] | None = None
+    files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
     folder: str = ""
     columns: CurveColumnsSection = CurveColumnsSection()
     load_unit: LoadUnit | None = None
-    length_unit: LengthUnit | None = None
+    length_unit: Literal["mm", "cm", "m"] | None = None
+    decimal: Literal[".", ","] | None = None
     comment: str = "#"
     order: Annotated[int, Field(ge=1, le=10)] = 4
     through_origin: bool = True

@@ -5,15 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-#: Words that make a column one of elongation or of load, in English and German exports.
+#: Words that make a column one of elongation, load or time, in English and German exports.
 WORDS = {
     "elongation": frozenset(
         "elongation extension displacement disp crosshead stroke travel position"
         " weg standardweg traversenweg verfahrweg kolbenweg längenänderung".split()
     ),
     "load": frozenset("load force kraft standardkraft prüfkraft".split()),
+    "time": frozenset("time zeit prüfzeit".split()),
 }
-#: A column with one of these words is neither: "Tensile strain (Extension)", "Load rate".
+#: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
 OTHERS = frozenset(
     "strain stress rate speed velocity time cell cycle"
     " dehnung spannung zeit geschwindigkeit".split()
@@ -28,6 +29,8 @@ LABELS = {
 #: mm in one of each unit of length, N in one of each unit of load.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
 LOAD_UNITS = {"N": 1.0, "kN": 1e3}
+#: Seconds in one of each unit of time.
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 _KNOWN = r"mm|cm|kN|kn|N|n|m"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
@@ -47,12 +50,12 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def means(name: str, quantity: str) -> bool:
-    """Whether a column of this name holds `quantity`: elongation, load, specimen or direction."""
+    """Whether a column holds `quantity`: elongation, load, time, specimen or direction."""
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
     words = set(re.split(r"[\W\d_]+", plain))
-    return bool(words & WORDS[quantity]) and not words & OTHERS
+    return bool(words & WORDS[quantity]) and not words & (OTHERS - WORDS[quantity])
 
 
 def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:

@@ -46,6 +46,7 @@ class LoadCurve:
     load : (n,) N, of the whole strip.
     path : the file, None when the curve did not come from one.
     time : (n,) in the file's unit, None unless asked for by name.
+    frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
     """
 
     direction: str
@@ -54,6 +55,7 @@ class LoadCurve:
     load: NDArray[np.float64]
     path: Path | None
     time: NDArray[np.float64] | None = None
+    frame: NDArray[np.intp] | None = None
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
@@ -162,7 +164,10 @@ def _labels(
     table = found.table
     if not column["direction"] and wanted is None:
         there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
-        problem = f"no column says the direction; say direction. The file has: {there}"
+        problem = (
+            "no column says the direction; say direction, in a project files = { warp = [...] }."
+            f" The file has: {there}"
+        )
         raise InputError(table.path, f"line {found.header}", problem)
     series = list(table.text(column["direction"])) if column["direction"] else None
     specimens = list(table.text(column["specimen"])) if column["specimen"] else None

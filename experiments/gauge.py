@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from .curves import LoadCurve, direction_named
 from .gauge_frames import GaugeFrame
-from .surface_points import place_of, triangulated, usual_edge
+from .surface_points import Surface, place_of, triangulated, usual_edge
 
 Array = NDArray[np.float64]
 
@@ -65,16 +65,29 @@ def virtual_strain_gauge(
 
     Raises
     ------
-    InputError : no frames, ends that are no points or coincide, an end lost in every frame.
+    InputError : no frames, ends that are no points or coincide, an end lost in every frame,
+        a gauge within one triangle of points.
     """
     ends = [_end(lower, "lower"), _end(upper, "upper")]
     if not frames:
         raise InputError(None, "frames", "expected at least one, got none")
     if np.array_equal(ends[0], ends[1]):
         raise InputError(None, "gauge", "lower and upper are the same point; expected two")
-    seen = [triangulated(frame) for frame in frames]
+    seen: list[Surface | None] = []
+    whole: Surface | None = None
+    for frame in frames:
+        seen.append(triangulated(frame, whole))
+        whole = seen[-1] or whole
     spacing = [usual_edge(surface) for surface in seen if surface is not None]
-    limit = max_gap * float(np.median(spacing)) if spacing else 0.0
+    usual = float(np.median(spacing)) if spacing else 0.0
+    apart = float(np.linalg.norm(ends[1] - ends[0]))
+    if apart < usual:
+        problem = (
+            f"the ends are {apart:.4g} mm apart, the points {usual:.4g} mm: a gauge must span"
+            " several points; is the length unit right?"
+        )
+        raise InputError(frames[0].path, "gauge", problem)
+    limit = max_gap * usual
     places = [[place_of(end, surface, limit) for surface in seen] for end in ends]
     warnings = []
     for name, end, per_frame in zip(("lower", "upper"), ends, places, strict=True):
@@ -170,13 +183,16 @@ def gauge_load_curve(
         load, inside = _at_times(load, np.asarray(frame_times), np.asarray(load_times), count, path)
     early = int((~inside).sum())
     if early:
-        log.warning("%s: %d of %d frames have no load at their time", specimen, early, count)
+        which = ", ".join(map(str, np.flatnonzero(~inside)))
+        problem = "%s: %d of %d frames have no load at their time: %s"
+        log.warning(problem, specimen, early, count, which)
     kept = inside & np.isfinite(record.elongation)
     if kept.sum() < 2:
         problem = f"only {kept.sum()} of {count} frames have both length and load; expected two"
         raise InputError(path, f"specimen {specimen!r}", problem)
     times = None if frame_times is None else np.asarray(frame_times, dtype=float)[kept]
-    return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times)
+    frame = np.flatnonzero(kept)
+    return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times, frame)
 
 
 def _at_times(

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from .column_names import columns_of, scale_of
-from .machine_tables import MachineTable
+from .machine_tables import NEEDED, MachineTable
 
 
-def column_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> str:
+def column_of(
+    found: MachineTable,
+    quantity: str,
+    named: Mapping[str, str],
+    needed: Sequence[str] = NEEDED,
+) -> str:
     """The name of the one column that holds a quantity; "" where it may be absent and is.
+
+    Times are looked for only where they are named or needed.
 
     Raises
     ------
     InputError : several columns, or none of one that is needed or was named.
     """
     names = [str(name) for name in found.table.cells.columns]
-    if quantity == "time" and quantity not in named:
+    if quantity == "time" and quantity not in (*named, *needed):
         return ""
     which = columns_of(names, quantity, named)
-    if len(which) == 1 or (not which and quantity not in (*named, "elongation", "load")):
+    if len(which) == 1 or (not which and quantity not in (*named, *needed)):
         return names[which[0]] if which else ""
     there = ", ".join(name for name in names if name)[:300]
     several = " or ".join(repr(names[i]) for i in which[:6])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -43,15 +43,20 @@ class MachineTable:
 
 
 def find_table(
-    path: Path, named: Mapping[str, str], comment: str = "#", decimal: str | None = None
+    path: Path,
+    named: Mapping[str, str],
+    comment: str = "#",
+    decimal: str | None = None,
+    quantities: Sequence[str] = NEEDED,
 ) -> MachineTable:
-    """Find the first table with a column of elongation and one of load.
+    """Find the first table with a column of each of the `quantities`.
 
     Parameters
     ----------
     named : quantities whose column is known by name.
     comment : lines that start so are skipped.
     decimal : the decimal mark, "." or ","; None finds it.
+    quantities : of elongation, load and time, those that are needed.
 
     Raises
     ------
@@ -64,14 +69,14 @@ def find_table(
     found = []
     for separator in SEPARATORS:
         rows = [(number, _cells(text, separator)) for number, text in lines]
-        index = _header(rows, named)
+        index = _header(rows, named, quantities)
         if index is not None:
             found.append((len(rows[index][1]), rows, index, separator))
     if not found:
-        raise InputError(path, "", _nothing_found(lines, named))
+        raise InputError(path, "", _nothing_found(lines, named, quantities))
     _, rows, index, separator = max(found, key=lambda one: one[0])
     header_line, names = rows[index]
-    needed = [i for quantity in NEEDED for i in columns_of(names, quantity, named)]
+    needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
     body = index + 1
     units = {name: split_unit(name)[1] for name in names}
     if body < len(rows) and _is_unit_row(rows[body][1], needed):
@@ -104,15 +109,13 @@ def _cells(text: str, separator: str) -> list[str]:
         return [text]
 
 
-def _header(rows: Rows, named: Mapping[str, str]) -> int | None:
+def _header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str]) -> int | None:
     """The first row of names with numbers one or two rows below; else the first row of names."""
     first = None
     for index, (_, names) in enumerate(rows):
-        if len(names) < 2:
-            continue
-        columns = [columns_of(names, quantity, named) for quantity in NEEDED]
+        columns = [columns_of(names, quantity, named) for quantity in quantities]
         # A sentence that speaks of load and extension is one cell, and no header.
-        if not all(columns) or len({*columns[0], *columns[1]}) < 2:
+        if not all(columns) or len(set().union(*columns)) < len(quantities):
             continue
         below = [row for _, row in rows[index + 1 : index + 3]]
         if any(all(any(_is_number(row, i) for i in each) for each in columns) for row in below):
@@ -159,9 +162,12 @@ def _decimal(path: Path, rows: Rows, names: list[str], needed: list[int]) -> str
     return ","
 
 
-def _nothing_found(lines: list[tuple[int, str]], named: Mapping[str, str]) -> str:
+def _nothing_found(
+    lines: list[tuple[int, str]], named: Mapping[str, str], quantities: Sequence[str]
+) -> str:
     what = " and ".join(
-        repr(named[quantity]) if quantity in named else f"one of {quantity}" for quantity in NEEDED
+        repr(named[quantity]) if quantity in named else f"one of {quantity}"
+        for quantity in quantities
     )
     problem = f"no header row with the columns {what}; name them with columns"
     for (number, text), (_, below) in pairwise(lines):

@@ -33,14 +33,20 @@ class Surface:
         return np.asarray(edges.max(axis=1))
 
 
-def triangulated(frame: GaugeFrame) -> Surface | None:
-    """The surface of a frame; None where fewer than three points, or a line, were correlated."""
+def triangulated(frame: GaugeFrame, before: Surface | None = None) -> Surface | None:
+    """The surface of a frame; None where fewer than three points, or a line, were correlated.
+
+    before : a surface whose triangles are taken where the reference points are the same: most
+        exports have the same points in every frame, and triangulating is what costs.
+    """
     from scipy.spatial import Delaunay, QhullError
 
     places = np.stack([frame.points, frame.points + frame.displacement], axis=1)
     places = places[np.isfinite(places).all(axis=(1, 2))]
     if len(places) < 3:
         return None
+    if before is not None and np.array_equal(places[:, 0, :2], before.places[:, 0, :2]):
+        return Surface(before.mesh, places)
     try:
         return Surface(Delaunay(places[:, 0, :2]), places)
     except QhullError:  # all on one line

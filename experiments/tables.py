@@ -182,14 +182,23 @@ def _what(error: Exception) -> str:
     return f"is not a comma-separated table ({' '.join(str(error).split())[:200]})"
 
 
-def write_table(path: Path | str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+def write_table(
+    path: Path | str,
+    header: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    comment: str | None = None,
+) -> None:
     """Write a comma-separated table; floats so that they read back exactly.
+
+    comment : one line above the header, after "# ".
 
     Raises
     ------
     OSError : the file cannot be written; what was there may be lost.
     """
     with open(path, "w", encoding="utf-8", newline="") as stream:
+        if comment is not None:
+            stream.write(f"# {comment}\n")
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([repr(c) if isinstance(c, float) else c for c in row] for row in rows)
