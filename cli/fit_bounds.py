@@ -19,7 +19,7 @@ DEFAULT_MARGIN_E, DEFAULT_MARGIN_G = 5.0, 0.5
 def read_bounds(
     path: Path, file: CommonFile, moduli: str, ends: Sequence[float], modulus: float
 ) -> dict[str, Any]:
-    """lower, upper, largest, margin_E, margin_G of a `FitProject`, MPa.
+    """lower, upper, least, largest, margin_E, margin_G of a `FitProject`, MPa.
 
     Raises
     ------
@@ -39,6 +39,7 @@ def read_bounds(
     if not of_moduli:
         return {
             **_of_coefficients(path, file, moduli, modulus),
+            "least": None,
             "largest": None,
             "margin_E": margin.E * modulus if margin else DEFAULT_MARGIN_E,
             "margin_G": margin.G12 * modulus if margin else DEFAULT_MARGIN_G,
@@ -57,6 +58,7 @@ def read_bounds(
     return {
         "lower": p.lower,
         "upper": p.upper,
+        "least": least,
         "largest": largest,
         "margin_E": p.margin_E,
         "margin_G": p.margin_G,

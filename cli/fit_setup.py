@@ -62,6 +62,7 @@ def parameters_of(project: FitProject, **nuisance: Any) -> ModuliParameters:
         project.margin_E,
         project.margin_G,
         breaks=project.breaks,
+        least=project.least,
         largest=project.largest,
         **nuisance,
     )

@@ -35,9 +35,9 @@ class ModuliParameters:
     margin_E, margin_G : MPa, the least modulus allowed there.
     displacement_offset, pressure_offset : nuisance parameters switched on.
     breaks : (3, 2) strains (eps1, eps2, gamma12) between the regions of a tri-linear law.
-    largest : (3,) MPa, the largest E1, E2, G12 allowed anywhere on the strain range; starts are
-        then drawn from modulus values between the margins and these, instead of from the box of
-        the coefficients.
+    least, largest : (3,) MPa, the least and largest E1, E2, G12 allowed anywhere on the strain
+        range, both or neither; `least` then takes the place of the margins, and starts are drawn
+        from modulus values between the two instead of from the box of the coefficients.
     """
 
     degree: int
@@ -50,6 +50,7 @@ class ModuliParameters:
     pressure_offset: bool = False
     least_pressure: float = 1.0
     breaks: Array | None = None
+    least: Array | None = None
     largest: Array | None = None
 
     @classmethod
@@ -69,7 +70,8 @@ class ModuliParameters:
         block = np.repeat(STRAIN_OF_BLOCK, degree + 1)
         low, high = t * least[block], t * largest[block]
         lower, upper = np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
-        return replace(draft, lower=lower, upper=upper, largest=np.asarray(largest, float))
+        ends = {"least": np.asarray(least, float), "largest": np.asarray(largest, float)}
+        return replace(draft, lower=lower, upper=upper, **ends)
 
     @property
     def places(self) -> NDArray[np.intp]:
@@ -128,6 +130,8 @@ class ModuliParameters:
     def positivity(self) -> tuple[Array, Array]:
         """A, margin of `A @ coefficients >= margin`: moduli on a strain grid."""
         grid = modulus_grid(self.strain_range, self.breaks)
+        if self.least is not None:
+            return grid[:, self.places], np.repeat(self.least[list(STRAIN_OF_BLOCK)], GRID)
         return grid[:, self.places], margins(self.margin_E, self.margin_G)
 
     @cached_property
@@ -179,12 +183,11 @@ class ModuliParameters:
         logarithm of their values at the Chebyshev points.
         """
         share = random.random((count, self.size))
-        if self.largest is None:
+        if self.least is None or self.largest is None:
             return np.asarray(self.lower + (self.upper - self.lower) * share)
-        least = np.array([self.margin_G, self.margin_E, self.margin_E])
         ends = [
-            np.log(np.repeat(e, self.degree + 1))
-            for e in (least, self.largest[list(STRAIN_OF_BLOCK)])
+            np.log(np.repeat(e[list(STRAIN_OF_BLOCK)], self.degree + 1))
+            for e in (self.least, self.largest)
         ]
         return np.asarray(np.exp(ends[0] + (ends[1] - ends[0]) * share) @ self.from_values.T)
 
