@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.identification.approach import approach
 from bubblefit.identification.assessment import certainty, moduli_error, pinned_by
 from bubblefit.identification.blocks import Blocks
 from bubblefit.identification.experiment import Experiment
@@ -509,3 +510,47 @@ def test_what_each_data_set_pins_down() -> None:
     warp = pinned_by(fit, point, LAW, reached, [1])
     assert warp["E1"].max() < 0.5
     assert min(warp["E2"].min(), warp["G12"].min()) > 1.0
+
+
+# The way to a joint fit
+
+
+def test_strips_lead_into_a_joint_fit() -> None:
+    """First the strips alone, told as such and counted; then all tests from their optimum."""
+    fit = replace(joint(noise=5.0, bubble_noise=0.1), lead_in=(1, 2, 3))
+    told: list[tuple[float | None, str]] = []
+    start = feasible_start(fit, 2, 0)
+    fit.reset()
+    fit.watch = lambda y, value, status, solver: told.append((value, status))
+    y = approach(fit, start, 1e-7, 100)
+    alone = [words.startswith("warp, fill, bias alone: ") for _, words in told]
+    assert len(told) == fit.analyses > 4 and alone == [True] * (len(told) - 1) + [False]
+    assert [value is None for value, _ in told] == alone
+    part = fit.part((1, 2, 3))
+    assert part.evaluate(y, False).value < 0.05 * part.evaluate(start, False).value
+    found = fit_from(fit, start, FitOptions())
+    direct = levenberg_marquardt(joint(noise=5.0, bubble_noise=0.1), start, 1e-7, 200)
+    assert found.value == pytest.approx(direct.value, rel=1e-3)
+
+
+def test_a_joint_fit_starts_where_it_was_told_when_the_strips_lead_astray() -> None:
+    fit = replace(joint(), lead_in=(1, 2, 3))
+    start = near(CUBIC, LAW)
+    fit.experiments[0].solver = Failing([1])  # the bubble, at the optimum of the strips
+    assert (approach(fit, start, 1e-7, 100) == start).all()
+    fit.experiments[1].solver = Failing(range(1, 1000))
+    assert (approach(fit, start, 1e-7, 100) == start).all()
+    assert (approach(joint(), start, 1e-7, 100) == start).all()
+
+
+def test_the_surrogate_of_a_joint_fit_leads_in_too() -> None:
+    fit = led(joint())
+    fit.surrogate.lead_in = (1, 2, 3)
+    told: list[tuple[str, str]] = []
+    for problem in (fit, fit.surrogate):
+        problem.watch = lambda y, value, status, solver: told.append((solver, status))
+    found = fit_from(fit, feasible_start(fit, 2, 1), FitOptions())
+    assert found.value < 1e-5
+    alone = [solver for solver, status in told if " alone: " in status]
+    assert alone and set(alone) == {"membrane"}
+    assert replace(joint(), lead_in=(1, 2)).led_by([MembraneSolver()] * 4).lead_in == (1, 2)
