@@ -34,8 +34,7 @@ class FitProject:
 
     `moduli` : "constant" to "cubic", or "trilinear" with its `breaks` (3, 2) strains
     (eps1, eps2, gamma12). `lower`, `upper` : bounds in the order of Table 4.2 (G12, E2, E1,
-    highest power first); `least`, `largest` (3,) E1, E2, G12 where the file bounds the moduli
-    instead.
+    highest power first); `least`, `largest` (3,) E1, E2, G12 where the file bounds the moduli.
     `strain_range` : ends (eps1, eps2, gamma12). `margin_E`, `margin_G` : smallest modulus allowed
     on that range. `solver_options` : by name of a solver, what its constructor is given.
     `modulus_unit`, `modulus_scale` : unit of the file and MPa per unit, for output in kind.

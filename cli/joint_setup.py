@@ -41,7 +41,12 @@ def joint_setup(
     matched = sum(weight for d, weight in strips.weights.items() if d in strips.strips)
     tests = strip_experiments(strips, project.uniaxial_weight / matched)
     experiments = (*bubble.problem.experiments, *tests)
-    problem = FitProblem(experiments, law_of(project), bubble_parameters(project.bubble))
+    problem = FitProblem(
+        experiments,
+        law_of(project),
+        bubble_parameters(project.bubble),
+        lead_in=tuple(range(1, len(experiments))),
+    )
     lead(problem)
     return JointSetup(problem, bubble, setup_of(strips, problem, tests))
 

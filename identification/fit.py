@@ -27,12 +27,13 @@ def levenberg_marquardt(
 
     Stops when e is below `tolerance`, on no progress, or after `max_analyses`.
     """
+    met = problem.unstable  # where the start was drawn is no matter of the fit
     first = problem.evaluate(start, True)
     if first is None:
         return None
     best, status = _both_stages(problem, first, tolerance, max_analyses)
     for factor in STIFFER:
-        if best.value < tolerance or not problem.unstable:
+        if best.value < tolerance or problem.unstable == met:
             break
         other, how = _from_stiffer(problem, best, factor, tolerance, max_analyses)
         if other.value < best.value:

@@ -8,6 +8,7 @@ from typing import Literal
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .approach import approach
 from .correction import corrected_fit
 from .fit import levenberg_marquardt
 from .nonlinear import NloptOptions, nlopt_minimise
@@ -40,12 +41,12 @@ def fit_from(problem: FitProblem, start: NDArray, options: FitOptions) -> Optimu
     ------
     InputError : a method of another name.
     """
-    if options.method == "lm" and problem.surrogate is not None:
-        return corrected_fit(
-            problem, start, options.tolerance, options.max_analyses, options.max_runs
-        )
     if options.method == "lm":
-        return levenberg_marquardt(problem, start, options.tolerance, options.max_analyses)
+        limits = options.tolerance, options.max_analyses
+        y = approach(problem.surrogate or problem, start, *limits)
+        if problem.surrogate is not None:
+            return corrected_fit(problem, y, *limits, options.max_runs)
+        return levenberg_marquardt(problem, y, *limits)
     if options.method in ALGORITHMS:
         nlopt_options = NloptOptions(
             ALGORITHMS[options.method],

@@ -36,8 +36,8 @@ class ModuliParameters:
     displacement_offset, pressure_offset : nuisance parameters switched on.
     breaks : (3, 2) strains (eps1, eps2, gamma12) between the regions of a tri-linear law.
     least, largest : (3,) MPa, the least and largest E1, E2, G12 allowed anywhere on the strain
-        range, given together or not at all; the least are then the margins, and starts are drawn
-        from modulus values between, instead of from the box of the coefficients.
+        range, both or neither; `least` then takes the place of the margins, and starts are drawn
+        from modulus values between the two instead of from the box of the coefficients.
     """
 
     degree: int
@@ -70,8 +70,8 @@ class ModuliParameters:
         block = np.repeat(STRAIN_OF_BLOCK, degree + 1)
         low, high = t * least[block], t * largest[block]
         lower, upper = np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
-        draft = replace(draft, least=np.asarray(least, float), largest=np.asarray(largest, float))
-        return replace(draft, lower=lower, upper=upper)
+        ends = {"least": np.asarray(least, float), "largest": np.asarray(largest, float)}
+        return replace(draft, lower=lower, upper=upper, **ends)
 
     @property
     def places(self) -> NDArray[np.intp]:
@@ -130,12 +130,9 @@ class ModuliParameters:
     def positivity(self) -> tuple[Array, Array]:
         """A, margin of `A @ coefficients >= margin`: moduli on a strain grid."""
         grid = modulus_grid(self.strain_range, self.breaks)
-        # Each modulus has a bound of its own where the moduli are bounded.
         if self.least is not None:
-            margin = np.repeat(self.least[list(STRAIN_OF_BLOCK)], GRID)
-        else:
-            margin = margins(self.margin_E, self.margin_G)
-        return grid[:, self.places], margin
+            return grid[:, self.places], np.repeat(self.least[list(STRAIN_OF_BLOCK)], GRID)
+        return grid[:, self.places], margins(self.margin_E, self.margin_G)
 
     @cached_property
     def inequalities(self) -> tuple[Array, Array]:

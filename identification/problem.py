@@ -53,7 +53,8 @@ class FitProblem:
     """Tests, a law and unknowns of one fit; an analysis runs every test once.
 
     `law` carries nu12, strain range and thickness option; its beta is replaced. `surrogate`: the
-    same problem for a solver that differentiates, where this one's does not.
+    same problem for a solver that differentiates, where this one's does not. `lead_in`: numbers
+    of tests that a fit matches first (see `approach`).
     """
 
     experiments: tuple[Experiment, ...]
@@ -64,6 +65,7 @@ class FitProblem:
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
     warm_starts: bool = True
+    lead_in: tuple[int, ...] = ()
     blocks: Blocks = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -100,7 +102,20 @@ class FitProblem:
     def led_by(self, solvers: Sequence[Solver]) -> FitProblem:
         """The same problem for other solvers, one a test: a surrogate."""
         led = tuple(e.by(solver) for e, solver in zip(self.experiments, solvers, strict=True))
-        return FitProblem(led, self.law, self.parameters)
+        return FitProblem(led, self.law, self.parameters, lead_in=self.lead_in)
+
+    def part(self, tests: Sequence[int]) -> FitProblem:
+        """The fit to some of the tests, by their numbers; whoever watches hears which."""
+        some = tuple(self.experiments[k] for k in tests)
+        names = ", ".join(e.name for e in some)
+
+        def watch(y: Array, value: float | None, status: str, solver: str) -> None:
+            if self.watch is not None:
+                # Of another sum than this problem's e: it must not stand beside that.
+                said = status if value is None else f"{status}, e = {value:.6g}"
+                self.watch(y, None, f"{names} alone: {said}", solver)
+
+        return FitProblem(some, self.law, self.parameters, watch, analyses=self.analyses)
 
     def shift(self, here: Sequence[History], there: Sequence[History]) -> None:
         """From now on reckon as if the solver gave `here` where it gives `there`, test by test."""
