@@ -811,3 +811,17 @@ def test_the_orders_offered_decide_the_thesis_choice(shared_data):
         # "The fill and bias directions can be simplified to third order" (section 3.2): even to
         # second in fill; warp needs more.
         assert found.by_bic == {"warp": 5, "fill": 2, "bias": 3}[direction]
+
+
+# Strain regions
+
+
+def test_a_broken_line_gives_its_own_breaks_back() -> None:
+    from bubblefit.experiments.regions import strain_regions
+
+    strain = np.linspace(0.0, 0.41, 300)[1:]
+    load = 900 * strain - 700 * np.maximum(strain - 0.05, 0) + 400 * np.maximum(strain - 0.3, 0)
+    # The places of the grid are a hundredth apart.
+    assert strain_regions(strain, load) == pytest.approx((0.05, 0.3), abs=0.005)
+    with pytest.raises(InputError, match="five points"):
+        strain_regions(strain[:4], load[:4])
