@@ -13,6 +13,7 @@ from bubblefit.cli.joint_project import JointProject, read_joint
 from bubblefit.cli.main import main
 from bubblefit.cli.uniaxial_project import UniaxialProject, read_uniaxial
 from bubblefit.errors import InputError
+from bubblefit.experiments.regions import strain_regions
 from click.testing import CliRunner
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -250,8 +251,20 @@ def test_each_modulus_has_bounds_of_its_own(example, form):
 def test_breaks(example):
     trilinear = ('moduli = "cubic"', 'moduli = "trilinear"')
     p = example(trilinear)
+    # Where three lines follow each load polynomial best, in shares of its strain range.
     assert p.breaks is not None
-    np.testing.assert_allclose(p.breaks, np.outer(p.strain_range, [1 / 3, 2 / 3]))
+    for row, (strip, end) in enumerate(zip(p.strips.values(), p.strain_range, strict=True)):
+        u = np.linspace(0, strip.final_length - strip.gauge_length, 200)[1:]
+        assert strip.polynomial is not None
+        strain = np.log(1 + u / strip.gauge_length)
+        regions = strain_regions(strain, strip.polynomial(u))
+        np.testing.assert_allclose(p.breaks[row], end * np.array(regions) / strain[-1])
+        assert 0 < p.breaks[row, 0] < p.breaks[row, 1] < end
+    # Thirds of the range of a strain whose test is not there.
+    two = ("[uniaxial.data]", "[uniaxial.warp]\n[uniaxial.fill]\n[uniaxial.data]")
+    other = example(trilinear, two, ("# strain_range", "strain_range"))
+    assert other.breaks is not None
+    np.testing.assert_allclose(other.breaks[2], [0.883 / 3, 2 * 0.883 / 3])
     breaks = "[material.breaks]\nwarp = [0.02, 0.1]\nfill = [0.03, 0.2]\nshear = [0.1, 0.5]\n"
     p = example(trilinear, ("# [least, largest]", f"{breaks}# [least, largest]"))
     np.testing.assert_array_equal(p.breaks, [[0.02, 0.1], [0.03, 0.2], [0.1, 0.5]])
