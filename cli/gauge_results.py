@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +32,20 @@ def loads_at_frames(record: GaugeRecord, options: Mapping[str, Any], name: str) 
     interval, times_file = options["frame_interval"], options["frame_times"]
     times = None if interval is None else interval * np.arange(count)
     if times_file is not None:
-        times = read_times(times_file, options["frame_time_column"], decimal=options["decimal"])
+        with _naming("--frame-time-column"):
+            times = read_times(times_file, options["frame_time_column"], decimal=options["decimal"])
         if len(times) != count:
             problem = f"expected one time for each of the {count} frames, got {len(times)}"
             raise InputError(times_file, "", problem)
     named = {"load": options["load_column"], "time": options["time_column"]}
-    machine = read_machine_loads(
-        options["loads"],
-        columns={quantity: column for quantity, column in named.items() if column is not None},
-        timed=times is not None,
-        load_unit=options["load_unit"],
-        decimal=options["decimal"],
-    )
+    with _naming("--load-column" if times is None else "--load-column, --time-column"):
+        machine = read_machine_loads(
+            options["loads"],
+            columns={quantity: column for quantity, column in named.items() if column is not None},
+            timed=times is not None,
+            load_unit=options["load_unit"],
+            decimal=options["decimal"],
+        )
     if times is None and len(machine.load) != count:
         problem = (
             f"expected one load for each of the {count} frames, got {len(machine.load)};"
@@ -58,6 +61,16 @@ def loads_at_frames(record: GaugeRecord, options: Mapping[str, Any], name: str) 
         load_times=machine.time,
         path=options["loads"],
     )
+
+
+@contextmanager
+def _naming(options: str) -> Iterator[None]:
+    """Readers ask for their argument `columns`, and --columns means those of the frames."""
+    try:
+        yield
+    except InputError as error:
+        problem = error.problem.replace("with columns", f"with {options}")
+        raise InputError(error.path, error.field, problem) from None
 
 
 def gauge_result(

@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from .column_names import columns_of, split_unit
+from .column_names import LENGTH_UNITS, LOAD_UNITS, TIME_UNITS, columns_of, split_unit
 from .tables import Table, read_lines
 
 Rows = list[tuple[int, list[str]]]
 
 SEPARATORS = ("\t", ";", ",")
 NEEDED = ("elongation", "load")
+UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
@@ -170,10 +171,14 @@ def _nothing_found(
         for quantity in quantities
     )
     problem = f"no header row with the columns {what}; name them with columns"
-    for (number, text), (_, below) in pairwise(lines):
+    for index, ((number, text), (_, below)) in enumerate(pairwise(lines)):
         for separator in SEPARATORS:
             names, row = _cells(text, separator), _cells(below, separator)
             if sum(_is_number(row, i) for i in range(len(row))) >= 2:
+                higher = _cells(lines[index - 1][1], separator) if index else []
+                # Names stand above their units.
+                if len(higher) == len(names) and any(c.strip("()[]<> ") in UNITS for c in names):
+                    number, names = lines[index - 1][0], higher
                 heads = ", ".join(name for name in names if name)[:200]
                 return f"{problem}; line {number}, above the first numbers, has: {heads}"
     return f"{problem}; no line with two numbers was found either"

@@ -294,7 +294,11 @@ LOADS = ["--loads", "{strip}/machine.csv", "--direction", "warp"]
         ([*LOADS, "--specimen", " "], "--specimen: expected a name on one line"),
         ([*LOADS, "--specimen", "a\nb"], "--specimen: expected a name on one line"),
         (LOADS, "machine.csv: expected one load for each of the 12 frames, got 60; --frame-times"),
-        ([*LOADS, "--load-column", "F"], "machine.csv: no header row with the columns 'F'"),
+        ([*LOADS, "--load-column", "F"], "'F'; name them with --load-column; line 4, above"),
+        (
+            [*LOADS, "--frame-times", "{strip}/frames/f0.csv"],
+            "f0.csv: no header row with the columns one of time; name them with --frame-time-col",
+        ),
         ([*LOADS, "--load-unit", "N"], "the file says 'kN', load_unit says 'N'"),
         (["--loads", "{tmp}/none.csv", "--direction", "warp"], "none.csv: no such file"),
         ([*LOADS, "--frame-times", "{tmp}/none.csv"], "none.csv: no such file"),

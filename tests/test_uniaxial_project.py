@@ -13,6 +13,7 @@ from bubblefit.cli.joint_project import JointProject, read_joint
 from bubblefit.cli.main import main
 from bubblefit.cli.uniaxial_project import UniaxialProject, read_uniaxial
 from bubblefit.errors import InputError
+from bubblefit.experiments.regions import strain_regions
 from click.testing import CliRunner
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -250,6 +251,7 @@ def test_each_modulus_has_bounds_of_its_own(example, form):
 def test_breaks(example):
     trilinear = ('moduli = "cubic"', 'moduli = "trilinear"')
     p = example(trilinear)
+    # Where three lines follow each load polynomial best, in shares of its strain range.
     assert p.breaks is not None
     # Where three lines follow the load curves best; the warp curve is stiff, soft, stiff.
     assert (0 < p.breaks[:, 0]).all() and (p.breaks[:, 1] < p.strain_range).all()
