@@ -13,7 +13,6 @@ from bubblefit.cli.joint_project import JointProject, read_joint
 from bubblefit.cli.main import main
 from bubblefit.cli.uniaxial_project import UniaxialProject, read_uniaxial
 from bubblefit.errors import InputError
-from bubblefit.experiments.regions import strain_regions
 from click.testing import CliRunner
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
