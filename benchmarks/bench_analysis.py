@@ -12,10 +12,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bubblefit.cli.bubble_setup import bubble_setup
-from bubblefit.cli.project import read_project
+from bubblefit.projects.bubble import read_project
 from bubblefit.solvers.base import PARAMETERS
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.bubble_setup import bubble_setup
 from threadpoolctl import threadpool_info, threadpool_limits
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bubble-known-solution"

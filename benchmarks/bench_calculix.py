@@ -14,17 +14,17 @@ from dataclasses import replace
 
 import numpy as np
 from bench_analysis import EXAMPLE, seconds
-from bubblefit.cli.bubble_setup import bubble_setup
-from bubblefit.cli.project import read_project
-from bubblefit.cli.project_data import KnownSolution
 from bubblefit.errors import SolverFailure
 from bubblefit.identification.assessment import moduli_error
 from bubblefit.identification.methods import FitOptions
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
+from bubblefit.projects.bubble import read_project
+from bubblefit.projects.bubble_data import KnownSolution
 from bubblefit.runs.start import EvaluationRecord, run_start
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.bubble_setup import bubble_setup
 from threadpoolctl import threadpool_limits
 
 METHODS = (("lm", "led by the membrane"), ("slsqp", "differences"), ("cobyla", "no derivatives"))

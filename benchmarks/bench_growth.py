@@ -12,14 +12,14 @@ import time
 
 import numpy as np
 from bench_analysis import EXAMPLE
-from bubblefit.cli.bubble_setup import bubble_setup
-from bubblefit.cli.project import read_project
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
+from bubblefit.projects.bubble import read_project
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.bubble_setup import bubble_setup
 from threadpoolctl import threadpool_limits
 
 QUADS = (192, 450, 800, 1800, 3200, 7200, 20_000)

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from bench_analysis import EXAMPLE
-from bubblefit.cli.bubble_setup import bubble_setup
-from bubblefit.cli.project import read_project
+from bubblefit.projects.bubble import read_project
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.bubble_setup import bubble_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data" / "benchmarks" / "marc_bubble_profiles.csv"

@@ -13,12 +13,12 @@ from functools import partial
 
 import numpy as np
 from bench_analysis import EXAMPLE
-from bubblefit.cli.bubble_setup import bubble_problem
 from bubblefit.cli.options import cores
-from bubblefit.cli.project import read_project
 from bubblefit.identification.methods import FitOptions
+from bubblefit.projects.bubble import read_project
 from bubblefit.runs.processes import run_starts
 from bubblefit.runs.start import StartRecord
+from bubblefit.studies.bubble_setup import bubble_problem
 
 #: Name, how, and what is remarkable about it.
 METHODS = {

@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bubblefit.cli.uniaxial_project import read_uniaxial
-from bubblefit.cli.uniaxial_setup import strip_models
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.projects.uniaxial import read_uniaxial
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.uniaxial_setup import strip_models
 
 # Thesis Table 3.2, GPa; beta_0 is garbled in the scan, its last digits are those of Table 4.2.
 TABLE_3_2 = [

@@ -14,13 +14,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from bubblefit.cli.bubble_results import assess
-from bubblefit.cli.bubble_setup import bubble_problem, bubble_setup
 from bubblefit.cli.options import cores
-from bubblefit.cli.project import read_project
 from bubblefit.identification.methods import FitOptions
+from bubblefit.projects.bubble import read_project
 from bubblefit.runs.processes import run_starts
 from bubblefit.runs.start import StartRecord
+from bubblefit.studies.bubble_results import assess
+from bubblefit.studies.bubble_setup import bubble_problem, bubble_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = {1: 1.55, 2: 1.66, 3: 1.70}

@@ -8,12 +8,12 @@ from typing import Any
 
 import click
 
-from .bubble_figures import report
-from .bubble_results import assess, summary, write_numbers
-from .bubble_setup import bubble_problem, bubble_setup
-from .fingerprint import fingerprint
-from .fit_results import write_result
-from .project import read_project
+from ..projects.bubble import read_project
+from ..studies.bubble_figures import report
+from ..studies.bubble_results import assess, summary, write_numbers
+from ..studies.bubble_setup import bubble_problem, bubble_setup
+from ..studies.fingerprint import fingerprint
+from ..studies.results import write_result
 from .study import run_study, study_options, tell, with_options
 
 

@@ -12,17 +12,17 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..identification.validation import FoldError, folds_of, validate
+from ..projects.schema import FORMS
+from ..projects.uniaxial import UniaxialProject, read_uniaxial
 from ..runs.folder import RESULT
+from ..studies.compare_results import FormResult, comparison, comparison_lines, write_comparison
+from ..studies.fingerprint import fingerprint
+from ..studies.results import best_fit, save_card
+from ..studies.uniaxial_results import strip_results
+from ..studies.uniaxial_setup import uniaxial_problem, uniaxial_setup
 from ..writing import replacing
-from .compare_results import FormResult, comparison, comparison_lines, write_comparison
-from .fingerprint import fingerprint
-from .fit_results import best_fit, save_card
 from .options import default_folder
-from .project_schema import FORMS
 from .study import fit_options, run_study, study_options, with_options
-from .uniaxial_project import UniaxialProject, read_uniaxial
-from .uniaxial_results import strip_results
-from .uniaxial_setup import uniaxial_problem, uniaxial_setup
 
 VALIDATION = "validation.json"
 FEW_STARTS = 5

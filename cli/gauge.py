@@ -11,11 +11,11 @@ import click
 from ..errors import OutputError
 from ..experiments.gauge import virtual_strain_gauge
 from ..experiments.gauge_frames import read_gauge_frames
+from ..projects.schema import LENGTH_UNITS
 from .frame_files import frame_files
 from .gauge_options import check_options, column_names
 from .gauge_results import gauge_lines, gauge_result, gauge_table, loads_at_frames
 from .options import exits
-from .project_schema import LENGTH_UNITS
 
 FILE = click.Path(path_type=Path)
 

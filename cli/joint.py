@@ -9,12 +9,12 @@ from typing import Any
 
 import click
 
-from .fingerprint import fingerprint
-from .fit_results import write_result
-from .joint_figures import report_joint
-from .joint_project import read_joint
-from .joint_results import assess_joint, joint_summary, write_joint_numbers
-from .joint_setup import joint_problem, joint_setup
+from ..projects.joint import read_joint
+from ..studies.fingerprint import fingerprint
+from ..studies.joint_figures import report_joint
+from ..studies.joint_results import assess_joint, joint_summary, write_joint_numbers
+from ..studies.joint_setup import joint_problem, joint_setup
+from ..studies.results import write_result
 from .study import run_study, study_options, tell, with_options
 
 

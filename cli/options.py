@@ -15,7 +15,7 @@ import click
 from ..errors import BubblefitError, InputError
 
 if TYPE_CHECKING:
-    from .fit_project import FitProject
+    from ..projects.fit import FitProject
 
 Project = TypeVar("Project", bound="FitProject")
 INTERRUPTED = 130

@@ -14,14 +14,14 @@ import numpy as np
 
 from ..errors import OutputError
 from ..materials.card import read_card
+from ..projects.bubble import read_project
 from ..reports import plot_profiles, write_vtu
+from ..studies.bubble_setup import bubble_model
+from ..studies.results import STRAINS, UNSTABLE, beyond_card, strains_of
+from ..studies.setup import project_solver
 from ..writing import replacing
-from .bubble_setup import bubble_model
-from .fit_results import STRAINS, UNSTABLE, beyond_card, strains_of
-from .fit_setup import project_solver
 from .options import default_folder, exits, solver_choice, with_solver
 from .progress import run_progress
-from .project import read_project
 
 
 @click.command("bubble")

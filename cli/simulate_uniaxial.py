@@ -17,16 +17,16 @@ from ..experiments.tables import write_table
 from ..materials.card import MaterialCard, read_card
 from ..meshes.strain import middle_strain
 from ..models.uniaxial import UniaxialModel
+from ..projects.uniaxial import UniaxialProject, read_uniaxial
 from ..reports import plot_loads
 from ..solvers.base import History
+from ..studies.results import STRAINS, beyond_card, strains_of
+from ..studies.setup import project_solver
+from ..studies.uniaxial_figures import draw_bias, load_panels
+from ..studies.uniaxial_setup import strip_models
 from ..writing import replacing
-from .fit_results import STRAINS, beyond_card, strains_of
-from .fit_setup import project_solver
 from .options import default_folder, exits, solver_choice, with_solver
 from .progress import run_progress
-from .uniaxial_figures import draw_bias, load_panels
-from .uniaxial_project import UniaxialProject, read_uniaxial
-from .uniaxial_setup import strip_models
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,10 +15,10 @@ import click
 from ..errors import InputError, NoFeasibleStart
 from ..identification.methods import METHODS, FitOptions
 from ..identification.problem import FitProblem
+from ..projects.fit import FitProject
 from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
 from ..runs.start import StartRecord
-from .fit_project import FitProject
 from .options import cores, default_folder, exits, solver_choice, with_solver
 from .progress import StudyProgress
 
@@ -99,12 +99,6 @@ def run_study(
     if all(r.objective is None for r in records):
         raise NoFeasibleStart(f"{options['project']}: no feasible start: {records[0].status}")
     return folder, records
-
-
-def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:
-    """The starts that ended with a fit, best first."""
-    found = [r for r in records if r.objective is not None]
-    return sorted(found, key=lambda r: (r.objective, r.number))
 
 
 def tell(result: dict[str, Any], summary: str, fail_above: float | None, as_json: bool) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 
 import click
 
-from .fingerprint import fingerprint
-from .fit_results import write_result
+from ..projects.uniaxial import read_uniaxial
+from ..studies.fingerprint import fingerprint
+from ..studies.results import write_result
+from ..studies.uniaxial_figures import report_uniaxial
+from ..studies.uniaxial_results import assess_uniaxial, uniaxial_summary, write_uniaxial_numbers
+from ..studies.uniaxial_setup import uniaxial_problem, uniaxial_setup
 from .study import run_study, study_options, tell, with_options
-from .uniaxial_figures import report_uniaxial
-from .uniaxial_project import read_uniaxial
-from .uniaxial_results import assess_uniaxial, uniaxial_summary, write_uniaxial_numbers
-from .uniaxial_setup import uniaxial_problem, uniaxial_setup
 
 
 @click.command("uniaxial")

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 from bubblefit.cli.frame_files import frame_files
 from bubblefit.cli.main import main
-from bubblefit.cli.uniaxial_project import read_uniaxial
 from bubblefit.errors import InputError
 from bubblefit.experiments.machine_loads import read_machine_loads, read_times
+from bubblefit.projects.uniaxial import read_uniaxial
 from click.testing import CliRunner, Result
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")

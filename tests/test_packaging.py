@@ -115,7 +115,7 @@ def test_links_of_the_documents_lead_somewhere():
 
 
 def test_every_key_of_the_project_file_is_documented():
-    from bubblefit.cli.uniaxial_schema import JointFile, UniaxialFile
+    from bubblefit.projects.uniaxial_schema import JointFile, UniaxialFile
 
     text = (ROOT / "docs" / "project-file.md").read_text()
 

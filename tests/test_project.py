@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.cli.project import BubbleProject, read_project
-from bubblefit.cli.project_data import KnownSolution, PointFiles
 from bubblefit.errors import InputError
+from bubblefit.projects.bubble import BubbleProject, read_project
+from bubblefit.projects.bubble_data import KnownSolution, PointFiles
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.cli.fit_setup import parameters_of
-from bubblefit.cli.joint_project import JointProject, read_joint
 from bubblefit.cli.main import main
-from bubblefit.cli.uniaxial_project import UniaxialProject, read_uniaxial
 from bubblefit.errors import InputError
+from bubblefit.projects.joint import JointProject, read_joint
+from bubblefit.projects.uniaxial import UniaxialProject, read_uniaxial
+from bubblefit.studies.setup import parameters_of
 from click.testing import CliRunner
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

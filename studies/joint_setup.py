@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from ..experiments.fields import DisplacementField
 from ..identification.problem import FitProblem
+from ..projects.joint import JointProject
 from .bubble_setup import BubbleSetup, bubble_parameters, bubble_setup
-from .fit_setup import law_of, lead
-from .joint_project import JointProject
+from .setup import law_of, lead
 from .uniaxial_setup import UniaxialSetup, setup_of, strip_experiments
 
 DIRECTIONS = 3  # blocks of a bubble at each pressure

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ..experiments.surfaces import write_surfaces
 from ..identification.assessment import moduli_error
+from ..projects.bubble import BubbleProject
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
 from ..writing import replacing
 from .bubble_setup import BubbleSetup
-from .fit_results import BestFit, best_fit, common_result, save_card, summary_lines
-from .project import BubbleProject
+from .results import BestFit, best_fit, common_result, save_card, summary_lines
 
 Array = NDArray[np.float64]
 

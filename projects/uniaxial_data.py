@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..experiments.curves import LoadCurve
 from ..experiments.load_polynomials import LoadPolynomial, fit_load_polynomial, specimen_scatter
 from ..experiments.published_polynomials import read_published_polynomials
-from .project_schema import LENGTH_UNITS, UnitsSection
+from .schema import LENGTH_UNITS, UnitsSection
 from .uniaxial_files import DIRECTIONS, ListedFile, listed_files, measured_curves
 from .uniaxial_schema import CurvesSection, GaugeSection, UniaxialSection
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.law import MODULI, HypoelasticLaw
+from ..projects.fit import FitProject
 from ..reports import Report, StartRow, Table, plot_optima, write_report
 from ..runs.folder import OutputFolder
-from .fit_project import FitProject
-from .fit_results import BestFit
+from .results import BestFit
 
 Array = NDArray[np.float64]
 BEST = 5  # fits drawn together, as in Figs 4.9 to 4.11

@@ -12,11 +12,11 @@ import numpy as np
 
 from ..experiments.tables import write_table
 from ..identification.validation import FoldError
+from ..projects.uniaxial import UniaxialProject
 from ..reports import LawRow, Report, Table, plot_laws, plot_loads, write_report
 from ..writing import replacing
-from .fit_results import BestFit
+from .results import BestFit
 from .uniaxial_figures import load_panels
-from .uniaxial_project import UniaxialProject
 from .uniaxial_setup import UniaxialSetup
 
 #: Of the smallest cross-validated error: a simpler form within it is as good.

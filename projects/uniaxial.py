@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..experiments.regions import strain_regions
 from ..models.uniaxial import GRIP_DISTANCE, WIDTH
-from .fit_project import FitProject, common_settings, parse
-from .project_schema import LENGTH_UNITS, CommonFile
+from .fit import FitProject, common_settings, parse
+from .schema import LENGTH_UNITS, CommonFile
 from .uniaxial_data import StripData, read_strips
 from .uniaxial_schema import UniaxialFile, UniaxialSection
 

@@ -19,10 +19,10 @@ from ..meshes.disk import disk_mesh
 from ..meshes.location import sampling_matrix
 from ..meshes.mesh import Mesh
 from ..models.bubble import BubbleModel
+from ..projects.bubble import BubbleProject
+from ..projects.bubble_data import KnownSolution, PointFiles
 from ..solvers.base import Solver
-from .fit_setup import law_of, lead, parameters_of, project_solver
-from .project import BubbleProject
-from .project_data import KnownSolution, PointFiles
+from .setup import law_of, lead, parameters_of, project_solver
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,8 @@ from ..experiments.polynomial_order import compare_orders
 from ..materials.law import MODULI
 from ..meshes.strain import middle_strain
 from ..models.uniaxial import UniaxialModel
+from ..projects.uniaxial import UniaxialProject
+from ..projects.uniaxial_data import StripData
 from ..reports import (
     OrderErrors,
     StripCurves,
@@ -25,9 +27,7 @@ from ..reports import (
 )
 from ..runs.folder import RESULT, OutputFolder
 from ..solvers.base import History
-from .fit_report import best_laws, certainty_table, draw_optima, moduli_curves, write_page
-from .uniaxial_data import StripData
-from .uniaxial_project import UniaxialProject
+from .page import best_laws, certainty_table, draw_optima, moduli_curves, write_page
 from .uniaxial_results import UniaxialAssessment
 from .uniaxial_setup import UniaxialSetup
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from .fit_project import FitProject, common_settings, parse
-from .project import BubbleProject, bubble_settings
-from .uniaxial_project import UniaxialProject, default_breaks, default_range, uniaxial_settings
+from .bubble import BubbleProject, bubble_settings
+from .fit import FitProject, common_settings, parse
+from .uniaxial import UniaxialProject, default_breaks, default_range, uniaxial_settings
 from .uniaxial_schema import JointFile
 
 

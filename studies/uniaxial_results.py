@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..experiments.tables import write_table
+from ..projects.uniaxial import UniaxialProject
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
 from ..solvers.base import History
 from ..writing import replacing
-from .fit_results import BestFit, best_fit, common_result, save_card, summary_lines
-from .uniaxial_project import UniaxialProject
+from .results import BestFit, best_fit, common_result, save_card, summary_lines
 from .uniaxial_setup import UniaxialSetup
 
 OBJECTIVES = {

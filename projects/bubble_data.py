@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .project_schema import (
+from .schema import (
     LENGTH_UNITS,
     MODULUS_UNITS,
     PRESSURE_UNITS,

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from .project_schema import (
+from .schema import (
     CommonFile,
     CommonFitSection,
     LoadUnit,

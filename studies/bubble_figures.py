@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from ..identification.blocks import Blocks
 from ..materials.law import MODULI
+from ..projects.bubble import BubbleProject
 from ..reports import Table, plot_heights, plot_moduli, plot_profiles, write_vtu
 from ..runs.folder import RESULT, OutputFolder
 from ..solvers.base import History
 from .bubble_setup import BubbleSetup
-from .fit_report import best_laws, certainty_table, draw_optima, moduli_curves, write_page
-from .project import BubbleProject
+from .page import best_laws, certainty_table, draw_optima, moduli_curves, write_page
 
 if TYPE_CHECKING:
     from .bubble_results import Assessment

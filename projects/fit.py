@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ..errors import InputError
-from .fit_bounds import read_bounds
-from .project_errors import first_error
-from .project_schema import FORMS, MODULUS_UNITS, CalculixSection, CommonFile, Form
+from .bounds import read_bounds
+from .schema import FORMS, MODULUS_UNITS, CalculixSection, CommonFile, Form
+from .schema_errors import first_error
 
 Array = NDArray[np.float64]
 File = TypeVar("File", bound=CommonFile)

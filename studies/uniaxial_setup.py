@@ -13,9 +13,9 @@ from ..identification.experiment import Experiment
 from ..identification.loads import LoadObjective
 from ..identification.problem import FitProblem
 from ..models.uniaxial import UniaxialModel, bias_strip, straight_strip
-from .fit_setup import law_of, lead, parameters_of, project_solver
-from .uniaxial_data import StripData
-from .uniaxial_project import UniaxialProject
+from ..projects.uniaxial import UniaxialProject
+from ..projects.uniaxial_data import StripData
+from .setup import law_of, lead, parameters_of, project_solver
 
 Array = NDArray[np.float64]
 

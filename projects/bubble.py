@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from ..errors import InputError
 from ..models.bubble import default_increments
-from .fit_project import FitProject, common_settings, parse
-from .project_data import KnownSolution, PointFiles, locate_data, merge_increments
-from .project_schema import LENGTH_UNITS, PRESSURE_UNITS, ProjectFile
+from .bubble_data import KnownSolution, PointFiles, locate_data, merge_increments
+from .fit import FitProject, common_settings, parse
+from .schema import LENGTH_UNITS, PRESSURE_UNITS, ProjectFile
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import __version__
 from ..identification.problem import FitProblem
-from .fit_project import FitProject
+from ..projects.fit import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
 FREE = {"path", "title", "starts", "data", "strips", "solver_options"}

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identification.assessment import moduli_error, pinned_by
+from ..projects.joint import JointProject
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
 from .bubble_results import data_result, nuisance_result, surface_warnings
-from .fit_results import BestFit, best_fit, common_result, save_card, summary_lines
-from .joint_project import JointProject
 from .joint_setup import JointSetup
+from .results import BestFit, best_fit, common_result, save_card, summary_lines
 from .uniaxial_results import rms_lines, strip_results, strip_warnings, write_loads
 
 Array = NDArray[np.float64]

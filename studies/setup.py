@@ -10,9 +10,9 @@ from ..errors import InputError, SolverFailure
 from ..identification.parameters import ModuliParameters
 from ..identification.problem import FitProblem
 from ..materials.law import HypoelasticLaw
+from ..projects.fit import FitProject
 from ..solvers.base import DifferentiatingSolver, Solver
 from ..solvers.registry import solver_named
-from .fit_project import FitProject
 
 #: Leads the fit where the solver that counts gives no derivatives.
 SURROGATE = "membrane"

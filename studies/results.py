@@ -19,11 +19,10 @@ from ..identification.assessment import Certainty, certainty
 from ..identification.problem import Evaluation, FitProblem
 from ..materials.card import MaterialCard, write_card
 from ..materials.law import HypoelasticLaw
+from ..projects.fit import FitProject
 from ..runs.folder import RESULT, OutputFolder
 from ..runs.start import StartRecord
 from ..solvers.base import History
-from .fit_project import FitProject
-from .study import ranking
 
 Array = NDArray[np.float64]
 
@@ -75,6 +74,12 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     valid = np.minimum(reached, law.strain_range)
     sure = certainty(leading, slopes, law, valid) if slopes is not None else None
     return BestFit(best, slopes, law, ranked, records, reached, sure)
+
+
+def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:
+    """The starts that ended with a fit, best first."""
+    found = [r for r in records if r.objective is not None]
+    return sorted(found, key=lambda r: (r.objective, r.number))
 
 
 def strains_of(history: History) -> Array:

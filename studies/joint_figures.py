@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..materials.law import MODULI
+from ..projects.joint import JointProject
 from ..reports import Table, plot_moduli, plot_pinned
 from ..runs.folder import OutputFolder
 from .bubble_figures import bubble_facts, bubble_figures, bubble_tables
-from .fit_report import best_laws, draw_optima, moduli_curves, write_page
-from .joint_project import JointProject
 from .joint_results import JointAssessment
 from .joint_setup import JointSetup
+from .page import best_laws, draw_optima, moduli_curves, write_page
 from .uniaxial_figures import FILES, order_figures, strip_figures, strip_table
 
 JOINT_FILES = (*FILES, ("bubble.vtu", "the inflated bubble at the last pressure, for ParaView"))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..identification.parameters import ModuliParameters
-from .project_schema import FORMS, CommonFile
+from .schema import FORMS, CommonFile
 
 #: Smallest modulus allowed anywhere on the strain range (MPa), unless the file says otherwise.
 DEFAULT_MARGIN_E, DEFAULT_MARGIN_G = 5.0, 0.5
