@@ -14,17 +14,20 @@ Array = NDArray[np.float64]
 def approach(problem: FitProblem, start: Array, tolerance: float, max_analyses: int) -> Array:
     """Unknowns at the least of the misfit of the tests that lead in; `start` where there are none.
 
-    From a random start a bubble asks for moduli that strips do not survive: nearly every step
-    ends without an equilibrium of the bias strip, and the fit creeps. Strips alone get to their
-    optimum from anywhere, and all tests together from there. `start` also where the other tests
-    fail, or are unstable, at that optimum.
+    From a random start nearly every step of a joint fit can end without an equilibrium of the bias
+    strip, and the fit creeps. Strips along the yarns get to their optimum from anywhere; from there
+    the bias strip does, which mostly has G12 to find; and from there all tests together. `start`
+    also where a test fails, or is unstable, at the optimum of the others.
     """
     if not problem.lead_in:
         return start
-    part = problem.part(problem.lead_in)
-    found = levenberg_marquardt(part, start, tolerance, max_analyses)
-    problem.analyses = part.analyses
-    if found is None or problem.analyses >= max_analyses:
-        return start
-    point = problem.evaluate(found.best.unknowns, False, warm=False)
-    return found.best.unknowns if point is not None and point.stable else start
+    y = start
+    for tests in problem.lead_in:
+        part = problem.part(tests)
+        found = levenberg_marquardt(part, y, tolerance, max_analyses)
+        problem.analyses = part.analyses
+        if problem.analyses >= max_analyses:
+            return start
+        y = start if found is None else found.best.unknowns
+    point = problem.evaluate(y, False, warm=False)
+    return y if point is not None and point.stable else start

@@ -53,8 +53,8 @@ class FitProblem:
     """Tests, a law and unknowns of one fit; an analysis runs every test once.
 
     `law` carries nu12, strain range and thickness option; its beta is replaced. `surrogate`: the
-    same problem for a solver that differentiates, where this one's does not. `lead_in`: numbers
-    of tests that a fit matches first (see `approach`).
+    same problem for a solver that differentiates, where this one's does not. `lead_in`: groups
+    of tests, by their numbers, that a fit matches first (see `approach`).
     """
 
     experiments: tuple[Experiment, ...]
@@ -65,7 +65,7 @@ class FitProblem:
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
     warm_starts: bool = True
-    lead_in: tuple[int, ...] = ()
+    lead_in: tuple[tuple[int, ...], ...] = ()
     blocks: Blocks = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from ..identification.problem import FitProblem
 from ..projects.fit import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
-FREE = {"path", "title", "starts", "data", "strips", "solver_options"}
+FREE = {"path", "title", "starts", "data", "solver_options"}
 # Of an external solver's options, what does.
 DECK = ("element", "templates")
 
@@ -37,6 +37,9 @@ def _settings(project: FitProject) -> Iterator[str]:
         value = getattr(project, field.name)
         if isinstance(value, FitProject):  # a part of a joint fit
             yield from (f"{field.name}.{setting}" for setting in _settings(value))
+        elif field.name == "strips":  # their loads are hashed as data, their lengths are the model
+            for direction, strip in value.items():
+                yield f"{direction}={strip.gauge_length!r},{strip.final_length!r};"
         elif field.name not in FREE:
             yield f"{field.name}={_plain(value)};"
 

@@ -9,7 +9,7 @@ from ..identification.problem import FitProblem
 from ..projects.joint import JointProject
 from .bubble_setup import BubbleSetup, bubble_parameters, bubble_setup
 from .setup import law_of, lead
-from .uniaxial_setup import UniaxialSetup, setup_of, strip_experiments
+from .uniaxial_setup import UniaxialSetup, lead_in, setup_of, strip_experiments
 
 DIRECTIONS = 3  # blocks of a bubble at each pressure
 
@@ -45,7 +45,7 @@ def joint_setup(
         experiments,
         law_of(project),
         bubble_parameters(project.bubble),
-        lead_in=tuple(range(1, len(experiments))),
+        lead_in=(*lead_in(tests, 1), tuple(range(1, len(experiments)))),
     )
     lead(problem)
     return JointSetup(problem, bubble, setup_of(strips, problem, tests))

@@ -86,6 +86,15 @@ def strip_experiments(
     return tuple(tests)
 
 
+def lead_in(tests: Sequence[Experiment], first: int = 0) -> tuple[tuple[int, ...], ...]:
+    """The strips along the yarns, by their numbers from `first`, where there is a bias strip too.
+
+    Their loads follow from the moduli at any strain; a bias strip can fail at the first increment.
+    """
+    straight = tuple(first + k for k, e in enumerate(tests) if e.name != "bias")
+    return (straight,) if 0 < len(straight) < len(tests) else ()
+
+
 def uniaxial_setup(project: UniaxialProject) -> UniaxialSetup:
     """Set up the fit.
 
