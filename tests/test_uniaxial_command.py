@@ -106,6 +106,8 @@ def test_the_files_of_a_study_agree(study):
     assert result["e_uniaxial_N"] == pytest.approx(sum(errors))
     assert result["objective"] == pytest.approx(sum(errors), rel=1e-6)
     assert result["objective"] == min(s["objective"] for s in result["starts"])
+    # Every start ends there: start 1 once stopped at the border of a positive definite law.
+    assert [s["objective"] for s in result["starts"]] == pytest.approx([result["objective"]] * 3)
 
     loads = pd.read_csv(out / "loads.csv")
     for direction, (start, end) in LENGTHS.items():
