@@ -75,8 +75,8 @@ class ModuliParameters:
         block = np.repeat(STRAIN_OF_BLOCK, degree + 1)
         low, high = t * least[block], t * largest[block]
         lower, upper = np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
-        ends = {"least": np.asarray(least, float), "largest": np.asarray(largest, float)}
-        return replace(draft, lower=lower, upper=upper, **ends)
+        low, high = np.asarray(least, float), np.asarray(largest, float)
+        return replace(draft, lower=lower, upper=upper, least=low, largest=high)
 
     @property
     def places(self) -> NDArray[np.intp]:
