@@ -597,7 +597,7 @@ def test_another_joint_study_is_not_resumed(together, tmp_path):
 
 
 def test_strips_fitted_by_calculix(ccx, tmp_path):
-    """Warp and fill of a known law: led by the membrane, in few runs (a bias strip takes minutes)."""
+    """Warp and fill of a known law, led by the membrane; a bias strip would take minutes."""
     write_points(tmp_path / "points.csv")
     lines = (tmp_path / "points.csv").read_text().splitlines(keepends=True)
     (tmp_path / "points.csv").write_text("".join(x for x in lines if not x.startswith("bias")))
