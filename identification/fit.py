@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 SAME = 1e-5  # e of the same equilibrium, found twice
 MOST_REWEIGHTED = 40  # analyses of the second stage
+FEW = 20  # analyses of a fit without warm starts, at least
 STIFFER = (2.0, 4.0)  # shear moduli of the restarts away from instability
 
 
@@ -38,7 +39,7 @@ def levenberg_marquardt(
         other, how = _from_stiffer(problem, best, factor, tolerance, max_analyses)
         if other.value < best.value:
             best, status = other, how
-    if best.value < tolerance or problem.analyses >= max_analyses:
+    if best.value < tolerance:
         return Optimum(best, status, problem.analyses)
     # What a card promises has to be found from the flat state: make sure that the fit did not
     # settle on a branch that only its own warm starts reach.
@@ -49,7 +50,9 @@ def levenberg_marquardt(
     again = cold if cold is not None else problem.evaluate(start, True)
     if again is None:
         return None
-    best, status = _both_stages(problem, again, tolerance, max_analyses)
+    # A fit that used up its analyses with warm starts gets as many as a usual one takes.
+    limit = max(max_analyses, problem.analyses + FEW)
+    best, status = _both_stages(problem, again, tolerance, limit)
     return Optimum(best, status, problem.analyses)
 
 

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: Order of the moduli in beta, and the place of their strain in (eps1, eps2, gamma12).
 STRAIN_OF_BLOCK = (2, 1, 0)
+#: How far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
+DEFINITE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class ModuliParameters:
     least, largest : (3,) MPa, the least and largest E1, E2, G12 allowed anywhere on the strain
         range, both or neither; `least` then takes the place of the margins, and starts are drawn
         from modulus values between the two instead of from the box of the coefficients.
+    strip_nu12 : Poisson's ratio where strips are pulled: they contract, so that the modulus across
+        is that at zero strain, and E1 > nu12^2 E2 (a positive definite law) is linear there.
     """
 
     degree: int
@@ -52,6 +56,7 @@ class ModuliParameters:
     breaks: Array | None = None
     least: Array | None = None
     largest: Array | None = None
+    strip_nu12: float | None = None
 
     @classmethod
     def between(
@@ -149,6 +154,12 @@ class ModuliParameters:
         if self.largest is not None:
             a = np.vstack([a, -moduli * size[:, None]])
             c = np.append(c, -np.repeat(self.largest[list(STRAIN_OF_BLOCK)], GRID) * size)
+        if self.strip_nu12 is not None:
+            e2, e1 = moduli[GRID : 2 * GRID], moduli[2 * GRID :]
+            share = DEFINITE * self.strip_nu12**2
+            definite = np.vstack([e1[0] - share * e2, e1 - share * e2[0]])
+            definite /= np.abs(definite).max(axis=1, keepdims=True)
+            a, c = np.vstack([a, definite]), np.append(c, np.zeros(len(definite)))
         extra = len(self.nuisance)
         if extra:
             wide = np.zeros((len(a) + 2 * extra, self.size + extra))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..experiments.fields import DisplacementField
 from ..identification.problem import FitProblem
@@ -44,7 +44,7 @@ def joint_setup(
     problem = FitProblem(
         experiments,
         law_of(project),
-        bubble_parameters(project.bubble),
+        replace(bubble_parameters(project.bubble), strip_nu12=project.nu12),
         lead_in=(*lead_in(tests, 1), tuple(range(1, len(experiments)))),
     )
     lead(problem)

@@ -89,7 +89,7 @@ def strip_experiments(
 def lead_in(tests: Sequence[Experiment], first: int = 0) -> tuple[tuple[int, ...], ...]:
     """The strips along the yarns, by their numbers from `first`, where there is a bias strip too.
 
-    Their loads follow from the moduli at any strain; a bias strip can fail at the first increment.
+    They are homogeneous and hardly ever fail; a bias strip can at its first increment.
     """
     straight = tuple(first + k for k, e in enumerate(tests) if e.name != "bias")
     return (straight,) if 0 < len(straight) < len(tests) else ()
@@ -123,6 +123,7 @@ def uniaxial_problem(
 ) -> FitProblem:
     """Only the fit: what each worker process builds for itself."""
     tests = strip_experiments(project, kept=kept)
-    problem = FitProblem(tests, law_of(project), parameters_of(project))
+    parameters = parameters_of(project, strip_nu12=project.nu12)
+    problem = FitProblem(tests, law_of(project), parameters, lead_in=lead_in(tests))
     lead(problem)
     return problem

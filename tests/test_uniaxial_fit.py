@@ -19,10 +19,10 @@ from bubblefit.identification.least_squares import descend
 from bubblefit.identification.loads import LoadObjective
 from bubblefit.identification.methods import FitOptions, fit_from
 from bubblefit.identification.objective import FieldObjective, FieldTarget
-from bubblefit.identification.parameters import ModuliParameters
+from bubblefit.identification.parameters import DEFINITE, ModuliParameters
 from bubblefit.identification.problem import FitProblem
 from bubblefit.materials.law import MODULI, HypoelasticLaw
-from bubblefit.materials.positivity import GRID
+from bubblefit.materials.positivity import GRID, modulus_grid
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
@@ -360,6 +360,26 @@ def test_no_analysis_of_a_fit_leaves_the_bounds() -> None:
     law = LAW.with_beta(tight.beta(found.best.unknowns))
     assert law.E1(np.linspace(0, RANGE[0], GRID)).max() == pytest.approx(700.0, rel=1e-6)
     assert law.E2(np.linspace(0, RANGE[1], GRID)).min() == pytest.approx(150.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_strips_keep_the_law_positive_definite(form: str) -> None:
+    """E1 E2 > (nu12 E2)^2 with the modulus across at zero strain, because a strip contracts."""
+    parameters, _ = FORMS[form]
+    bounded = replace(parameters, strip_nu12=0.4)
+    draws = parameters.draw(np.random.default_rng(4), 3000)
+    a, c = bounded.inequalities
+    agreed = {True: 0, False: 0}
+    for coefficients in draws[parameters.allowed(draws)][:200]:
+        law = HypoelasticLaw(full(parameters, coefficients), 0.4, RANGE, "constant",
+                             parameters.breaks)  # fmt: skip
+        grid = modulus_grid(RANGE, parameters.breaks) @ law.beta
+        e2, e1 = grid[GRID : 2 * GRID], grid[2 * GRID :]
+        worst = min((e1[0] / e2).min(), (e1 / e2[0]).min()) / 0.4**2
+        inside = bool((a @ bounded.unknowns(coefficients) >= c - 1e-12).all())
+        assert inside == (worst >= DEFINITE)
+        agreed[inside] += 1
+    assert min(agreed.values()) >= 5, agreed
 
 
 # A solver without derivatives, led by the membrane
