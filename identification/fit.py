@@ -26,17 +26,19 @@ def levenberg_marquardt(
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
 
-    Stops when e is below `tolerance`, on no progress, or after `max_analyses`.
+    Stops when e is below `tolerance`, on no progress, or after `max_analyses` (some more only
+    where the fit turns out to hang on its warm starts).
     """
+    kept = max_analyses - 1  # the last one checks what was found from the unloaded state
     met = problem.unstable  # where the start was drawn is no matter of the fit
     first = problem.evaluate(start, True)
     if first is None:
         return None
-    best, status = _both_stages(problem, first, tolerance, max_analyses)
+    best, status = _both_stages(problem, first, tolerance, kept)
     for factor in STIFFER:
         if best.value < tolerance or problem.unstable == met:
             break
-        other, how = _from_stiffer(problem, best, factor, tolerance, max_analyses)
+        other, how = _from_stiffer(problem, best, factor, tolerance, kept)
         if other.value < best.value:
             best, status = other, how
     if best.value < tolerance:
