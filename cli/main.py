@@ -15,6 +15,7 @@ COMMANDS = {
     "joint": ("joint", "Fit a material to a bubble and strips together."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
+    "study": ("study_command", "What refinement, or nu12, changes in an analysis."),
     "init": ("init", "Write a commented example project."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }
