@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import InputError
+from ..models.bubble import BubbleModel
 from ..solvers.base import History
 from ..studies.poisson import PUBLISHED_SPREAD
 from ..studies.refinement import Curve, Level, edge_length
@@ -93,9 +94,7 @@ def levels(
 
 def _bubble_models(project: BubbleProject, what: What, factor: float) -> dict[str, Any]:
     if what == "elements":
-        return {
-            "bubble": bubble_model(replace(project, elements=round(project.elements * factor**2)))
-        }
+        return {"bubble": _refined_bubble(project, factor)}
     if factor != int(factor):
         problem = "the bubble's steps are divided, never joined: use --coarser 0"
         raise InputError(None, "increments", problem)
@@ -103,6 +102,16 @@ def _bubble_models(project: BubbleProject, what: What, factor: float) -> dict[st
     parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise(ends)]
     steps = tuple(float(p) for part in parts for p in part)
     return {"bubble": bubble_model(replace(project, increments=steps))}
+
+
+def _refined_bubble(project: BubbleProject, factor: float) -> BubbleModel:
+    """From the count that the project's mesh has, not the one asked for: so that finer meshes
+    divide its quads, as far as there is such a mesh."""
+    own = bubble_model(project)
+    if factor == 1:
+        return own
+    whole = len(own.mesh.quads) * (4 if project.symmetry == "quarter" else 1)
+    return bubble_model(replace(project, elements=round(whole * factor**2)))
 
 
 def _bubble_quantities(model: Any, history: History) -> dict[str, float]:
