@@ -69,6 +69,7 @@ def _model(runs: Sequence[LevelRun], accuracy: float) -> dict[str, Any]:
             for run in runs
         ],
         "quantities": {},
+        "warnings": list(good[-1].notes) if good else [],
     }
     if len(good) < 2:
         return found

@@ -88,7 +88,7 @@ def _run(study: Study, what: What, factors: list[float], quiet: bool) -> dict[st
         warm_up(study.solver, planned[0][name].model, law)
         for level in (p[name] for p in planned):
             with run_progress(study.solver, level.increments, quiet):
-                run = run_level(study.solver, level, law, kind.quantities, kind.curve)
+                run = run_level(study.solver, level, law, kind.quantities, kind.curve, study.notes)
             runs[name].append(run)
     if all(sum(r.values is not None for r in several) < 2 for several in runs.values()):
         reason = next(r.failure for several in runs.values() for r in several if r.failure)

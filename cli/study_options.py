@@ -14,9 +14,10 @@ import click
 from ..errors import OutputError
 from ..experiments.tables import write_table
 from ..materials.card import MaterialCard, read_card
-from ..solvers.base import Solver
+from ..solvers.base import History, Solver
 from ..writing import replacing
 from .fit_project import FitProject
+from .fit_results import UNSTABLE, beyond_card, strains_of
 from .fit_setup import project_solver
 from .options import default_folder, exits, solver_choice, with_solver
 from .study_kinds import StudyKind, study_kind
@@ -32,6 +33,11 @@ class Study:
     card_path: Path
     solver: Solver
     folder: Path
+
+    def notes(self, history: History) -> list[str]:
+        """What a reader of a run's values should know."""
+        unstable = [UNSTABLE] if history.stable is False else []
+        return [*history.remarks, *beyond_card(strains_of(history), self.card), *unstable]
 
 
 def card_options(command: Callable[..., Any]) -> Callable[..., Any]:

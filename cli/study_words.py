@@ -24,6 +24,7 @@ def convergence_lines(result: Mapping[str, Any]) -> list[str]:
         lines += [_quantity(*item) for item in model["quantities"].items()]
         if "rms_N" in model:
             lines.append(_rms(model["rms_N"]))
+        lines += [f"note: {name}, finest: {words}" for words in model["warnings"]]
     return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -40,7 +40,7 @@ class LevelRun:
 
     values : quantities of interest by name, None where the run failed; curve : (x, y) of the
     response, where levels are compared along one; seconds : wall clock; failure : why there are
-    no values.
+    no values; notes : what a reader of the values should know.
     """
 
     level: Level
@@ -49,6 +49,7 @@ class LevelRun:
     values: Mapping[str, float] | None = None
     curve: Curve | None = None
     failure: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def edge_length(mesh: Mesh) -> float:
@@ -71,6 +72,7 @@ def run_level(
     law: HypoelasticLaw,
     quantities: Callable[[Any, History], Mapping[str, float]],
     curve: Callable[[Any, History], Curve] | None = None,
+    notes: Callable[[History], Sequence[str]] = lambda history: history.remarks,
 ) -> LevelRun:
     """Run one level; an analysis that does not end well is a level without values."""
     begun = time.perf_counter()
@@ -81,7 +83,8 @@ def run_level(
     seconds = time.perf_counter() - begun
     values = quantities(level.model, history)
     along = None if curve is None else curve(level.model, history)
-    return LevelRun(level, seconds, history.iterations, values, along)
+    said = tuple(notes(history))
+    return LevelRun(level, seconds, history.iterations, values, along, notes=said)
 
 
 def rms_between(coarse: Curve, fine: Curve) -> float:

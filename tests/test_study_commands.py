@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
+from bubblefit.errors import SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from click.testing import CliRunner
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -124,6 +126,38 @@ def test_nu12_of_a_bubble_and_of_strips(bubble: Path) -> None:
     assert len(table) == 7 * 5
     assert (bubble / "out/nu12.png").stat().st_size > 10_000
     assert "bubble, 300 kPa" in done
+    assert result["models"]["bubble"]["failed"] == {}
+
+
+def test_what_a_reader_should_know_is_said(bubble: Path) -> None:
+    law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.05, 0.13, 0.13])
+    write_card(MaterialCard(law, 0.81), bubble / "card.toml")
+    for name, *options in (["nu12", "--nu12", 0.3], ["mesh", "--levels", 2]):
+        done = study(name, "project.toml", "--card", "card.toml", *options, "--out", name,
+                     cwd=bubble)  # fmt: skip
+        result = json.loads((bubble / name / "result.json").read_text())
+        (words,) = result["models"]["bubble"]["warnings"]
+        assert "beyond the card's valid range 0.050" in words and words in done
+
+
+def test_a_nu12_that_fails_is_named_and_left_out(
+    bubble: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = MembraneSolver.run
+
+    def picky(self: MembraneSolver, model, law, *args, **kwargs):
+        if law.nu12 > 0.4:
+            raise SolverFailure("no equilibrium at 186 kPa")
+        return run(self, model, law, *args, **kwargs)
+
+    monkeypatch.setattr(MembraneSolver, "run", picky)
+    options = ["project.toml", "--card", "card.toml", "--out", "out"]
+    done = study("nu12", *options, cwd=bubble)
+    assert "nu12 = 0.45: no equilibrium at 186 kPa" in done
+    model = json.loads((bubble / "out/result.json").read_text())["models"]["bubble"]
+    assert model["failed"] == {"0.45": "no equilibrium at 186 kPa"}
+    assert model["responses"]["300 kPa"]["to_base"][-1] is None
+    study("nu12", *options, "--overwrite", "--nu12", 0.45, cwd=bubble, code=4)
 
 
 def test_chosen_values_of_nu12(strips: Path) -> None:
