@@ -14,7 +14,7 @@ from ..studies.bubble_results import assess, summary, write_numbers
 from ..studies.bubble_setup import bubble_problem, bubble_setup
 from ..studies.fingerprint import fingerprint
 from ..studies.results import write_result
-from .study import run_study, study_options, tell, with_options
+from .fitting import run_study, study_options, tell, with_options
 
 
 @click.command("bubble")

@@ -21,8 +21,8 @@ from ..studies.results import best_fit, save_card
 from ..studies.uniaxial_results import strip_results
 from ..studies.uniaxial_setup import uniaxial_problem, uniaxial_setup
 from ..writing import replacing
+from .fitting import fit_options, run_study, study_options, with_options
 from .options import default_folder
-from .study import fit_options, run_study, study_options, with_options
 
 VALIDATION = "validation.json"
 FEW_STARTS = 5

@@ -15,7 +15,7 @@ from ..studies.joint_figures import report_joint
 from ..studies.joint_results import assess_joint, joint_summary, write_joint_numbers
 from ..studies.joint_setup import joint_problem, joint_setup
 from ..studies.results import write_result
-from .study import run_study, study_options, tell, with_options
+from .fitting import run_study, study_options, tell, with_options
 
 
 @click.command("joint")

@@ -16,6 +16,7 @@ COMMANDS = {
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
+    "study": ("study_command", "What refinement, or nu12, changes in an analysis."),
     "init": ("init", "Write a commented example project."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }

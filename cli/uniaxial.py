@@ -14,7 +14,7 @@ from ..studies.results import write_result
 from ..studies.uniaxial_figures import report_uniaxial
 from ..studies.uniaxial_results import assess_uniaxial, uniaxial_summary, write_uniaxial_numbers
 from ..studies.uniaxial_setup import uniaxial_problem, uniaxial_setup
-from .study import run_study, study_options, tell, with_options
+from .fitting import run_study, study_options, tell, with_options
 
 
 @click.command("uniaxial")

@@ -17,6 +17,8 @@ from ..meshes.strip import strip_mesh, yarn_direction
 ROLLERS: Mapping[str, tuple[int, ...]] = {"top": (1,), "symmetry_x": (0,)}
 #: Ends held as in the jaws of the machine.
 GRIPS: Mapping[str, tuple[int, ...]] = {"top": (0, 1), "bottom": (0,)}
+#: Quads across and along: half a straight strip (Fig. 3.5), the whole bias strip (Fig. 3.6).
+QUADS = {"straight": (5, 8), "bias": (10, 30)}
 #: Thesis section 3.1: cut strips, and section 3.3: equal increments.
 WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
 
@@ -97,8 +99,8 @@ def straight_strip(
     thickness: float,
     width: float = WIDTH,
     increments: int = INCREMENTS,
-    across: int = 5,
-    along: int = 8,
+    across: int = QUADS["straight"][0],
+    along: int = QUADS["straight"][1],
 ) -> UniaxialModel:
     """Warp or fill test: one half of the width over the gauge length (Fig. 3.5; 40 quads).
 
@@ -125,8 +127,8 @@ def bias_strip(
     length: float = GRIP_DISTANCE,
     angle: float = 45.0,
     increments: int = INCREMENTS,
-    across: int = 10,
-    along: int = 30,
+    across: int = QUADS["bias"][0],
+    along: int = QUADS["bias"][1],
 ) -> UniaxialModel:
     """Bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
 
@@ -139,6 +141,17 @@ def bias_strip(
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
     return UniaxialModel(mesh, yarn_direction(angle), thickness, levels, GRIPS)
+
+
+def refined_quads(strip: Literal["straight", "bias"], factor: float) -> dict[str, int]:
+    """The thesis' `across` and `along` of a strip times a factor, to the nearest that can be made.
+
+    A bias strip is whole and has nodes on its middle line: an even number across.
+    """
+    across, along = (factor * count for count in QUADS[strip])
+    if strip == "bias":
+        return {"across": max(2, 2 * round(across / 2)), "along": max(3, round(along))}
+    return {"across": max(1, round(across)), "along": max(1, round(along))}
 
 
 def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[float, ...]:

@@ -1,10 +1,12 @@
 """Figures, the HTML report and VTU files."""
 
+from .convergence import ConvergencePanel, plot_convergence
 from .html import Report, StartRow, Table, write_report
 from .laws import LawRow, plot_laws
 from .loads import StripCurves, plot_loads
 from .moduli import plot_moduli
 from .moduli_together import plot_moduli_together
+from .nu12 import plot_nu12
 from .optima import PUBLISHED_OPTIMA, plot_optima
 from .orders import OrderErrors, plot_orders
 from .pinned import plot_pinned
@@ -15,17 +17,20 @@ from .vtu import write_vtu
 
 __all__ = [
     "PUBLISHED_OPTIMA",
+    "ConvergencePanel",
     "LawRow",
     "OrderErrors",
     "Report",
     "StartRow",
     "StripCurves",
     "Table",
+    "plot_convergence",
     "plot_heights",
     "plot_laws",
     "plot_loads",
     "plot_moduli",
     "plot_moduli_together",
+    "plot_nu12",
     "plot_optima",
     "plot_orders",
     "plot_pinned",

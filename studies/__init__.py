@@ -1,1 +1,1 @@
-"""From a project to a fit ready to run, and from finished starts to results and pages."""
+"""Fits and series of analyses: from a project to something ready to run, and to its results."""

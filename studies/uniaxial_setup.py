@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..identification.experiment import Experiment
 from ..identification.loads import LoadObjective
 from ..identification.problem import FitProblem
-from ..models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from ..models.uniaxial import UniaxialModel, bias_strip, refined_quads, straight_strip
 from ..projects.uniaxial import UniaxialProject
 from ..projects.uniaxial_data import StripData
 from .setup import law_of, lead, parameters_of, project_solver
@@ -34,22 +34,34 @@ class UniaxialSetup:
     models: tuple[UniaxialModel, ...]
 
 
-def strip_models(project: UniaxialProject) -> dict[str, UniaxialModel]:
+def strip_models(project: UniaxialProject, refinement: float = 1.0) -> dict[str, UniaxialModel]:
     """The models of a project, by direction.
+
+    refinement : what the thesis' counts of quads across and along are multiplied with.
 
     Raises
     ------
     InputError : lengths that do not make a strip.
     """
-    return {direction: _model(project, strip) for direction, strip in project.strips.items()}
+    return {d: _model(project, strip, refinement) for d, strip in project.strips.items()}
 
 
-def _model(project: UniaxialProject, strip: StripData) -> UniaxialModel:
+def _model(project: UniaxialProject, strip: StripData, refinement: float) -> UniaxialModel:
     lengths = strip.gauge_length, strip.final_length, project.thickness, project.width
     if strip.direction == "bias":
-        return bias_strip(*lengths, project.grip_distance, project.bias_angle, project.increments)
-    direction = "warp" if strip.direction == "warp" else "fill"
-    return straight_strip(direction, *lengths, project.increments)  # type: ignore[arg-type]
+        return bias_strip(
+            *lengths,
+            project.grip_distance,
+            project.bias_angle,
+            project.increments,
+            **refined_quads("bias", refinement),
+        )
+    return straight_strip(
+        "warp" if strip.direction == "warp" else "fill",
+        *lengths,
+        project.increments,
+        **refined_quads("straight", refinement),
+    )
 
 
 def strip_experiments(

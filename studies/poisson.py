@@ -1,0 +1,57 @@
+"""How much the response depends on nu12, as Fig. 4.2 of the thesis draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+#: The values of Fig. 4.2.
+NU12 = (0.05, 0.15, 0.25, 0.35, 0.45)
+#: What the thesis found: the largest displacement, relative to the mean of the five.
+PUBLISHED = (1.029, 1.016, 1.0015, 0.985, 0.967)
+#: In its words: plus or minus three percent.
+PUBLISHED_SPREAD = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Ratios:
+    """A response at several nu12. values, to_base, to_mean (n,): itself, relative to the response
+    at the base nu12, and relative to the mean of all n (how Fig. 4.2 is normalised)."""
+
+    nu12: Array
+    values: Array
+    to_base: Array
+    to_mean: Array
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Lowest and highest `to_base`, less one; NaN where no run ended."""
+        known = self.to_base[np.isfinite(self.to_base)]
+        return (float(known.min() - 1), float(known.max() - 1)) if len(known) else (np.nan, np.nan)
+
+
+def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
+    """Normalise a response (n,); NaN where a run failed, left out of the mean."""
+    v = np.asarray(values, dtype=float)
+    mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
+    return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
+
+
+def by_response(
+    nu12: Sequence[float],
+    responses: Sequence[Mapping[str, float] | None],
+    base: Mapping[str, float],
+) -> dict[str, Ratios]:
+    """Ratios of every response that the run at the base nu12 has.
+
+    responses : of each nu12, by name; None where the run failed.
+    """
+    return {
+        name: ratios(nu12, [np.nan if r is None else r[name] for r in responses], value)
+        for name, value in base.items()
+    }
