@@ -1,7 +1,7 @@
 """Figures, the HTML report and VTU files."""
 
 from .convergence import ConvergencePanel, plot_convergence
-from .html import Report, StartRow, Table, write_report
+from .html import Report, StartRow, Table, percent, write_report
 from .laws import LawRow, plot_laws
 from .loads import StripCurves, plot_loads
 from .moduli import plot_moduli
@@ -24,6 +24,7 @@ __all__ = [
     "StartRow",
     "StripCurves",
     "Table",
+    "percent",
     "plot_convergence",
     "plot_heights",
     "plot_laws",

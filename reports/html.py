@@ -114,5 +114,5 @@ def number(value: object) -> str:
 
 
 def percent(value: float) -> str:
-    """A fraction as percent with two significant digits."""
-    return f"{100 * value:.2g} %"
+    """A fraction as percent with two significant digits, whole from 100 % on."""
+    return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..experiments.surfaces import write_surfaces
 from ..identification.assessment import moduli_error
 from ..projects.bubble import BubbleProject
+from ..reports import percent
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
 from ..writing import replacing
@@ -111,7 +112,7 @@ def summary(found: Assessment, folder: Path) -> str:
     result = found.result
     details = [f"mean |dx|+|dy|+|dz|: {found.mean_absolute:.3g} mm"]
     if "moduli_error" in result:
-        errors = ", ".join(f"{k} {100 * v:.2g} %" for k, v in result["moduli_error"].items())
+        errors = ", ".join(f"{k} {percent(v)}" for k, v in result["moduli_error"].items())
         details.append(f"largest error of the moduli over the strain reached: {errors}")
     used = {k: v for k, v in result["nuisance"].items() if v is not None}
     if used:

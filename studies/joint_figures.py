@@ -6,7 +6,7 @@ import numpy as np
 
 from ..materials.law import MODULI
 from ..projects.joint import JointProject
-from ..reports import Table, plot_moduli, plot_pinned
+from ..reports import Table, percent, plot_moduli, plot_pinned
 from ..runs.folder import OutputFolder
 from .bubble_figures import bubble_facts, bubble_figures, bubble_tables
 from .joint_results import JointAssessment
@@ -69,7 +69,7 @@ def _pinned(found: JointAssessment, folder: OutputFolder) -> list[tuple[str, str
 
 def _pinned_table(found: JointAssessment) -> list[Table]:
     rows: list[list[object]] = [
-        [source, name, f"{100 * s['median']:.2g} %", f"{100 * s['largest']:.2g} %"]
+        [source, name, percent(s["median"]), percent(s["largest"])]
         for source, sigmas in found.result["pinned"].items()
         for name, s in sigmas.items()
     ]

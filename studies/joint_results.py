@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..identification.assessment import moduli_error, pinned_by
 from ..projects.joint import JointProject
+from ..reports import percent
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
 from .bubble_results import data_result, nuisance_result, surface_warnings
@@ -137,4 +138,4 @@ def joint_summary(found: JointAssessment, folder: Path) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.2g} %" if value < 10 * NOTHING else "unknown"
+    return percent(value) if value < 10 * NOTHING else "unknown"

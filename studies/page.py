@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..materials.law import MODULI, HypoelasticLaw
 from ..projects.fit import FitProject
-from ..reports import Report, StartRow, Table, plot_optima, write_report
+from ..reports import Report, StartRow, Table, percent, plot_optima, write_report
 from ..runs.folder import OutputFolder
 from .results import BestFit
 
@@ -93,7 +93,7 @@ def certainty_table(found: BestFit, note: str) -> list[Table]:
     if found.certainty is None:
         return []
     body: list[list[object]] = [
-        [name, f"{100 * float(np.median(s)):.2g} %", f"{100 * float(s.max()):.2g} %"]
+        [name, percent(float(np.median(s))), percent(float(s.max()))]
         for name, s in found.certainty.sigma.items()
     ]
     header = ["modulus", "median 1 sigma", "largest 1 sigma"]
