@@ -135,15 +135,9 @@ def _from_slack(membrane: ClosedMembrane, level: float, cuts: int) -> Array:
             "no equilibrium at all: E1, E2, G12 at zero strain are "
             f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
         )
-    area = float((membrane.elements.area.sum(axis=1) * membrane.section).sum())
-    line = 2.0 * level * membrane.cavity.measure(membrane.reference)[0] / area  # p R/t of a tube
-    scale = float(np.cbrt(0.5 * (moduli[0] + moduli[1]) * line**2))
-    for share in SLACK_SHARES:
-        membrane.slack = share * scale
-        found = membrane.equilibrium(np.zeros_like(membrane.reference), level)
-        membrane.slack = 0.0
-        if found is not None:
-            return found
+    found = _stiffened(membrane, np.zeros_like(membrane.reference), level)
+    if found is not None:
+        return found
     if cuts > 0:
         lower = _from_slack(membrane, 0.25 * level, cuts - 1)
         found = _reach(membrane, 0.25 * level, lower, level, lower, cuts)
@@ -157,6 +151,9 @@ def _reach(
 ) -> Array | None:
     """Equilibrium at `level`, through halved steps from `lower`; strain history as for bubbles."""
     found = membrane.equilibrium(start, level)
+    if found is None and lower > 0 and cuts == MOST_CUTS:
+        # Folds of a cap come and go: what helps against slack helps here before smaller steps do.
+        found = _stiffened(membrane, u_lower, level)
     if found is not None or cuts == 0:
         return found
     middle = 0.5 * (lower + level)
@@ -165,3 +162,17 @@ def _reach(
         return None
     onward = 2.0 * u_middle - u_lower
     return _reach(membrane, middle, u_middle, level, onward, cuts - 1)
+
+
+def _stiffened(membrane: ClosedMembrane, start: Array, level: float) -> Array | None:
+    """Equilibrium from a start with slack parts; the artificial stress has faded when it ends."""
+    modulus = 0.5 * (float(membrane.law.E1(0.0)) + float(membrane.law.E2(0.0)))
+    area = float((membrane.elements.area.sum(axis=1) * membrane.section).sum())
+    line = 2.0 * level * membrane.cavity.measure(membrane.reference)[0] / area  # p R/t of a tube
+    for share in SLACK_SHARES:
+        membrane.slack = share * float(np.cbrt(modulus * line**2))
+        found = membrane.equilibrium(start, level)
+        membrane.slack = 0.0
+        if found is not None:
+            return found
+    return None
