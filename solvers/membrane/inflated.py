@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from .cavity import closed_cavity
 from .closed import BorderedTangent, ClosedMembrane
 from .element import reference_elements
 from .factorisation import tangent_for
+from .snap import through_snap
 
 Array = NDArray[np.float64]
 
@@ -79,9 +81,15 @@ def analyse(
     path, forces = (np.zeros((len(levels), *shape)) for _ in range(2))
     volume = np.zeros(len(levels))
     low, high = np.zeros(3), np.zeros(3)
+    remarks: list[str] = []
     membrane.keep_tangent = False
     for i in range(len(levels)):
-        path[i] = _increment(membrane, path[:i], levels, i)
+        path[i], snapped = _increment(membrane, path[:i], levels, i)
+        if snapped:
+            remarks.append(
+                f"snaps between {levels[i - 1] * 1e3:.4g} and {levels[i] * 1e3:.4g} kPa: "
+                "a limit pressure, passed by leading the volume"
+            )
         membrane.accept()
         forces[i], volume[i] = membrane.residual.reshape(shape), membrane.volume
         np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
@@ -91,6 +99,7 @@ def analyse(
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.iterations = membrane.iterations
         history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high))
+        history = replace(history, remarks=(*remarks, *history.remarks))
     else:
         reactions = {
             name: forces[:, model.mesh.node_sets[name]].sum(axis=1) for name in model.supports
@@ -105,25 +114,30 @@ def analyse(
             cavity_volume=model.copies * volume,
             iterations=membrane.iterations,
             path=path,
+            remarks=tuple(remarks),
         )
     return history, np.zeros((*history.displacement.shape, 0))
 
 
-def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> Array:
+def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> tuple[Array, bool]:
+    """Displacement at level i, and whether the membrane snaps on the way."""
     level = float(levels[i])
     if i == 0:
-        return _from_slack(membrane, level, MOST_CUTS)
+        return _from_slack(membrane, level, MOST_CUTS), False
     before = float(levels[i - 1])
     start = path[-1]
     if i > 1:
         start = start + (level - before) / (before - levels[i - 2]) * (path[-1] - path[-2])
     found = _reach(membrane, before, path[-1], level, start, MOST_CUTS)
+    if found is not None:
+        return found, False
+    found = through_snap(membrane, path[-1], before, level)
     if found is None:
         raise SolverFailure(
             f"no equilibrium at {level * 1e3:.4g} kPa (increment {i + 1} of {len(levels)}); "
-            "more increments usually help, unless the membrane snaps at this pressure"
+            "more increments usually help, unless the membrane has a limit pressure below this one"
         )
-    return found
+    return found, True
 
 
 def _from_slack(membrane: ClosedMembrane, level: float, cuts: int) -> Array:
