@@ -14,7 +14,7 @@ from bubblefit.solvers.membrane.cavity import Gas, closed_cavity
 from bubblefit.solvers.membrane.element import reference_elements
 from bubblefit.solvers.membrane.inflated import closed_membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from .closed_meshes import half_tube, sphere_octant, tube_warp
@@ -297,3 +297,22 @@ def test_a_sphere_beyond_its_limit_pressure_is_a_failure() -> None:
     limit = 2 * THICKNESS * E / ((1 - NU) * RADIUS * np.e)
     with pytest.raises(SolverFailure, match="no equilibrium at"):
         MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
+
+
+def test_a_limit_pressure_is_passed_by_volume() -> None:
+    """Fill modulus that falls under the stress and rises again: p R/t has a maximum on the way."""
+    beta = 1e3 * np.array([0, 0, 0, 0.1, 81.7789, 15.6849, -4.03842, 0.181033, 0, 0, 0, 0.3])
+    law = HypoelasticLaw(beta, 0.24, [0.2, 0.2, 0.2])
+    model = tube(8, 1, 20.0, np.linspace(0.003, 0.09, 30), caps=False)
+    history, m = run(model, law)
+    assert any("snaps" in remark for remark in history.remarks)
+    strain = m.strain_old[..., 1].mean()
+    assert np.ptp(m.strain_old[..., 1]) < 1e-6
+    apothem = RADIUS * np.cos(np.pi / 16) * np.exp(strain)
+    assert m.stress_old[..., 1] == pytest.approx(0.09 * apothem / THICKNESS, rel=1e-6)
+    rigidity = lambda e: law.E2(e) / (1 - 0.24**2 * law.E2(e) / law.E1(0.0))  # noqa: E731
+    # The axial strain is zero, so that the stress is the integral of the modulus.
+    exact = quad(rigidity, 0, strain)[0]
+    assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
+    softest = min(rigidity(np.linspace(0, strain, 400)))
+    assert softest < exact  # there is a limit pressure

@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 
 #: The slack state's artificial stiffness is multiplied by this in every iteration.
 FADE = 0.6
+#: Artificial stress of the slack state, as multiples of what makes the first step as large as the
+#: answer for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
+#: artificial stress alone it would by p R^2/(4 t stress).
+SLACK_SHARES = (4.0, 0.4, 40.0)
 
 
 class BorderedTangent:
@@ -112,3 +116,16 @@ class ClosedMembrane(Membrane):
         slot, entries = np.broadcast_arrays(slot, entries)
         inside = slot >= 0
         np.add.at(self.tangent.data, slot[inside], entries[inside])
+
+    def equilibrium_from_slack(self, start: Array, level: float) -> Array | None:
+        """Equilibrium from a start with slack parts: with an artificial stress, which fades."""
+        modulus = 0.5 * (float(self.law.E1(0.0)) + float(self.law.E2(0.0)))
+        area = float((self.elements.area.sum(axis=1) * self.section).sum())
+        line = 2.0 * level * self.cavity.measure(self.reference)[0] / area  # p R/t of a tube
+        for share in SLACK_SHARES:
+            self.slack = share * float(np.cbrt(modulus * line**2))
+            found = self.equilibrium(start, level)
+            self.slack = 0.0
+            if found is not None:
+                return found
+        return None

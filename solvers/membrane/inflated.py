@@ -22,10 +22,8 @@ from .snap import through_snap
 Array = NDArray[np.float64]
 
 MOST_CUTS = 8
-#: Artificial stress of the slack state, as multiples of what makes the first step as large as the
-#: answer for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
-#: artificial stress alone it would by p R^2/(4 t stress).
-SLACK_SHARES = (4.0, 0.4, 40.0)
+#: An increment in which the volume grows by a larger share is gone through by volume.
+MOST_GROWTH = 0.1
 
 
 def prepare(model: InflatedModel, law: HypoelasticLaw, tolerance: float) -> ClosedMembrane:
@@ -87,8 +85,8 @@ def analyse(
         path[i], snapped = _increment(membrane, path[:i], levels, i)
         if snapped:
             remarks.append(
-                f"snaps between {levels[i - 1] * 1e3:.4g} and {levels[i] * 1e3:.4g} kPa: "
-                "a limit pressure, passed by leading the volume"
+                f"snaps, or nearly, between {levels[i - 1] * 1e3:.4g} and "
+                f"{levels[i] * 1e3:.4g} kPa: passed by leading the volume"
             )
         membrane.accept()
         forces[i], volume[i] = membrane.residual.reshape(shape), membrane.volume
@@ -130,7 +128,10 @@ def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> 
         start = start + (level - before) / (before - levels[i - 2]) * (path[-1] - path[-2])
     found = _reach(membrane, before, path[-1], level, start, MOST_CUTS)
     if found is not None:
-        return found, False
+        now, then = (membrane.cavity.measure(membrane.reference + u)[0] for u in (found, path[-1]))
+        if now < (1.0 + MOST_GROWTH) * then:
+            return found, False
+        # Newton may leap over a limit point, but the law needs the strain path on the way.
     found = through_snap(membrane, path[-1], before, level)
     if found is None:
         raise SolverFailure(
@@ -149,7 +150,7 @@ def _from_slack(membrane: ClosedMembrane, level: float, cuts: int) -> Array:
             "no equilibrium at all: E1, E2, G12 at zero strain are "
             f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
         )
-    found = _stiffened(membrane, np.zeros_like(membrane.reference), level)
+    found = membrane.equilibrium_from_slack(np.zeros_like(membrane.reference), level)
     if found is not None:
         return found
     if cuts > 0:
@@ -167,7 +168,7 @@ def _reach(
     found = membrane.equilibrium(start, level)
     if found is None and lower > 0 and cuts == MOST_CUTS:
         # Folds of a cap come and go: what helps against slack helps here before smaller steps do.
-        found = _stiffened(membrane, u_lower, level)
+        found = membrane.equilibrium_from_slack(u_lower, level)
     if found is not None or cuts == 0:
         return found
     middle = 0.5 * (lower + level)
@@ -176,17 +177,3 @@ def _reach(
         return None
     onward = 2.0 * u_middle - u_lower
     return _reach(membrane, middle, u_middle, level, onward, cuts - 1)
-
-
-def _stiffened(membrane: ClosedMembrane, start: Array, level: float) -> Array | None:
-    """Equilibrium from a start with slack parts; the artificial stress has faded when it ends."""
-    modulus = 0.5 * (float(membrane.law.E1(0.0)) + float(membrane.law.E2(0.0)))
-    area = float((membrane.elements.area.sum(axis=1) * membrane.section).sum())
-    line = 2.0 * level * membrane.cavity.measure(membrane.reference)[0] / area  # p R/t of a tube
-    for share in SLACK_SHARES:
-        membrane.slack = share * float(np.cbrt(modulus * line**2))
-        found = membrane.equilibrium(start, level)
-        membrane.slack = 0.0
-        if found is not None:
-            return found
-    return None

@@ -29,6 +29,9 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
         while step >= LEAST_STEP and volume < MOST_GROWTH * first:
             membrane.gas = Gas((outside + pressure) * volume * (1.0 + step), outside)
             found = membrane.equilibrium(u + step * slope, 0.0)
+            if found is None and step < 0.5 * STEP:
+                # Snapping gathers in one bulge, and the rest of the wall slackens.
+                found = membrane.equilibrium_from_slack(u, level)
             if found is None:
                 step, slope = 0.5 * step, np.zeros_like(u)
                 continue
