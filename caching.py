@@ -20,6 +20,7 @@ KERNELS = (
     "materials/point_law.py",
     "materials/law.py",
     "solvers/membrane/kernel.py",
+    "solvers/membrane/cavity.py",
     "solvers/membrane/sensitivity.py",
 )
 

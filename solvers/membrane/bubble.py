@@ -131,7 +131,7 @@ def _from_flat(membrane: Membrane, level: float, cuts: int) -> Array:
             "no equilibrium at all: E1, E2, G12 at zero strain are "
             f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
         )
-    stiffness = 0.5 * membrane.thickness * (moduli[0] + moduli[1])
+    stiffness = 0.5 * float(np.median(membrane.section)) * (moduli[0] + moduli[1])
     # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
     height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)
     dome = np.zeros_like(membrane.reference)

@@ -34,7 +34,7 @@ class Derivatives:
         """Explicit derivative of the residual at the equilibrium u, (3 n, np)."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         explicit(
-            m.reference + u, m.quads, e.values, e.slopes, e.area, m.thickness, law.beta, law.nu12,
+            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.beta, law.nu12,
             law.limits, law.area_power, m.strain_old, m.stress_old, self.which,
             self.strain, self.stress, self.fresh, self.point, self.rate,
         )  # fmt: skip

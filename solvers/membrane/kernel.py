@@ -45,9 +45,9 @@ def assemble(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Internal minus pressure forces at `position`, and the tangent.
 
-    position (n, 3) mm; h_*, s_* (elements, 4, 3) log strain and stress before (old) and at this
-    position (new, written); slot (elements, 144) place of each element entry in the sparse
-    `data` (-1: held), written when `with_tangent`; residual (3 n,) written.
+    position (n, 3) mm; thickness (elements,) mm; h_*, s_* (elements, 4, 3) log strain and stress
+    before (old) and at this position (new, written); slot (elements, 144) place of each element
+    entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written.
 
     Returns the largest nodal pressure force of an element (N), or -1 when a point has no valid
     stress.
@@ -82,7 +82,7 @@ def assemble(  # type: ignore[no-untyped-def]
                 s_new[e, g], pk2, stiff, p, law, steep, pull, work,
             ):  # fmt: skip
                 return -1.0
-            wt = area[e, g] * thickness
+            wt = area[e, g] * thickness[e]
             wp = area[e, g] * pressure
             nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
             ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]

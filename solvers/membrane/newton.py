@@ -34,15 +34,16 @@ MOST_FRUITLESS = 3
 class Membrane:
     """Everything an equilibrium iteration needs; strain and stress at the start and the end.
 
-    reference (n, 3) mm; strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal
-    correction of one iteration; keep_tangent: end every increment with the tangent of its
+    reference (n, 3) mm; thickness mm, one or (elements,), which section (elements,) repeats;
+    strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal correction of one
+    iteration; keep_tangent: end every increment with the tangent of its
     equilibrium assembled (sensitivities want it; in a chord step it costs little more).
     """
 
     reference: Array
     quads: NDArray[np.intp]
     elements: ReferenceElements
-    thickness: float
+    thickness: float | Array
     law: HypoelasticLaw
     free: NDArray[np.intp]
     tangent: Tangent
@@ -50,6 +51,7 @@ class Membrane:
     step_limit: float
     keep_tangent: bool = False
     iterations: int = 0
+    section: Array = field(init=False)
     strain_old: Array = field(init=False)
     stress_old: Array = field(init=False)
     strain_new: Array = field(init=False)
@@ -58,6 +60,7 @@ class Membrane:
 
     def __post_init__(self) -> None:
         shape = (len(self.quads), 4, 3)
+        self.section = np.array(np.broadcast_to(self.thickness, len(self.quads)), dtype=float)
         self.strain_old, self.stress_old = np.zeros(shape), np.zeros(shape)
         self.strain_new, self.stress_new = np.zeros(shape), np.zeros(shape)
         self.residual = np.zeros(3 * len(self.reference))
@@ -66,7 +69,7 @@ class Membrane:
         """Largest free residual over the largest pressure force; inf where there is no stress."""
         law, e = self.law, self.elements
         force = assemble(
-            self.reference + u, self.quads, e.values, e.slopes, e.area, self.thickness, pressure,
+            self.reference + u, self.quads, e.values, e.slopes, e.area, self.section, pressure,
             law.beta, law.nu12, law.limits, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
@@ -74,10 +77,14 @@ class Membrane:
         self.iterations += 1
         if force < 0:
             return np.inf
+        self.further_forces(u, with_tangent)
         if force == 0.0:  # no pressure: the reactions of what is prescribed are the measure
             force = float(np.abs(self.residual).max()) or 1.0
         ratio = float(np.abs(self.residual[self.free]).max()) / force
         return ratio if np.isfinite(ratio) else np.inf
+
+    def further_forces(self, u: Array, with_tangent: bool) -> None:
+        """Add to `residual` (and the tangent) what is neither stress nor pressure: nothing here."""
 
     def accept(self) -> None:
         """Take the strain and stress of the last evaluation as the start of the next increment."""

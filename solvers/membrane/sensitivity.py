@@ -84,7 +84,7 @@ def explicit(  # type: ignore[no-untyped-def]
                 if which[j] < 12:
                     own[2 - which[j] // 4, j] = row[which[j]]
             dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
-            wt = area[e, g] * thickness
+            wt = area[e, g] * thickness[e]
             for i in range(3):
                 for k in range(3):
                     pull[i, k] *= wt

@@ -13,13 +13,15 @@ from ... import __version__
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
+from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
 from ..base import PARAMETERS, History, SolverCheck
-from . import bubble, strip
+from . import bubble, inflated, strip
+from .closed import ClosedMembrane
 from .newton import Membrane
 
 Array = NDArray[np.float64]
-Model = BubbleModel | UniaxialModel
+Model = BubbleModel | UniaxialModel | InflatedModel
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
@@ -98,13 +100,19 @@ class MembraneSolver:
         membrane = self._membrane(model, law)
         if isinstance(model, UniaxialModel):
             return strip.analyse(membrane, model, parameters, pressure_offset, guess)
+        if isinstance(model, InflatedModel):
+            assert isinstance(membrane, ClosedMembrane)
+            return inflated.analyse(membrane, model, parameters, pressure_offset, guess)
         return bubble.analyse(membrane, model, parameters, pressure_offset, guess)
 
     def _membrane(self, model: Model, law: HypoelasticLaw) -> Membrane:
         """Geometry and sparsity are made once a model; strain history anew every run."""
         if self._prepared is None or self._prepared[0] is not model:
+            membrane: Membrane
             if isinstance(model, UniaxialModel):
                 membrane = strip.prepare(model, law, self.tolerance)
+            elif isinstance(model, InflatedModel):
+                membrane = inflated.prepare(model, law, self.tolerance)
             else:
                 membrane = bubble.prepare(model, law, self.tolerance)
             self._prepared = (model, membrane)

@@ -1,0 +1,109 @@
+"""Bending of an inflated membrane: gas of constant mass, rigid bodies, a collar that moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SolverFailure
+from ...models.inflated import InflatedModel, RigidCylinder
+from ..base import History
+from .cavity import Gas
+from .closed import ClosedMembrane
+from .contact import brought_to_touch, gaps
+
+Array = NDArray[np.float64]
+
+MOST_CUTS = 6
+#: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
+BITE = 0.02
+
+
+def analyse(
+    membrane: ClosedMembrane,
+    model: InflatedModel,
+    inflated: Array,
+    pressure: float,
+    extremes: tuple[Array, Array],
+) -> History:
+    """Frames of the bending: first the inflated state, then one for every collar displacement.
+
+    `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
+    all bodies on it. Where no equilibrium is found on the way, the history ends with the last
+    good frame and says so.
+
+    Raises
+    ------
+    SolverFailure : there is not even the first displacement.
+    """
+    plan = model.bending
+    assert plan is not None
+    way = np.asarray(plan.direction, dtype=float)
+    position = membrane.reference + inflated
+    posts = [brought_to_touch(body, position, -way, BITE) for body in plan.supports]
+    collar = brought_to_touch(plan.collar, position, way, 0.0)
+    volume, _ = membrane.cavity.measure(position)
+    membrane.gas = Gas((pressure + plan.atmosphere) * volume, plan.atmosphere)
+    membrane.penalty = plan.penalty
+    membrane.keep_tangent = True
+
+    def bodies(moved: float) -> tuple[RigidCylinder, ...]:
+        centre = np.asarray(collar.centre) + moved * way
+        return (*posts, replace(collar, centre=tuple(centre.tolist())))
+
+    low, high = (extreme.copy() for extreme in extremes)
+    path, moves = [inflated], [0.0]
+    gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
+    deepest = 0.0
+    for wanted in plan.displacements:
+        start = path[-1]
+        if len(path) > 2:
+            ahead = (wanted - moves[-1]) / (moves[-1] - moves[-2])
+            start = start + ahead * (path[-1] - path[-2])
+        found = _reach(membrane, bodies, moves[-1], path[-1], wanted, start, MOST_CUTS)
+        if found is None:
+            if len(path) == 1:
+                raise SolverFailure(f"no equilibrium with the collar at {wanted:.4g} mm")
+            remarks.append(f"no equilibrium between {moves[-1]:.4g} and {wanted:.4g} mm of collar")
+            break
+        membrane.accept()
+        path.append(found)
+        moves.append(wanted)
+        gas.append((membrane.pressure, membrane.volume))
+        pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
+        now = membrane.reference + found
+        deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
+        np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
+        np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
+    remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
+    # What is normal to a symmetry plane is taken up by the other half.
+    force = model.copies * np.array(pushes) * ~membrane.cavity.symmetric
+    named = [(body.name, force[:, i]) for i, body in enumerate((*posts, collar))]
+    return History(
+        force[:, -1] @ way,
+        np.array(path),
+        low,
+        high,
+        dict(named),
+        cavity_pressure=np.array([p for p, _ in gas]),
+        cavity_volume=model.copies * np.array([v for _, v in gas]),
+        iterations=membrane.iterations,
+        path=np.array(path),
+        remarks=tuple(remarks),
+    )
+
+
+def _reach(membrane, bodies, before, u_before, wanted, start, cuts):  # type: ignore[no-untyped-def]
+    """Equilibrium with the collar at `wanted`, through halved ways from `before`."""
+    membrane.bodies = bodies(wanted)
+    found = membrane.equilibrium(start, membrane.pressure)
+    if found is not None or cuts == 0:
+        return found
+    middle = 0.5 * (before + wanted)
+    halfway = _reach(membrane, bodies, before, u_before, middle, u_before, cuts - 1)
+    if halfway is None:
+        return None
+    onward = 2.0 * halfway - u_before
+    return _reach(membrane, bodies, middle, halfway, wanted, onward, cuts - 1)

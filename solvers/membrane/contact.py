@@ -1,0 +1,86 @@
+"""Frictionless contact of nodes with analytic rigid cylinders, by penalty."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.inflated import RigidCylinder
+
+Array = NDArray[np.float64]
+
+
+def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
+    """Distance (n,) mm of points (n, 3) from a body, its gradient (n, 3) and Hessian (n, 3, 3).
+
+    Negative inside the body. A ring's mouth is rounded by its fillet: there the distance is that
+    from the circle through the fillet's centre, less its radius.
+    """
+    axis = np.asarray(body.axis, dtype=float)
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ axis
+    across = arm - along[:, None] * axis
+    r = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    radial = across / r[:, None]
+    around = np.cross(axis, radial)
+    turn = np.einsum("ni,nj->nij", around, around) / r[:, None, None]
+    if not body.ring:
+        return r - body.radius, radial, turn
+    beyond = np.abs(along) - (0.5 * body.length - body.fillet)
+    in_mouth = beyond > 0
+    s = np.where(in_mouth, beyond, 0.0)
+    q = body.radius + body.fillet - r
+    d = np.where(in_mouth, np.hypot(q, s), q)
+    d = np.where(np.abs(d) > 1e-9, d, 1e-9)
+    out = -(q / d)[:, None] * radial + (s / d * np.sign(along))[:, None] * axis
+    side = (s / d)[:, None] * radial + (q / d * np.sign(along))[:, None] * axis
+    curve = np.where(in_mouth, 1.0 / d, 0.0)
+    hessian = curve[:, None, None] * np.einsum("ni,nj->nij", side, side)
+    return d - body.fillet, out, hessian - (q / d)[:, None, None] * turn
+
+
+def contact_forces(
+    body: RigidCylinder, position: Array, stiffness: Array
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
+
+    stiffness (n,) N/mm: penalty times the node's share of the reference surface.
+    """
+    gap, out, hessian = gaps(body, position)
+    touched = np.flatnonzero(gap < 0)
+    k, g, n = stiffness[touched], gap[touched], out[touched]
+    force = np.zeros_like(position)
+    force[touched] = -(k * g)[:, None] * n
+    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[touched]
+    return force, k[:, None, None] * slope, touched
+
+
+def brought_to_touch(
+    body: RigidCylinder, position: Array, direction: Array, bite: float
+) -> RigidCylinder:
+    """The body moved along `direction` until it is `bite` (mm) into the surface."""
+    centre = np.asarray(body.centre, dtype=float)
+
+    def moved(way: float) -> RigidCylinder:
+        return replace(body, centre=tuple((centre + way * direction).tolist()))
+
+    arm = position - centre
+    reach = float(np.ptp(position, axis=0).max()) + 2 * body.radius
+    # The first touch from outside is the one wanted; a ring starts around the membrane's middle.
+    start = -reach
+    if body.ring:
+        heights = arm[np.abs(arm @ np.asarray(body.axis)) < 0.5 * body.length] @ direction
+        start = 0.5 * float(heights.min() + heights.max())
+    ways = np.linspace(start, reach, 2001)
+    least = np.array([gaps(moved(w), position)[0].min() for w in ways])
+    first = int(np.argmax(least < -bite))
+    low, high = ways[max(first - 1, 0)], ways[first]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if gaps(moved(middle), position)[0].min() < -bite:
+            high = middle
+        else:
+            low = middle
+    return moved(float(low))
