@@ -15,7 +15,7 @@ from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.models.bending import inflated_cylinder
 from bubblefit.models.bodies import RigidSupports
 from bubblefit.models.cylinder import CylinderModel
-from bubblefit.solvers.calculix.cylinder import inflation_decks
+from bubblefit.solvers.calculix.cylinder import cylinder_decks
 from bubblefit.solvers.calculix.cylinder_results import inflation_history
 from bubblefit.solvers.calculix.library import material_library
 from bubblefit.solvers.calculix.solids import solid_mesh
@@ -51,7 +51,7 @@ def closed_form(pressure: float) -> np.ndarray:
 
 def run(ccx, model: CylinderModel, folder: Path):
     solids = solid_mesh(model)
-    for name, text in inflation_decks(model, LINEAR, solids).items():
+    for name, text in cylinder_decks(model, LINEAR, solids).items():
         (folder / name).write_text(text)
     environment = os.environ | {
         "LD_LIBRARY_PATH": str(material_library().parent),
@@ -148,7 +148,7 @@ def test_sections_that_solids_cannot_have_are_refused():
 
 def test_the_deck_holds_what_the_model_says():
     model = case(25.0, 40.0)
-    files = inflation_decks(model, LINEAR, solid_mesh(model))
+    files = cylinder_decks(model, LINEAR, solid_mesh(model))
     deck, mesh = files["job.inp"], files["mesh.inp"]
     for line in (
         "SYMMETRY_X, 1, 1",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +28,19 @@ FIRST, LEAST = 0.1, 1e-5
 MOST_INCREMENTS = 1000
 
 
-def inflation_decks(
-    model: CylinderModel, law: HypoelasticLaw, solids: SolidMesh, folder: Path | None = None
+def cylinder_decks(
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    solids: SolidMesh,
+    bending: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
 ) -> dict[str, str]:
-    """Text of each input file by name: inflation alone; `folder`: the user's templates.
+    """Text of each input file by name.
+
+    Parameters
+    ----------
+    bending : what `bending_context` makes; inflation alone unless given.
+    folder : the user's templates.
 
     Raises
     ------
@@ -72,6 +82,8 @@ def inflation_decks(
             for direction in directions
         ],
         "inflation": list(model.inflation),
+        "last_time": len(model.inflation) + (len(bending["path"]) - 1 if bending else 0),
+        "bending": bending,
         "first": FIRST,
         "least": LEAST,
         "most_increments": MOST_INCREMENTS,
