@@ -16,9 +16,11 @@ from bubblefit.models.bending import inflated_cylinder
 from bubblefit.models.bodies import RigidSupports
 from bubblefit.models.cylinder import CylinderModel
 from bubblefit.solvers.calculix.cylinder import cylinder_decks
+from bubblefit.solvers.calculix.cylinder_bending import bending_context
 from bubblefit.solvers.calculix.cylinder_results import inflation_history
 from bubblefit.solvers.calculix.library import material_library
 from bubblefit.solvers.calculix.solids import solid_mesh
+from bubblefit.solvers.calculix.solver import CalculixSolver
 from scipy.optimize import fsolve
 
 THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
@@ -88,6 +90,45 @@ def test_the_tube_s_strain_converges_to_that_of_a_thin_wall(ccx, tmp_path):
     history = run(ccx, model, tmp_path)
     at = RADIUS + history.displacement[-1, model.mesh.node_sets["side_line"][0], 0]
     assert np.log(at / RADIUS) == pytest.approx(closed_form(PRESSURE)[1], rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def bent(ccx):
+    model = replace(case(30.0, 40.0), deflections=[3.0, 6.0], increments=[3.0, 6.0])
+    return model, CalculixSolver(ccx=ccx.path).run(model, LINEAR)
+
+
+def test_collar_and_supports_balance(bent):
+    _, history = bent
+    assert history.load.shape == (3,)
+    assert history.load[0] == pytest.approx(0.0, abs=1e-6)
+    assert 0 < history.load[1] < history.load[2]
+    total = history.reactions["collar"] + history.reactions["supports"]
+    # The tolerance of the run is 5e-3 of the mean force.
+    np.testing.assert_allclose(total, 0, atol=1e-3 * history.load[-1])
+
+
+def test_the_gas_keeps_its_mass(bent):
+    model, history = bent
+    absolute = history.cavity_pressure + model.gas.ambient
+    energy = absolute * history.cavity_volume
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
+    assert history.cavity_pressure[-1] > model.pressure
+    assert any("passes" in remark for remark in history.remarks)
+
+
+def test_the_crown_follows_the_collar(bent):
+    model, history = bent
+    top = history.displacement[:, model.mesh.node_sets["top_line"][0], 1]
+    # Pressed into the contact's springs, by a pressure over 1 MPa/mm.
+    np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.6)
+
+
+def test_a_whole_cylinder_is_not_bent():
+    with pytest.raises(InputError, match="mesh it as 'quarter'"):
+        model = inflated_cylinder(150.0, PRESSURE, THICKNESS, 60.0, symmetry="full")
+        solids = solid_mesh(model)
+        bending_context(model, solids, np.zeros_like(solids.points))
 
 
 # Solids

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.cylinder import CylinderModel
-from .rigid import collar_body, support_body
+from .rigid import SUPPORT_COUNTS, collar_body, support_body
 from .solids import SolidMesh
 
 Array = NDArray[np.float64]
@@ -92,3 +92,9 @@ def bending_context(
         "force_tolerance": TOLERANCES[0],
         "correction_tolerance": TOLERANCES[1],
     }
+
+
+def body_nodes(solids: int) -> tuple[slice, slice]:
+    """Nodes of the support and of the collar in a result, after those of the `solids` (count)."""
+    support = 2 * (SUPPORT_COUNTS[0] + 1) * (SUPPORT_COUNTS[1] + 1)
+    return slice(solids, solids + support), slice(solids + support, None)
