@@ -17,8 +17,9 @@ from bubblefit.models.bodies import RigidSupports
 from bubblefit.models.cylinder import CylinderModel
 from bubblefit.solvers.calculix.cylinder import cylinder_decks
 from bubblefit.solvers.calculix.cylinder_bending import bending_context
-from bubblefit.solvers.calculix.cylinder_results import inflation_history
+from bubblefit.solvers.calculix.cylinder_results import bending_history, inflation_history
 from bubblefit.solvers.calculix.library import material_library
+from bubblefit.solvers.calculix.reasons import increments
 from bubblefit.solvers.calculix.solids import solid_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from scipy.optimize import fsolve
@@ -93,9 +94,15 @@ def test_the_tube_s_strain_converges_to_that_of_a_thin_wall(ccx, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def bent(ccx):
+def scratch(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("bending")
+
+
+@pytest.fixture(scope="module")
+def bent(ccx, scratch):
     model = replace(case(30.0, 40.0), deflections=[3.0, 6.0], increments=[3.0, 6.0])
-    return model, CalculixSolver(ccx=ccx.path).run(model, LINEAR)
+    solver = CalculixSolver(ccx=ccx.path, scratch=scratch, keep=True)
+    return model, solver.run(model, LINEAR)
 
 
 def test_collar_and_supports_balance(bent):
@@ -122,6 +129,35 @@ def test_the_crown_follows_the_collar(bent):
     top = history.displacement[:, model.mesh.node_sets["top_line"][0], 1]
     # Pressed into the contact's springs, by a pressure over 1 MPa/mm.
     np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.6)
+
+
+def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path):
+    model, history = bent
+    solids, results = solid_mesh(model), max(scratch.rglob("job.frd"), key=os.path.getmtime)
+    converged = {(i.step, i.increment) for i in increments(results.with_name("job.sta"))}
+    last = max(converged)
+    # Stopped: no end mark, and a frame of residuals that never converged.
+    cut = tmp_path / "job.frd"
+    data = results.read_bytes()
+    cut.write_bytes(data[: data.rindex(b" 9999")])
+    gauge = history.cavity_pressure[1:]
+    early = bending_history(cut, model, solids, gauge, 0, converged - {last})
+    assert len(early.load) == 2
+    np.testing.assert_array_equal(early.load, history.load[:2])
+    assert "the last increment is at 3 mm" in early.remarks[0]
+    whole = bending_history(results, model, solids, gauge, 0)
+    np.testing.assert_array_equal(whole.load, history.load)
+    for path, given in ((cut, None), (cut, set()), (tmp_path / "none.frd", None)):
+        with pytest.raises(SolverFailure, match="no usable results"):
+            bending_history(path, model, solids, gauge, 0, given)
+    # Cut anywhere it is an early end, too, or none.
+    for part in (0.3, 0.9, 0.99):
+        cut.write_bytes(data[: int(part * len(data))])
+        try:
+            found = bending_history(cut, model, solids, gauge, 0, converged)
+        except SolverFailure:
+            continue
+        np.testing.assert_array_equal(found.load, history.load[: len(found.load)])
 
 
 def test_a_whole_cylinder_is_not_bent():
