@@ -35,7 +35,14 @@ def quarter_disk(elements: float) -> tuple[Array, NDArray[np.intp]]:
     -------
     points (p, 2), quads (q, 4) counter-clockwise.
     """
-    n, m = divisions(elements)
+    return divided_quarter_disk(*divisions(elements))
+
+
+def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
+    """The same with n divisions of the core and m layers of the ring: n^2 + 2 n m quads.
+
+    The 2 n + 1 nodes of the rim lie at equal angles.
+    """
     core, ring = _core_and_ring(n, m)
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     # The core's two far sides, from the x axis to the y axis, are the ring's first layer.

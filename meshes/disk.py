@@ -7,11 +7,11 @@ from numbers import Integral, Real
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from .blocks import quarter_disk
 from .mesh import Mesh
+from .mirror import snapped, with_mirror_image
 
 MIN_ELEMENTS, MAX_ELEMENTS = 8, 4_000_000
 #: Nodes nearer to a symmetry line or the rim than this, in radii, are put on it.
@@ -53,10 +53,10 @@ def disk_mesh(
         points, quads = quarter_disk_by_gmsh(elements / 4)
     else:
         points, quads = quarter_disk(elements / 4)
-    points = _snapped(points)
+    points = snapped(points, NEAR)
     if symmetry == "full":
         for axis in (0, 1):
-            points, quads = _with_mirror_image(points, quads, axis)
+            points, quads, _ = with_mirror_image(points, quads, axis)
     # Sets are taken in unit radius, where the rim is 1 whatever the unit of length.
     sets = {
         "rim": np.flatnonzero(np.hypot(points[:, 0], points[:, 1]) > 1 - NEAR),
@@ -86,21 +86,3 @@ def _check(radius: float, elements: int, symmetry: str, generator: str) -> None:
         raise InputError(None, "symmetry", f"expected 'full' or 'quarter', got {symmetry!r}")
     if generator not in ("blocks", "gmsh"):
         raise InputError(None, "generator", f"expected 'blocks' or 'gmsh', got {generator!r}")
-
-
-def _snapped(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (n, 2) with those next to a symmetry line exactly on it: cos(pi/2) is not zero."""
-    return np.where(np.abs(points) < NEAR, 0.0, points)
-
-
-def _with_mirror_image(
-    points: NDArray[np.float64], quads: NDArray[np.intp], axis: int
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """The mesh and its image in the line where coordinate `axis` is zero, sewn along it."""
-    off = points[:, axis] != 0
-    image = np.arange(len(points))
-    image[off] = len(points) + np.arange(np.count_nonzero(off))
-    sign = np.where(np.arange(2) == axis, -1.0, 1.0)
-    # A mirror turns quads round: read them backwards to keep the normal +z.
-    turned = image[quads[:, ::-1]]
-    return np.concatenate([points, points[off] * sign]), np.concatenate([quads, turned])

@@ -30,6 +30,13 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
     return np.asarray(_over(area, edges).min(axis=1))
 
 
+def least_scaled_jacobian(mesh: Mesh) -> dict[str, float]:
+    """Scaled Jacobian of the worst quad of the mesh (`all`) and of each element set."""
+    quality = scaled_jacobian(mesh)
+    sets = {name: quality[numbers] for name, numbers in mesh.element_sets.items() if len(numbers)}
+    return {name: float(values.min()) for name, values in ({"all": quality} | sets).items()}
+
+
 def _over(value: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quotient, zero where the divisor is: collapsed edges are bad elements, not NaN."""
     return np.divide(value, by, out=np.zeros_like(value), where=by > 0)

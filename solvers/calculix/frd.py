@@ -66,12 +66,19 @@ class FrdFile:
         self.mesh = self._header()
         self._first = self._at
 
-    def frames(self) -> Iterator[FrdFrame]:
-        """Every increment, in the file's order; steps may be missing or repeated."""
+    def frames(self, ended: bool = True) -> Iterator[FrdFrame]:
+        """Every increment, in the file's order; steps may be missing or repeated.
+
+        ended : the analysis ended, and the file with its mark. If it did not, the file may stop
+            after any whole result, and the increment that this one belongs to is the last.
+        """
         self._at = self._first
         frame: FrdFrame | None = None
         step = increment = 0
-        while not (line := self._line()).startswith("9999", 1):
+        while ended or self._at < len(self._data):
+            line = self._line()
+            if line.startswith("9999", 1):
+                break
             if line.startswith("    1PSTEP"):
                 increment, step = self._int(line[36:48]), self._int(line[48:60])
             elif line.startswith("  100C"):

@@ -5,17 +5,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
+from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
 from ..process import log_tail, run_process
 from ..scratch import fresh_folder, put_aside, remove
-from . import bubble, strip
+from . import bubble, cylinder_analysis, strip
 from .executable import ADVICE, Executable, find_ccx
 from .library import material_library
 from .reasons import Increment, increments, reason
@@ -26,10 +27,12 @@ log = logging.getLogger(__name__)
 
 JOB = "job"
 TIMEOUT_S = 3600.0
-Model = BubbleModel | UniaxialModel
+Model = BubbleModel | UniaxialModel | CylinderModel
 T = TypeVar("T")
 #: Makes something of the .frd file and the number of iterations.
 Reader = Callable[[Path, int], T]
+#: The same of a run that stopped early; the steps and increments that converged.
+Rescue = Callable[[Path, int, set[tuple[int, int]]], T]
 
 
 class CalculixSolver:
@@ -98,7 +101,7 @@ class CalculixSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate or pull the model.
+        """Inflate, pull or bend the model.
 
         Parameters
         ----------
@@ -110,10 +113,18 @@ class CalculixSolver:
         SolverFailure : it did not end well; the scratch folder is kept and named.
         InputError : a template that cannot be used, a ccx that cannot be started.
         """
-        shells = self._shell_mesh(model)
 
-        def once(files: dict[str, str], read: Reader[T]) -> T:
-            return self._once(files, read, scratch or self.scratch, timeout or self.timeout)
+        def once(files: dict[str, str], read: Reader[T], rescue: Rescue[T] | None = None) -> T:
+            place, seconds = scratch or self.scratch, timeout or self.timeout
+            return self._once(files, read, place, seconds, rescue)
+
+        if isinstance(model, CylinderModel):
+
+            def bent(files: dict[str, str], read: cylinder_analysis.Read, early: bool) -> Any:
+                return once(files, lambda frd, n: read(frd, n, None), read if early else None)
+
+            return cylinder_analysis.analyse(model, law, self.templates, bent)
+        shells = self._shell_mesh(model)
 
         if isinstance(model, UniaxialModel):
             return strip.analyse(model, law, shells, self.element, self.templates, once)
@@ -121,13 +132,18 @@ class CalculixSolver:
         return once(files, lambda frd, n: bubble_history(frd, model, shells, n))
 
     def _once(
-        self, files: dict[str, str], read: Reader[T], parent: Path | None, timeout: float
+        self,
+        files: dict[str, str],
+        read: Reader[T],
+        parent: Path | None,
+        timeout: float,
+        rescue: Rescue[T] | None = None,
     ) -> T:
-        """One run in a fresh scratch folder; what `read` makes of it."""
+        """One run in a fresh scratch folder; what `read` makes of it, or `rescue` of a bad end."""
         program, library = self.executable().path, material_library()
         folder = fresh_folder("ccx", parent)
         try:
-            found = self._in(folder, program, library, files, timeout, read)
+            found = self._in(folder, program, library, files, timeout, read, rescue)
         except SolverFailure as failure:
             kept = put_aside(folder)
             log.info("failed run kept in %s", kept)
@@ -152,6 +168,7 @@ class CalculixSolver:
         files: dict[str, str],
         timeout: float,
         read: Reader[T],
+        rescue: Rescue[T] | None,
     ) -> T:
         """One run in a folder that is empty at its start."""
         try:
@@ -176,9 +193,18 @@ class CalculixSolver:
             _Watch(sta, self.progress) if self.progress is not None else None,
         )
         problem = reason(folder, JOB, outcome, timeout)
+        done = increments(sta)
+        iterations = sum(i.iterations for i in done)
         if problem is not None:
-            raise SolverFailure(problem, self.name, outcome.exit_code)
-        iterations = sum(i.iterations for i in increments(sta))
+            log.info("stopped early: %s", problem)
+            try:
+                if rescue is None:
+                    raise SolverFailure(problem, self.name, outcome.exit_code)
+                converged = {(i.step, i.increment) for i in done}
+                return rescue(folder / f"{JOB}.frd", iterations, converged)
+            except SolverFailure:
+                # Why it stopped says more than what its results then lack.
+                raise SolverFailure(problem, self.name, outcome.exit_code) from None
         return read(folder / f"{JOB}.frd", iterations)
 
     def _shell_mesh(self, model: Model) -> ShellMesh:

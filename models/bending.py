@@ -1,0 +1,77 @@
+"""The thesis' cases of three-point bending (Table 6.1) as models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ..errors import InputError
+from ..meshes.cylinder import cylinder_mesh
+from ..meshes.graded import Refinement
+from .bodies import Collar, RigidSupports, thesis_collar
+from .cylinder import CylinderModel
+from .gas import Gas
+
+#: Thesis section 6.1: all are 3 m long, their seam three layers thick. Its width is not given:
+#: 40 mm is ours.
+LENGTH, SEAM_WIDTH, SEAM_LAYERS = 3000.0, 40.0, 3
+#: Thesis section 6.4: how far the collar goes, mm; frames and increments are ours.
+DEFLECTION, FRAMES = 240.0, 60
+#: Equal increments of pressure on inflation.
+INFLATION = 10
+#: Elements next to collar and supports: mm along the axis over mm elsewhere, and mm beyond the
+#: edge of the collar or to either side of a support in which they are that small.
+FINER, BESIDE_COLLAR, BESIDE_SUPPORT = 0.5, 15.0, 40.0
+
+
+def inflated_cylinder(
+    diameter: float,
+    pressure: float,
+    thickness: float,
+    size: float,
+    length: float = LENGTH,
+    seam_width: float = SEAM_WIDTH,
+    supports: RigidSupports | None = None,
+    collar: Collar | None = None,
+    deflections: Sequence[float] | None = None,
+    symmetry: Literal["quarter", "full"] = "quarter",
+    cap_warp: Literal["x", "y"] = "x",
+    gas: Gas | None = None,
+) -> CylinderModel:
+    """A case of the thesis (Table 6.1): mesh, sections, bodies and schedule.
+
+    Parameters
+    ----------
+    diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge.
+    thickness : mm of one layer; the seam has three.
+    size : mm of an element, half of that along the axis next to collar and supports.
+    collar : the thesis' for this diameter unless given.
+    deflections : mm; 60 equal ones to 240 mm unless given, each an increment.
+
+    Raises
+    ------
+    InputError : as `CylinderModel` and `cylinder_mesh`; a pressure or thickness not above zero.
+    """
+    for name, value in (("pressure", pressure), ("thickness", thickness)):
+        if not 0 < value < math.inf:
+            raise InputError(None, name, f"expected > 0, got {value!r}")
+    supports = supports or RigidSupports()
+    collar = collar or thesis_collar(diameter)
+    fine = FINER * size
+    zones = (
+        Refinement("collar", 0.0, 0.5 * collar.length + BESIDE_COLLAR, fine),
+        Refinement("support", 0.5 * supports.span, BESIDE_SUPPORT, fine),
+    )
+    mesh = cylinder_mesh(length, diameter, size, seam_width, symmetry, zones, cap_warp)
+    layers = np.ones(len(mesh.quads))
+    if "seam" in mesh.element_sets:
+        layers[mesh.element_sets["seam"]] = SEAM_LAYERS
+    if deflections is None:
+        deflections = np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:].tolist()
+    steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
+    return CylinderModel(
+        mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas()
+    )

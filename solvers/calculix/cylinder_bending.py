@@ -1,0 +1,100 @@
+"""Bending the inflated cylinder on CalculiX: rigid bodies, contact, schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models.cylinder import CylinderModel
+from .rigid import SUPPORT_COUNTS, collar_body, support_body
+from .solids import SolidMesh
+
+Array = NDArray[np.float64]
+
+#: MPa/mm: 0.2 to 5 change the load by less than 1 % (DESIGN.md, 4a).
+STIFFNESS = 1.0
+#: CalculiX' own, and more than enough: the load is a sum over many nodes.
+TOLERANCES = (5e-3, 1e-2)
+#: mm that the support begins inside the cylinder, so that it touches, and that the collar begins
+#: above the inflated cylinder, so that it does not.
+INTO, ABOVE = 0.02, 0.5
+#: Quads that may touch: mm to either side of a support and beyond the collar's edge, and how low
+#: or high they lie, in radii.
+BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
+#: Whole times before the first increment of bending: at rest, then down to the cylinder.
+WAITING = 2
+
+
+def bending_context(
+    model: CylinderModel,
+    solids: SolidMesh,
+    inflated: Array,
+    pressures: Sequence[float] | None = None,
+) -> dict[str, Any]:
+    """What the template is given for step 2.
+
+    Parameters
+    ----------
+    inflated : (nodes of the solids, 3) mm of displacement of the inflated cylinder.
+    pressures : MPa, gauge, at every increment of bending; that of inflation unless given.
+
+    Raises
+    ------
+    InputError : a whole cylinder, whose bodies this does not make.
+    """
+    if model.copies != 4:
+        raise InputError(None, "symmetry", "CalculiX bends a quarter; mesh it as 'quarter'")
+    mesh, top = model.mesh, solids.node_sets["top_line"]
+    radius = float(np.abs(mesh.points[:, 1]).max())
+    under = solids.node_sets["support_bottom"]
+    # A slice of the cylinder as long as half the collar may touch it.
+    near = top[solids.points[top, 2] <= 0.5 * model.collar.length]
+    crown = float((solids.points + inflated)[near, 1].max()) + ABOVE
+    bodies = {
+        "SUPPORT_BODY": support_body(
+            model.supports, radius, float((solids.points + inflated)[under, 1].min()) + INTO
+        ),
+        "COLLAR_BODY": collar_body(model.collar, crown),
+    }
+    middle = mesh.points[mesh.quads].mean(axis=1)
+    beside = np.abs(middle[:, 2] - 0.5 * model.supports.span) < BESIDE_SUPPORT
+    tube = ~np.isin(np.arange(len(middle)), mesh.element_sets["caps"])
+    may_touch = {
+        "SUPPORT_BODY": tube & beside & (middle[:, 1] < LOW * radius),
+        "COLLAR_BODY": tube
+        & (middle[:, 2] < 0.5 * model.collar.length + BESIDE_COLLAR)
+        & (middle[:, 1] > HIGH * radius),
+    }
+    listed, node, element = [], len(solids.points), len(solids.elements)
+    for name, body in bodies.items():
+        listed.append(
+            {
+                "name": name,
+                "points": body.points.tolist(),
+                "elements": (body.elements + 1 + node).tolist(),
+                "first_node": node,
+                "first_element": element,
+                "fabric": (solids.element_sets["outside"][may_touch[name]] + 1).tolist(),
+            }
+        )
+        node, element = node + len(body.points), element + len(body.elements)
+    steps = len(model.increments)
+    gauge = [model.pressure] * steps if pressures is None else list(pressures)
+    return {
+        "bodies": listed,
+        "stiffness": STIFFNESS,
+        "path": [0.0, 0.0, *(ABOVE + d for d in (0.0, *model.increments))],
+        "pressures": [model.pressure] * (WAITING + 1) + gauge,
+        "force_tolerance": TOLERANCES[0],
+        "correction_tolerance": TOLERANCES[1],
+    }
+
+
+def body_nodes(solids: int) -> tuple[slice, slice]:
+    """Nodes of the support and of the collar in a result, after those of the `solids` (count)."""
+    support = 2 * (SUPPORT_COUNTS[0] + 1) * (SUPPORT_COUNTS[1] + 1)
+    return slice(solids, solids + support), slice(solids + support, None)

@@ -1,0 +1,248 @@
+"""The inflated cylinder on CalculiX: solids, deck, and the tube's middle against closed forms."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.volume import enclosed_volume
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.models.bodies import RigidSupports
+from bubblefit.models.cylinder import CylinderModel
+from bubblefit.solvers.calculix.cylinder import cylinder_decks
+from bubblefit.solvers.calculix.cylinder_bending import bending_context
+from bubblefit.solvers.calculix.cylinder_results import bending_history, inflation_history
+from bubblefit.solvers.calculix.library import material_library
+from bubblefit.solvers.calculix.reasons import increments
+from bubblefit.solvers.calculix.solids import solid_mesh
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from scipy.optimize import fsolve
+
+THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
+WARP, FILL, SHEAR = 400.0, 150.0, 30.0  # MPa
+LINEAR = HypoelasticLaw(np.array([0, 0, 0, SHEAR, 0, 0, 0, FILL, 0, 0, 0, WARP], float))
+
+
+def case(size: float = 25.0, seam: float = 0.0, length: float = 900.0) -> CylinderModel:
+    supports = RigidSupports(length / 1.5)
+    return inflated_cylinder(2 * RADIUS, PRESSURE, THICKNESS, size, length, seam, supports=supports)
+
+
+def closed_form(pressure: float) -> np.ndarray:
+    """Axial and hoop log strain of a long thin-walled tube with closed ends.
+
+    Hoop stress p r / t, axial p r / 2 t, with the radius r as inflated and t as at rest.
+    """
+    den = 1 - LINEAR.nu12**2 * FILL / WARP
+    d11, d22, d12 = WARP / den, FILL / den, LINEAR.nu12 * FILL / den
+
+    def unbalance(strain: np.ndarray) -> list[float]:
+        hoop = pressure * RADIUS * np.exp(strain[1]) / THICKNESS
+        return [
+            d11 * strain[0] + d12 * strain[1] - 0.5 * hoop,
+            d12 * strain[0] + d22 * strain[1] - hoop,
+        ]
+
+    return fsolve(unbalance, [0.01, 0.05], xtol=1e-12)
+
+
+def run(ccx, model: CylinderModel, folder: Path):
+    solids = solid_mesh(model)
+    for name, text in cylinder_decks(model, LINEAR, solids).items():
+        (folder / name).write_text(text)
+    environment = os.environ | {
+        "LD_LIBRARY_PATH": str(material_library().parent),
+        "OMP_NUM_THREADS": "1",
+    }
+    done = subprocess.run(
+        [str(ccx.path), "-i", "job"], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    return inflation_history(folder / "job.frd", model, solids, 0)
+
+
+def test_the_middle_of_the_tube_has_the_closed_form(ccx, tmp_path):
+    model = case()
+    history = run(ccx, model, tmp_path)
+    side = model.mesh.node_sets["side_line"]
+    for frame, pressure in enumerate(model.inflation):
+        axial, hoop = closed_form(pressure)
+        at = model.mesh.points[side] + history.displacement[frame, side]
+        # 0.1 % is sixteen quads around; the gas meets the inside, half a thickness (0.5 %) in.
+        assert at[0, 0] == pytest.approx(RADIUS * np.exp(hoop), rel=1e-3)
+        grown = np.log((at[2, 2] - at[0, 2]) / model.mesh.points[side[2], 2])
+        assert grown == pytest.approx(axial, abs=3e-4)
+    assert (np.diff(history.cavity_volume) > 0).all()
+    np.testing.assert_array_equal(history.load, model.inflation)
+    # No seam: nothing bends it.
+    bottom = model.mesh.node_sets["bottom_line"]
+    assert np.ptp(history.displacement[-1, bottom, 1][:4]) < 0.2
+
+
+@pytest.mark.slow
+def test_the_tube_s_strain_converges_to_that_of_a_thin_wall(ccx, tmp_path):
+    model = case(12.0)
+    history = run(ccx, model, tmp_path)
+    at = RADIUS + history.displacement[-1, model.mesh.node_sets["side_line"][0], 0]
+    assert np.log(at / RADIUS) == pytest.approx(closed_form(PRESSURE)[1], rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("bending")
+
+
+@pytest.fixture(scope="module")
+def bent(ccx, scratch):
+    model = replace(case(30.0, 40.0), deflections=[3.0, 6.0], increments=[3.0, 6.0])
+    solver = CalculixSolver(ccx=ccx.path, scratch=scratch, keep=True)
+    return model, solver.run(model, LINEAR)
+
+
+def test_collar_and_supports_balance(bent):
+    _, history = bent
+    assert history.load.shape == (3,)
+    assert history.load[0] == pytest.approx(0.0, abs=1e-6)
+    assert 0 < history.load[1] < history.load[2]
+    total = history.reactions["collar"] + history.reactions["supports"]
+    # The tolerance of the run is 5e-3 of the mean force.
+    np.testing.assert_allclose(total, 0, atol=1e-3 * history.load[-1])
+
+
+def test_the_gas_keeps_its_mass(bent):
+    model, history = bent
+    absolute = history.cavity_pressure + model.gas.ambient
+    energy = absolute * history.cavity_volume
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
+    assert history.cavity_pressure[-1] > model.pressure
+    assert any("passes" in remark for remark in history.remarks)
+
+
+def test_the_crown_follows_the_collar(bent):
+    model, history = bent
+    top = history.displacement[:, model.mesh.node_sets["top_line"][0], 1]
+    # Pressed into the contact's springs, by a pressure over 1 MPa/mm.
+    np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.6)
+
+
+def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path):
+    model, history = bent
+    solids, results = solid_mesh(model), max(scratch.rglob("job.frd"), key=os.path.getmtime)
+    converged = {(i.step, i.increment) for i in increments(results.with_name("job.sta"))}
+    last = max(converged)
+    # Stopped: no end mark, and a frame of residuals that never converged.
+    cut = tmp_path / "job.frd"
+    data = results.read_bytes()
+    cut.write_bytes(data[: data.rindex(b" 9999")])
+    gauge = history.cavity_pressure[1:]
+    early = bending_history(cut, model, solids, gauge, 0, converged - {last})
+    assert len(early.load) == 2
+    np.testing.assert_array_equal(early.load, history.load[:2])
+    assert "the last increment is at 3 mm" in early.remarks[0]
+    whole = bending_history(results, model, solids, gauge, 0)
+    np.testing.assert_array_equal(whole.load, history.load)
+    for path, given in ((cut, None), (cut, set()), (tmp_path / "none.frd", None)):
+        with pytest.raises(SolverFailure, match="no usable results"):
+            bending_history(path, model, solids, gauge, 0, given)
+    # Cut anywhere it is an early end, too, or none.
+    for part in (0.3, 0.9, 0.99):
+        cut.write_bytes(data[: int(part * len(data))])
+        try:
+            found = bending_history(cut, model, solids, gauge, 0, converged)
+        except SolverFailure:
+            continue
+        np.testing.assert_array_equal(found.load, history.load[: len(found.load)])
+
+
+def test_a_whole_cylinder_is_not_bent():
+    with pytest.raises(InputError, match="mesh it as 'quarter'"):
+        model = inflated_cylinder(150.0, PRESSURE, THICKNESS, 60.0, symmetry="full")
+        solids = solid_mesh(model)
+        bending_context(model, solids, np.zeros_like(solids.points))
+
+
+# Solids
+
+
+def volumes(points: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Least of the Jacobians at the corners, as a sign that a solid is the right way out."""
+    corner = points[elements]
+    spokes = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
+    spokes += ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
+    at = [
+        np.einsum(
+            "mx,mx->m",
+            np.cross(corner[:, b] - corner[:, a], corner[:, c] - corner[:, a]),
+            corner[:, d] - corner[:, a],
+        )
+        for a, b, c, d in spokes
+    ]
+    return np.min(at, axis=0)
+
+
+@pytest.mark.parametrize("seam", [0.0, 40.0])
+def test_solids_have_the_sections_of_the_model(seam):
+    model = case(12.0, seam)
+    mesh, solids = model.mesh, solid_mesh(model)
+    assert (volumes(solids.points, solids.elements) > 0).all()
+    np.testing.assert_allclose(solids.middle(solids.points), mesh.points, atol=1e-9)
+    assert set(solids.elements.ravel()) == set(range(len(solids.points)))
+    owners = np.concatenate([solids.element_sets[n] for n in ("tube", "caps")])
+    np.testing.assert_array_equal(np.sort(owners), np.arange(len(solids.elements)))
+    # A quad's solids together are as thick as the model says.
+    inside = solids.elements[solids.element_sets["inside"], :4]
+    outside = solids.elements[solids.element_sets["outside"], 4:]
+    through = solids.points[outside].mean(axis=1) - solids.points[inside].mean(axis=1)
+    away = np.abs(mesh.points[mesh.quads][:, :, 2]).max(axis=1) < mesh.points[:, 2].max()
+    np.testing.assert_allclose(
+        np.linalg.norm(through, axis=1)[away], model.thickness[away], rtol=0.01
+    )
+    # What the gas meets has no step: its pressure is in balance.
+    rest = enclosed_volume(solids.points, inside)
+    shift = enclosed_volume(solids.points + np.array([0.0, 10.0, 0.0]), inside)
+    assert shift == pytest.approx(rest, rel=1e-12)
+    for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
+        on_plane = np.flatnonzero(solids.points[:, axis] == 0)
+        np.testing.assert_array_equal(solids.node_sets[name], on_plane)
+
+
+def test_sections_that_solids_cannot_have_are_refused():
+    model = case(25.0, 40.0)
+    for thickness in (
+        np.linspace(0.8, 0.9, len(model.thickness)),
+        np.full_like(model.thickness, 1),
+    ):
+        with pytest.raises(InputError) as caught:
+            solid_mesh(replace(model, thickness=thickness))
+        assert caught.value.field == "thickness"
+
+
+def test_the_deck_holds_what_the_model_says():
+    model = case(25.0, 40.0)
+    files = cylinder_decks(model, LINEAR, solid_mesh(model))
+    deck, mesh = files["job.inp"], files["mesh.inp"]
+    for line in (
+        "SYMMETRY_X, 1, 1",
+        "SYMMETRY_Z, 3, 3",
+        "SUPPORT_BOTTOM, 2, 2",
+        "INSIDE, P1, 1",
+        "10, 0.14",
+        "*SOLID SECTION, ELSET=TUBE, MATERIAL=@BUBBLEFIT_HYPOELASTIC@TUBE, ORIENTATION=AROUND",
+        "*SOLID SECTION, ELSET=CAPS, MATERIAL=@BUBBLEFIT_HYPOELASTIC@CAPS",
+    ):
+        assert line in deck.splitlines()
+    for name in ("TUBE", "CAPS", "INSIDE", "OUTSIDE"):
+        assert f"*ELSET, ELSET={name}" in mesh.splitlines()
+    assert "*NSET, NSET=SUPPORT_BOTTOM" in mesh.splitlines()
+
+
+def test_a_run_without_results_is_no_result(tmp_path):
+    model = case()
+    with pytest.raises(SolverFailure, match="no usable results"):
+        inflation_history(tmp_path / "job.frd", model, solid_mesh(model), 0)
