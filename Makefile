@@ -18,7 +18,7 @@ demo: $(READY)
 # Without a ccx the tests that need one are left out, except in CI.
 test: $(READY)
 	@[ -n "$$BUBBLEFIT_CCX" ] || sh .ci/calculix || [ -z "$$CI" ]
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .
