@@ -151,7 +151,14 @@ def write_comparison(
             ("laws.png", "Error on the data, and at specimens or points left out of the fit"),
             ("loads.png", "Best fit of every form"),
         ],
-        tables=[Table("Errors in N", header, rows)],
+        tables=[
+            Table(
+                "Errors in N",
+                ["moduli", "coefficients", "fit", *directions, "left out", *directions],
+                rows,
+                "of the fit to all points, and at what the fits of the folds were not given",
+            )
+        ],
         files=[("comparison.csv", "the table"), ("result.json", "all numbers, for programs")],
     )
     write_report(folder, page)

@@ -6,10 +6,10 @@ import numpy as np
 
 from ..materials.law import MODULI
 from ..projects.joint import JointProject
-from ..reports import Table, percent, plot_moduli, plot_pinned
+from ..reports import Table, plot_moduli, plot_pinned
 from ..runs.folder import OutputFolder
 from .bubble_figures import bubble_facts, bubble_figures, bubble_tables
-from .joint_results import JointAssessment
+from .joint_results import JointAssessment, sigma_words
 from .joint_setup import JointSetup
 from .page import best_laws, draw_optima, moduli_curves, write_page
 from .uniaxial_figures import FILES, order_figures, strip_figures, strip_table
@@ -69,7 +69,7 @@ def _pinned(found: JointAssessment, folder: OutputFolder) -> list[tuple[str, str
 
 def _pinned_table(found: JointAssessment) -> list[Table]:
     rows: list[list[object]] = [
-        [source, name, percent(s["median"]), percent(s["largest"])]
+        [source, name, sigma_words(s["median"]), sigma_words(s["largest"])]
         for source, sigmas in found.result["pinned"].items()
         for name, s in sigmas.items()
     ]

@@ -130,12 +130,13 @@ def joint_summary(found: JointAssessment, folder: Path) -> str:
     lines = [f"bubble: mean |dx|+|dy|+|dz| {result['mean_abs_mm']:.3g} mm", *rms_lines(result)]
     for source, sigmas in result["pinned"].items():
         parts = ", ".join(
-            f"{name} {_percent(s['median'])} (at worst {_percent(s['largest'])})"
+            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
             for name, s in sigmas.items()
         )
         lines.append(f"1 sigma from {source}: {parts}")
     return summary_lines(result, found.fit, lines, folder)
 
 
-def _percent(value: float) -> str:
+def sigma_words(value: float) -> str:
+    """A relative uncertainty as percent, as long as it says anything."""
     return percent(value) if value < 10 * NOTHING else "unknown"
