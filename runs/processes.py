@@ -20,6 +20,8 @@ from .start import EvaluationRecord, StartRecord, run_start
 log = logging.getLogger(__name__)
 Record = EvaluationRecord | StartRecord
 WAIT_S = 0.5
+#: For a worker to kill its solver and remove its scratch folder once it is told to end.
+GRACE_S = 20.0
 
 
 def run_starts(
@@ -78,7 +80,10 @@ def run_starts(
         for worker in workers:
             worker.terminate()
         for worker in workers:
-            worker.join()
+            worker.join(GRACE_S)
+            if worker.is_alive():  # it could not even end: do not wait for it for ever
+                worker.kill()
+                worker.join()
 
 
 def _here(
@@ -133,5 +138,9 @@ def _work(
             problem = build()
             while (number := tasks.get()) is not None:
                 tell(run_start(problem, options, seed, number, tell))
+    except SystemExit:
+        # Told to end, perhaps within a lock of the queue: what multiprocessing does at the end of
+        # a process would wait for that lock.
+        os._exit(1)
     except Exception as error:
         tell(error)
