@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -44,27 +45,25 @@ class StripData:
     @property
     def points(self) -> tuple[Array, Array]:
         """Elongation and load of all specimens up to the end of the model, by elongation."""
-        if not self.curves:
-            return np.empty(0), np.empty(0)
-        elongation = np.concatenate([c.elongation for c in self.curves])
-        load = np.concatenate([c.load for c in self.curves])
-        order = self._order
-        return elongation[order], load[order]
+        elongation, load, _ = self._inside
+        return elongation, load
 
     @property
     def specimen_of(self) -> NDArray[np.intp]:
         """Number of the specimen of each of the `points`."""
-        if not self.curves:
-            return np.empty(0, np.intp)
-        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
-        return whose[self._order].astype(np.intp)
+        return self._inside[2]
 
-    @property
-    def _order(self) -> NDArray[np.intp]:
+    @cached_property
+    def _inside(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        if not self.curves:
+            return np.empty(0), np.empty(0), np.empty(0, np.intp)
         elongation = np.concatenate([c.elongation for c in self.curves])
+        load = np.concatenate([c.load for c in self.curves])
+        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
         end = (self.final_length - self.gauge_length) * (1 + 1e-9)
         order = np.argsort(elongation, kind="stable")
-        return order[(elongation[order] >= 0) & (elongation[order] <= end)]
+        order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
+        return elongation[order], load[order], whose[order].astype(np.intp)
 
 
 def read_strips(

@@ -32,15 +32,20 @@ Array = NDArray[np.float64]
 class CardRun:
     """One card on one strip: its history, and how many of its increments are shown."""
 
+    model: UniaxialModel
     history: History
     shown: int
-    elongation: Array
     rms: float | None
+
+    @property
+    def elongation(self) -> Array:
+        """mm of the gauge, at every increment."""
+        return np.array(self.model.elongations)
 
     @property
     def whole(self) -> bool:
         """Whether nothing is left out."""
-        return self.shown == len(self.elongation)
+        return self.shown == len(self.model.elongations)
 
 
 #: By (card, direction).
@@ -59,8 +64,9 @@ def run_cards(
     each analysis, given the solver and the number of increments.
     """
     runs: Runs = {}
+    solver = project_solver(project)
     for direction, model in strip_models(project).items():
-        solver, strip = project_solver(project), project.strips[direction]
+        strip = project.strips[direction]
         u = np.array(model.elongations)
         for name, card in cards.items():
             own = replace(model, thickness=card.thickness)
@@ -75,7 +81,7 @@ def run_cards(
             if strip.polynomial is not None and shown:
                 error = history.load[:shown] - strip.polynomial(u[:shown])
                 rms = float(np.sqrt(np.mean(error**2)))
-            runs[name, direction] = CardRun(history, shown, u, rms)
+            runs[name, direction] = CardRun(own, history, shown, rms)
     return runs
 
 
@@ -138,8 +144,8 @@ def write_cards(project: UniaxialProject, cards: Sequence[str], runs: Runs, fold
     for number, name in enumerate(cards, start=1):
         if (name, "bias") in ended:
             suffix = "" if len(cards) == 1 else f"-{number}"
-            model = strip_models(project)["bias"]
-            draw_bias(model, ended[name, "bias"].history, folder, "bias" + suffix)
+            run = ended[name, "bias"]
+            draw_bias(run.model, run.history, folder, "bias" + suffix)
 
 
 def cards_lines(result: dict[str, Any]) -> list[str]:

@@ -26,19 +26,24 @@ def project_solver(project: FitProject) -> Solver:
     InputError : there is no such solver (says in which file), or an option is wrong.
     SolverFailure : it is not installed, or does not carry the law.
     """
+    return project_solvers(project, 1)[0]
+
+
+def project_solvers(project: FitProject, count: int) -> list[Solver]:
+    """`count` of them, so that each can keep what it prepares for its model; checked once."""
     name = project.solver
     try:
-        solver = solver_named(name, **project.solver_options.get(name, {}))
+        solvers = [solver_named(name, **project.solver_options.get(name, {})) for _ in range(count)]
     except InputError as error:
         if error.field != "solver":
             raise
         raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
     # Once here, in one line, rather than as the failure of every analysis.
-    if solver.external:
-        found = solver.check()
+    if solvers and solvers[0].external:
+        found = solvers[0].check()
         if not (found.available and found.carries_law):
-            raise SolverFailure(found.advice or "is not usable", solver.name)
-    return solver
+            raise SolverFailure(found.advice or "is not usable", solvers[0].name)
+    return solvers
 
 
 def law_of(project: FitProject) -> HypoelasticLaw:

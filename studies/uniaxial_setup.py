@@ -15,7 +15,7 @@ from ..identification.problem import FitProblem
 from ..models.uniaxial import UniaxialModel, bias_strip, refined_quads, straight_strip
 from ..projects.uniaxial import UniaxialProject
 from ..projects.uniaxial_data import StripData
-from .setup import law_of, lead, parameters_of, project_solver
+from .setup import law_of, lead, parameters_of, project_solvers
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,8 @@ def strip_experiments(
     match, by direction; all unless given.
     """
     models, tests = strip_models(project), []
-    for direction, strip in project.strips.items():
+    solvers = project_solvers(project, len(project.strips))
+    for solver, (direction, strip) in zip(solvers, project.strips.items(), strict=True):
         own = weight * project.weights[direction]
         if own == 0:
             continue
@@ -94,7 +95,7 @@ def strip_experiments(
         if not scale > 0:
             raise InputError(project.path, f"uniaxial, {direction}", "the measured load is zero")
         objective = LoadObjective(model.elongations, elongation, load, scale, own, noise)
-        tests.append(Experiment(direction, model, project_solver(project), objective, False))
+        tests.append(Experiment(direction, model, solver, objective, False))
     return tuple(tests)
 
 
