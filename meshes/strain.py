@@ -1,4 +1,4 @@
-"""Logarithmic strain of a deformed mesh at the middle of its quads."""
+"""Logarithmic strain of a deformed surface."""
 
 from __future__ import annotations
 
@@ -24,6 +24,14 @@ def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
     yarns = np.array([[warp[0], -warp[1]], [warp[1], warp[0]]])
     slopes = np.einsum("nj,mjk,kl->mnl", MIDDLE, np.linalg.inv(jacobian), yarns)
     gradient = np.einsum("mni,mnl->mil", rest + u, slopes)
-    stretch, axes = np.linalg.eigh(np.einsum("mik,mil->mkl", gradient, gradient))
-    h = np.einsum("mka,ma,mla->mkl", axes, 0.5 * np.log(stretch), axes)
-    return np.stack([h[:, 0, 0], h[:, 1, 1], 2 * h[:, 0, 1]], axis=1)
+    return log_strain_of(gradient)
+
+
+def log_strain_of(gradient: Array) -> Array:
+    """Log strain (..., 3) of surface gradients (..., 3, 2): eps1, eps2, gamma12.
+
+    The columns of a gradient are the images of the unit warp and fill vectors.
+    """
+    stretch, axes = np.linalg.eigh(np.einsum("...ki,...kj->...ij", gradient, gradient))
+    h = np.einsum("...ia,...a,...ja->...ij", axes, 0.5 * np.log(stretch), axes)
+    return np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1)

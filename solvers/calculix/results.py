@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...meshes.mesh import Mesh
+from ...meshes.strain import log_strain_of
 from ...models.bubble import BubbleModel
 from ..base import History
 from ..membrane.element import reference_elements
@@ -59,9 +60,7 @@ def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> A
     frames = []
     for displacement in displacements:
         gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])
-        values, axes = np.linalg.eigh(np.einsum("mpki,mpkj->mpij", gradient, gradient))
-        h = np.einsum("mpia,mpa,mpja->mpij", axes, 0.5 * np.log(values), axes)
-        frames.append(np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1))
+        frames.append(log_strain_of(gradient))
     return np.array(frames)
 
 

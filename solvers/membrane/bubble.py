@@ -15,7 +15,7 @@ from ..base import History
 from .derivatives import Derivatives
 from .element import reference_elements
 from .factorisation import tangent_for
-from .newton import Membrane
+from .newton import Membrane, initial_moduli
 
 Array = NDArray[np.float64]
 
@@ -122,15 +122,9 @@ def _increment(
 
 def _from_flat(membrane: Membrane, level: float, cuts: int) -> Array:
     """First increment: a flat membrane has no stiffness, so start from an inflated guess."""
-    law = membrane.law
+    moduli = initial_moduli(membrane.law)
     radius = np.hypot(membrane.reference[:, 0], membrane.reference[:, 1])
     size = float(radius.max())
-    moduli = [float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12)]
-    if not min(moduli) > 0:
-        raise SolverFailure(
-            "no equilibrium at all: E1, E2, G12 at zero strain are "
-            f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
-        )
     stiffness = 0.5 * float(np.median(membrane.section)) * (moduli[0] + moduli[1])
     # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
     height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)

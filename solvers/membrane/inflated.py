@@ -17,6 +17,7 @@ from .cavity import closed_cavity
 from .closed import BorderedTangent, ClosedMembrane
 from .element import reference_elements
 from .factorisation import tangent_for
+from .newton import initial_moduli
 from .snap import through_snap
 
 Array = NDArray[np.float64]
@@ -143,13 +144,7 @@ def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> 
 
 def _from_slack(membrane: ClosedMembrane, level: float, cuts: int) -> Array:
     """First increment: facets carry no pressure until they are stretched."""
-    law = membrane.law
-    moduli = [float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12)]
-    if not min(moduli) > 0:
-        raise SolverFailure(
-            "no equilibrium at all: E1, E2, G12 at zero strain are "
-            f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
-        )
+    initial_moduli(membrane.law)
     found = membrane.equilibrium_from_slack(np.zeros_like(membrane.reference), level)
     if found is not None:
         return found

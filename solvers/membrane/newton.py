@@ -145,3 +145,19 @@ class Membrane:
             flat[self.free] = before + scale * step
             last, backtracks, chord = norm, 0, norm < CHORD_BELOW and scale == 1.0
         return None
+
+
+def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
+    """E1, E2, G12 at zero strain, MPa.
+
+    Raises
+    ------
+    SolverFailure : one of them is not positive, so that there is no equilibrium to look for.
+    """
+    e1, e2, g12 = (float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12))
+    if not min(e1, e2, g12) > 0:
+        raise SolverFailure(
+            "no equilibrium at all: E1, E2, G12 at zero strain are "
+            f"{e1:.3g}, {e2:.3g}, {g12:.3g} MPa and must be positive"
+        )
+    return e1, e2, g12

@@ -15,7 +15,7 @@ from ..base import History
 from .derivatives import Derivatives
 from .driven import DrivenTangent, Pull
 from .element import reference_elements
-from .newton import Membrane
+from .newton import Membrane, initial_moduli
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def analyse(
     """
     if pressure_offset or "pressure_offset" in parameters:
         raise InputError(None, "pressure_offset", "a strip has no pressure; leave it out")
-    _check_moduli(membrane.law)
+    initial_moduli(membrane.law)
     tangent = membrane.tangent
     assert isinstance(tangent, DrivenTangent)
     direction = np.zeros(membrane.reference.size)
@@ -107,15 +107,6 @@ def analyse(
         load_slope=model.load_factor * load_slope if parameters else None,
     )
     return history, rates
-
-
-def _check_moduli(law: HypoelasticLaw) -> None:
-    moduli = [float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12)]
-    if not min(moduli) > 0:
-        raise SolverFailure(
-            "no equilibrium at all: E1, E2, G12 at zero strain are "
-            f"{', '.join(f'{m:.3g}' for m in moduli)} MPa and must be positive"
-        )
 
 
 def _increment(pull: Pull, path: Array, levels: Array, i: int, guess: Array | None) -> Array:
