@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import BubblefitError, InputError
+from ..errors import BubblefitError, InputError, OutputError
 
 if TYPE_CHECKING:
     from ..projects.fit import FitProject
@@ -49,6 +49,20 @@ def default_folder(project: Path) -> Path:
     """out/NAME below the current folder, after the project's folder and file."""
     name = project.resolve().parent.name
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+
+
+def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool) -> Path:
+    """The output folder of one analysis or study: `out`, or out/NAME-`suffix`.
+
+    Raises
+    ------
+    OutputError : it holds a result already and may not be written over.
+    """
+    own = default_folder(project)
+    folder = out or own.with_name(f"{own.name}-{suffix}")
+    if (folder / "result.json").exists() and not overwrite:
+        raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
+    return folder
 
 
 def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:

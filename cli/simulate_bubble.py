@@ -12,7 +12,6 @@ from typing import Any
 import click
 import numpy as np
 
-from ..errors import OutputError
 from ..materials.card import read_card
 from ..projects.bubble import read_project
 from ..reports import plot_profiles, write_vtu
@@ -20,7 +19,7 @@ from ..studies.bubble_setup import bubble_model
 from ..studies.results import STRAINS, UNSTABLE, beyond_card, strains_of
 from ..studies.setup import project_solver
 from ..writing import replacing
-from .options import default_folder, exits, solver_choice, with_solver
+from .options import exits, result_folder, solver_choice, with_solver
 from .progress import run_progress
 
 
@@ -44,9 +43,7 @@ def simulate_bubble(
     settings = with_solver(read_project(project, need_data=False), solver_given)
     card = read_card(card_path)
     solver = project_solver(settings)
-    folder = out or default_folder(project).with_name(default_folder(project).name + "-simulated")
-    if (folder / "result.json").exists() and not overwrite:
-        raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
+    folder = result_folder(project, "simulated", out, overwrite)
     model = replace(bubble_model(settings), thickness=card.thickness)
     with run_progress(solver, len(model.increments), as_json):
         history = solver.run(model, card.law)

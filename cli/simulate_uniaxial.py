@@ -10,13 +10,13 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError, SolverFailure
+from ..errors import InputError, SolverFailure
 from ..materials.card import MaterialCard, read_card
 from ..projects.uniaxial import read_uniaxial
 from ..solvers.base import Solver
 from ..studies.cards_on_strips import cards_lines, cards_result, run_cards, write_cards
 from ..writing import replacing
-from .options import default_folder, exits, solver_choice, with_solver
+from .options import exits, result_folder, solver_choice, with_solver
 from .progress import run_progress
 
 
@@ -56,9 +56,7 @@ def simulate_uniaxial(
     """
     settings = with_solver(read_uniaxial(project, data, need_data=False), solver_given)
     named = _named(cards)
-    folder = out or default_folder(project).with_name(default_folder(project).name + "-simulated")
-    if (folder / "result.json").exists() and not overwrite:
-        raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
+    folder = result_folder(project, "simulated", out, overwrite)
 
     def progress(solver: Solver, increments: int) -> AbstractContextManager[None]:
         return run_progress(solver, increments, as_json)

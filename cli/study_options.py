@@ -11,7 +11,6 @@ from typing import Any
 
 import click
 
-from ..errors import OutputError
 from ..experiments.tables import write_table
 from ..materials.card import MaterialCard, read_card
 from ..projects.fit import FitProject
@@ -19,7 +18,7 @@ from ..solvers.base import History, Solver
 from ..studies.results import UNSTABLE, beyond_card, strains_of
 from ..studies.setup import project_solver
 from ..writing import replacing
-from .options import default_folder, exits, solver_choice, with_solver
+from .options import exits, result_folder, solver_choice, with_solver
 from .study_kinds import StudyKind, study_kind
 
 
@@ -67,11 +66,7 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
             kind = study_kind(project)
             settings = with_solver(kind.read(project, data), solver_given)
             card = read_card(card_path)
-            own = default_folder(project)
-            folder = out or own.with_name(f"{own.name}-{name}")
-            if (folder / "result.json").exists() and not overwrite:
-                problem = "already holds a result; use --overwrite or another --out"
-                raise OutputError(f"{folder}: {problem}")
+            folder = result_folder(project, name, out, overwrite)
             return Study(kind, settings, card, card_path, project_solver(settings), folder)
 
         return command(open_study, **kwargs)
