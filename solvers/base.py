@@ -28,8 +28,10 @@ class History:
     gamma12) log strain; cavity pressure (MPa) and volume (mm^3), (frames,), where there is a
     cavity; path: displacement at every increment (increments, nodes, 3) and its derivatives
     path_slope (..., parameters), where the solver keeps them (a start for the next run); stable:
-    whether the equilibrium at the last load is, None where the solver did not look; iterations:
-    what the solver counts as its work; remarks: what a reader of the result should know.
+    whether the equilibrium at the last load is, None where the solver did not look; wrinkled:
+    share of the reference surface that carries no stress in one direction (frames,), None likewise;
+    iterations: what the solver counts as its work; remarks: what a reader of the result should
+    know.
     """
 
     load: Array
@@ -44,6 +46,7 @@ class History:
     path_slope: Array | None = None
     load_slope: Array | None = None
     stable: bool | None = None
+    wrinkled: Array | None = None
     remarks: tuple[str, ...] = ()
 
 
