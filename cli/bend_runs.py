@@ -17,11 +17,13 @@ from ..projects.bend import BendProject
 from ..runs.bend_folder import BendFolder
 from ..runs.bend_run import BendRun
 from ..runs.folder import RESULT
-from ..studies.bend_figures import report_bend
-from ..studies.bend_results import bend_lines, bend_result, outcome_of, write_bend_tables
+from ..studies.bend_page import report_bend
+from ..studies.bend_results import BendOutcome, bend_result, outcome_of
 from ..studies.bend_setup import KEY, Pair, pairs_of, run_pairs
+from ..studies.bend_tables import write_bend_tables
 from ..studies.setup import project_solver
 from ..writing import replacing
+from .bend_words import bend_lines
 from .fitting import WORSE
 from .options import cores, exits, solver_choice
 from .progress import RunsProgress
@@ -120,7 +122,7 @@ def _words(pair: Pair, run: BendRun) -> str:
     return f"{pair.case.name} with {pair.name}: {how} in {run.seconds:.0f} s"
 
 
-def _judge(outcome: Any, above: float | None) -> None:
+def _judge(outcome: BendOutcome, above: float | None) -> None:
     """Exit 1 when a run is further from what was measured than asked for, or says nothing of it."""
     if above is None:
         return
