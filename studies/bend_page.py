@@ -11,6 +11,7 @@ from ..reports import Report, Table, percent, write_report
 from .bend_figures import bend_figures, write_beams
 from .bend_measures import PLACES
 from .bend_results import BendOutcome
+from .bend_statements import TOLERANCES
 
 #: Letters of a cell that is not broken.
 SHORT = 30
@@ -84,7 +85,7 @@ def _statements(outcome: BendOutcome) -> list[Table]:
     header = ["the thesis", "these runs", "verdict"]
     if all(s.holds is None for s in outcome.statements):
         return []
-    return [Table("What the thesis saw", header, rows, text=(1, 2))]
+    return [Table("What the thesis saw", header, rows, TOLERANCES, text=(1, 2))]
 
 
 def _runs(outcome: BendOutcome) -> list[Table]:
@@ -103,23 +104,13 @@ def _runs(outcome: BendOutcome) -> list[Table]:
         strain, rise = f"{max(found.body_strain):.3f}", f"{found.pressure_rise:+.2f}"
         stiffness = None if found.stiffness is None else f"{found.stiffness:.2f}"
         rows.append(
-            [
-                *head,
-                stiffness,
-                buckles,
-                found.buckling_is,
-                wrinkles,
-                *loads,
-                strain,
-                rise,
-                outcome.ended(i),
-                seconds,
-            ]
-        )
+            [*head, stiffness, buckles, found.buckling_is, wrinkles, *loads, strain, rise,
+             outcome.ended(i), seconds]
+        )  # fmt: skip
     at = [f"load at {p:g} mm, N" for p in PLACES]
     header = [
-        "case", "card", "stiffness, N/mm", "buckles", "there", "wrinkles from", *at, "inflation strain",
-        "pressure, kPa", "ended", "s",
+        "case", "card", "stiffness, N/mm", "buckles", "there", "wrinkles from", *at,
+        "inflation strain", "pressure, kPa", "ended", "s",
     ]  # fmt: skip
     note = (
         "Stiffness: to 20 mm. Buckles: the limit point where the load falls afterwards, else the "
