@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli import progress
+from bubblefit.cli import bend_runs, progress
 from bubblefit.cli.main import main
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -47,6 +47,12 @@ def formula(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFa
     monkeypatch.setitem(registry.SOLVERS, "formula", Counted)
     monkeypatch.setitem(registry.SOLVERS, "dying", Dying)
     return told
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without figures and page, which take the longest and are looked at elsewhere."""
+    monkeypatch.setattr(bend_runs, "report_bend", lambda *arguments: None)
 
 
 def bend(*arguments, cwd: Path, code: int = 0, command=("bend",)):
@@ -171,6 +177,7 @@ def test_the_beam_for_paraview_is_whole_and_bent(study) -> None:
 # Which runs
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_cases_and_cards_are_picked(tmp_path: Path, formula: Path) -> None:
     project = write_project(tmp_path)
     write_card(MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.9), tmp_path / "mine.toml")
@@ -185,6 +192,7 @@ def test_cases_and_cards_are_picked(tmp_path: Path, formula: Path) -> None:
     one_line(done, "--card", "soft, stiff")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_finished_run_is_not_repeated(tmp_path: Path, formula: Path) -> None:
     project = write_project(tmp_path)
     bend(project, "--out", "out", "--jobs", 2, cwd=tmp_path)
@@ -242,6 +250,7 @@ def test_a_process_that_dies_is_noticed(tmp_path: Path) -> None:
     one_line(done, "a worker process died", "finished runs are kept", "--resume")
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("above", "code"), [(10.0, 0), (0.01, 1)])
 def test_fail_above(tmp_path: Path, above: float, code: int) -> None:
     arguments = (measured(tmp_path), "--out", "out", "--fail-above", above)
@@ -260,12 +269,14 @@ def test_fail_above_needs_something_measured(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_json_is_all_that_is_printed(tmp_path: Path) -> None:
     done = bend(write_project(tmp_path), "--out", "out", "--json", cwd=tmp_path)
     assert json.loads(done.stdout) == result_in(tmp_path / "out")
     assert done.stderr == ""
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_progress_is_a_plain_line_where_there_is_no_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
