@@ -20,8 +20,8 @@ KERNELS = (
     "materials/point_law.py",
     "materials/relaxation.py",
     "materials/law.py",
+    "meshes/volume.py",
     "solvers/membrane/kernel.py",
-    "solvers/membrane/cavity.py",
     "solvers/membrane/sensitivity.py",
 )
 

@@ -78,7 +78,8 @@ def _of_the_gas(model: CylinderModel, history: History) -> Array:
     """Gauge pressure (increments,) of the gas in the volumes found; the last one's beyond them."""
     assert history.cavity_volume is not None
     full, volume = float(history.cavity_volume[0]), history.cavity_volume[1:]
-    found = [model.gas.gauge_pressure(float(v), model.pressure, full) for v in volume]
+    gas = model.gas.closed_in(model.pressure, full)
+    found = [gas.pressure(float(v)) for v in volume]
     return np.array(found + [found[-1]] * (len(model.increments) - len(found)))
 
 

@@ -54,12 +54,12 @@ def closed_membrane(
         np.asarray(model.thickness, dtype=float),
         law,
         free,
-        BorderedTangent(tangent_for(quads, points.size, free)),
+        BorderedTangent(tangent_for(quads, points.size, free, points)),
         tolerance,
         # A slack step much larger than a facet folds the mesh.
         step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
         wrinkle_stiffness=wrinkle_stiffness,
-        cavity=closed_cavity(points, quads, elements, fixed),
+        cavity=closed_cavity(points, quads, fixed),
     )
 
 
