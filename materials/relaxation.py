@@ -26,14 +26,16 @@ from .point_moduli import increment_modulus
 Array = NDArray[np.float64]
 
 ITERATIONS = 25
+#: Strain, or stress over the stiffness, that is taken as none.
+ROUNDING = 1e-13
 #: Wrinkle normals tried, over half a turn, where Newton's iteration finds none.
 NORMALS = 36
 
 
 @compiled()
-def tensile(s: Array) -> bool:
-    """Whether no principal stress is negative; s = (s11, s22, s12)."""
-    return s[0] + s[1] >= 0.0 and s[0] * s[1] - s[2] * s[2] >= 0.0
+def least_principal(a: float, b: float, c: float) -> float:
+    """The smaller eigenvalue of [[a, c], [c, b]]."""
+    return 0.5 * (a + b) - math.hypot(0.5 * (a - b), c)
 
 
 @compiled()
@@ -238,14 +240,14 @@ def relaxed_update(
         strain_slope[i, i] = 1.0
     if not stress_update(beta, nu, limits, h, h_old, s_old, s_new, tangent, slopes):
         return -1
-    if tensile(s_new):
+    if least_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * tangent[0, 0]:
         carried[:] = s_new
         return 0
     t0, t1, t2 = s_new[0], s_new[1], s_new[2]
     state, away = 1, (0.0, 0.0)
     if _slack(beta, nu, limits, h_old, s_old, he, s_new, tangent, slopes):
         w0, w1, w2 = he[0] - h[0], he[1] - h[1], 0.5 * (he[2] - h[2])
-        if w0 + w1 >= 0.0 and w0 * w1 - w2 * w2 >= 0.0:
+        if least_principal(w0, w1, w2) >= -ROUNDING:
             state = 2
             strain_slope[:] = 0.0
         away = (

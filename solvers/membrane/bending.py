@@ -109,7 +109,7 @@ def analyse(
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations,
         path=np.array(path),
-        wrinkled=np.array(wrinkled) if membrane.wrinkle_stiffness is not None else None,
+        wrinkled=np.array(wrinkled)[frames] if membrane.wrinkle_stiffness is not None else None,
         remarks=tuple(remarks),
     )
 

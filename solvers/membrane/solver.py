@@ -118,11 +118,9 @@ class MembraneSolver:
             membrane: Membrane
             if isinstance(model, UniaxialModel):
                 membrane = strip.prepare(model, law, self.tolerance)
-            elif isinstance(model, CylinderModel):
-                closed = closed_membrane_of(model)
+            elif isinstance(model, CylinderModel | InflatedModel):
+                closed = closed_membrane_of(model) if isinstance(model, CylinderModel) else model
                 membrane = inflated.prepare(closed, law, self.tolerance, self.wrinkle_stiffness)
-            elif isinstance(model, InflatedModel):
-                membrane = inflated.prepare(model, law, self.tolerance, self.wrinkle_stiffness)
             else:
                 membrane = bubble.prepare(model, law, self.tolerance)
             self._prepared = (model, membrane)
