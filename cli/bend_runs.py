@@ -118,7 +118,7 @@ def _runs(
 
 
 def _words(pair: Pair, run: BendRun) -> str:
-    how = "failed" if run.failed else f"{run.deflection[-1]:g} mm"
+    how = f"failed ({run.failed})" if run.failed else f"{run.deflection[-1]:g} mm"
     return f"{pair.case.name} with {pair.name}: {how} in {run.seconds:.0f} s"
 
 

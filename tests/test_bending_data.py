@@ -128,3 +128,4 @@ def test_error_of_a_model_by_hand() -> None:
     assert (error.compared, error.beyond) == (5, 1)
     assert model_error(readings[:1], [70.0, 80.0], [0.0, 1.0]) is None
     assert model_error([], [0.0, 1.0], [0.0, 1.0]) is None
+    assert model_error([curve([0, 1], [0, 0])], [0.0, 1.0], [0.0, 1.0]) is None
