@@ -308,8 +308,8 @@ def test_statements_that_do_not_hold() -> None:
     found = statements(project, runs)
     verdicts = [s.verdict for s in found[:8]]
     assert verdicts == [
-        "does not hold", "holds in 25 of 30", "holds in 4 of 5", "does not hold", "holds in 25 of 30",
-        "does not hold", "does not hold", "does not hold",
+        "does not hold", "holds in 25 of 30", "holds in 4 of 5", "does not hold",
+        "holds in 25 of 30", "does not hold", "does not hold", "does not hold",
     ]  # fmt: skip
     assert any("200 mm, 80 kPa" in s.found for s in found)
 
