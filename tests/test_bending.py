@@ -13,6 +13,7 @@ from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.contact import brought_to_touch, contact_forces, gaps
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .closed_meshes import half_tube, tube_warp
@@ -124,6 +125,18 @@ def test_the_start_of_each_frame_does_not_matter(bent: tuple[InflatedModel, Hist
     """A linear law's strain path is short here: more frames on the way change little."""
     finer = bend(beam((1.0, 2.0, 4.0, 6.0, 8.0, 10.0)))[0]
     assert finer.load[-1] == pytest.approx(bent[1].load[-1], rel=1e-3)
+
+
+def test_the_line_search_finds_what_plain_newton_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A little way, which both manage; and in one go."""
+    model = beam((1.0, 3.0))
+    with_search = bend(model)[0]
+    with monkeypatch.context() as patch:
+        patch.setattr(ClosedMembrane, "equilibrium", Membrane.equilibrium)
+        plain = bend(model)[0]
+    assert with_search.load == pytest.approx(plain.load, rel=1e-6)
+    in_one = bend(beam((3.0,)))[0]
+    assert in_one.load[-1] == pytest.approx(plain.load[-1], rel=1e-3)
 
 
 def test_work_of_the_collar_is_what_gas_and_fabric_store() -> None:

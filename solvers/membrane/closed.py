@@ -13,6 +13,7 @@ from ...models.inflated import RigidCylinder
 from .cavity import Cavity
 from .contact import contact_forces
 from .factorisation import Tangent
+from .line_search import searched_equilibrium
 from .newton import Membrane, initial_moduli
 
 Array = NDArray[np.float64]
@@ -98,6 +99,12 @@ class ClosedMembrane(Membrane):
             self.tangent.stiffness = self.gas.stiffness(self.volume) if self.gas else 0.0
             self.tangent.border = push[self.free]
         return super().unbalance(u, self.pressure, with_tangent)
+
+    def equilibrium(self, u: Array, pressure: float) -> Array | None:
+        """As of any membrane; with a line search where rigid bodies may touch it."""
+        if self.bodies:
+            return searched_equilibrium(self, u, pressure)
+        return super().equilibrium(u, pressure)
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
         if with_tangent and self.slack > 0:
