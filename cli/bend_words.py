@@ -9,7 +9,7 @@ from ..studies.bend_measures import PLACES
 
 
 def bend_lines(result: Mapping[str, Any]) -> list[str]:
-    """The table for the terminal, then statements that do not hold, then what to know."""
+    """The table for the terminal, then the statements that do not hold, or not in all cases."""
     runs = result["runs"]
     compared = any(r.get("error") for r in runs)
     wide = max(len(r["case"]) for r in runs), max(len(r["card"]) for r in runs)
@@ -40,8 +40,8 @@ def bend_lines(result: Mapping[str, Any]) -> list[str]:
         holds = sum(s["verdict"] == "holds" for s in checked)
         lines.append(f"statements of the thesis: {holds} of {len(checked)} checked hold")
         lines += [
-            f"  does not hold: {s['thesis']}: {s['found']}"
+            f"  {s['verdict']}: {s['thesis']}: {s['found']}"
             for s in checked
-            if s["verdict"] == "does not hold"
+            if s["verdict"] != "holds"
         ]
     return lines

@@ -33,7 +33,9 @@ class BendOutcome:
         whole = pair.case.deflections[-1]
         if run.deflection[-1] >= whole * (1 - 1e-9):
             return "finished"
-        return f"stopped at {run.deflection[-1]:g} of {whole:g} mm"
+        # A solver says first why it stopped.
+        why = f": {run.remarks[0]}" if run.remarks else ""
+        return f"stopped at {run.deflection[-1]:g} of {whole:g} mm{why}"
 
     def notes(self, number: int) -> list[str]:
         """What a reader of a run's numbers should know."""
