@@ -16,6 +16,10 @@ from .bend_statements import Statement, statements
 from .results import STRAINS, beyond_card, versions
 
 
+#: What the solvers' remark on a run that stopped early says.
+EARLY = "stopped early"
+
+
 @dataclass(frozen=True, eq=False)
 class BendOutcome:
     """All pairs with how they ended; measures of those that ended well; the statements."""
@@ -33,8 +37,7 @@ class BendOutcome:
         whole = pair.case.deflections[-1]
         if run.deflection[-1] >= whole * (1 - 1e-9):
             return "finished"
-        # A solver says first why it stopped.
-        why = f": {run.remarks[0]}" if run.remarks else ""
+        why = next((f": {r}" for r in run.remarks if EARLY in r), "")
         return f"stopped at {run.deflection[-1]:g} of {whole:g} mm{why}"
 
     def notes(self, number: int) -> list[str]:

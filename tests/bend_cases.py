@@ -68,7 +68,7 @@ class Formula:
             cavity_pressure=np.array(pressure),
             cavity_volume=volume,
             wrinkled=0.05 + 0.002 * np.maximum(way - 50.0, 0.0),
-            remarks=("made up",),
+            remarks=("made up", *(["the run stopped early: so asked"] if e1 == STOPS else [])),
         )
 
 

@@ -233,7 +233,10 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path) -> None:
 
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]
-    assert run["ended"] == "stopped at 120 of 240 mm: made up" and run["load_N"]["240 mm"] is None
+    assert (
+        run["ended"] == "stopped at 120 of 240 mm: the run stopped early: so asked"
+        and run["load_N"]["240 mm"] is None
+    )
     assert "stopped at 120 of 240 mm" in done.stdout
 
 
