@@ -14,6 +14,7 @@ from bubblefit.cli.main import main
 from bubblefit.cli.study_kinds import KINDS, levels
 from bubblefit.errors import InputError
 from bubblefit.projects.bend import read_bend
+from bubblefit.reports import ConvergencePanel, plot_convergence
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.studies.bend_convergence import quantities, refined_cylinder
@@ -125,6 +126,8 @@ def test_increments_of_a_case_converge(project: Path) -> None:
     found = result["models"]["narrow"]["quantities"]
     for name in ("radius sideways at mid-span, inflated, mm", "volume, inflated, l"):
         assert found[name]["order"] == pytest.approx(2.0, abs=0.1)
+    # Sideways radius, volume, stiffness, load at 40 mm and RMS: each has its line.
+    assert (project.parent / "out/convergence.png").stat().st_size > 10_000
     # Nodes that come into contact on the way leave the load no clean order.
     assert abs(found["load at 40 mm, N"]["own_error"]) < 2e-3
     assert len(result["models"]["narrow"]["rms_N"]["to_next_finer"]) == 2
@@ -187,3 +190,10 @@ def test_other_projects_have_no_cases(tmp_path: Path) -> None:
     (tmp_path / "project.toml").write_text((example / "project.toml").read_text())
     done = study("mesh", "project.toml", "--card", "x", "--case", "a", cwd=tmp_path, code=2)
     assert "--case: only a project of bending has cases" in done
+
+
+def test_more_quantities_than_colours_are_drawn(tmp_path: Path) -> None:
+    names = [*(f"load at {d} mm, N" for d in (40, 100, 240)), *(f"quantity {i}" for i in range(9))]
+    panel = ConvergencePanel("case", [2.0, 1.0], {n: [0.1] for n in names}, [10, 40], [0.1, 0.3])
+    plot_convergence(tmp_path / "c.png", [panel], "elements")
+    assert (tmp_path / "c.png").stat().st_size > 10_000
