@@ -100,11 +100,11 @@ def test_patch_of_a_curved_surface_in_an_even_deformation() -> None:
     gradient = np.eye(3) + 0.1 * np.random.default_rng(7).uniform(-1, 1, (3, 3))
     assert np.isfinite(m.unbalance(points @ gradient.T - points, 0.01, with_tangent=False))
     corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
-    for e, quad in enumerate(quads):
+    for e, facet in enumerate(quads):
         for g, (a, b) in enumerate(GAUSS_POINTS):
             # Tangents of the bilinear facet, by hand.
             slopes = [[0.25 * i * (1 + j * b), 0.25 * j * (1 + i * a)] for i, j in corner]
-            normal = np.cross(*(np.array(slopes).T @ points[quad]))
+            normal = np.cross(*(np.array(slopes).T @ points[facet]))
             normal /= np.linalg.norm(normal)
             along = warp[e] - (warp[e] @ normal) * normal
             along /= np.linalg.norm(along)
