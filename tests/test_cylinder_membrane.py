@@ -14,6 +14,7 @@ from bubblefit.models.cylinder import CylinderModel
 from bubblefit.models.gas import Gas
 from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.factorisation import BandedTangent, tangent_for
 from bubblefit.solvers.membrane.ordering import swept
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -120,11 +121,34 @@ def test_derivatives_are_refused(quarter) -> None:
         MembraneSolver().run_with_sensitivity(quarter[0], LAW)
 
 
-def test_a_first_step_without_equilibrium_is_a_failure(quarter) -> None:
-    """A collar that goes through the floor in one step: nothing to report."""
-    model = replace(quarter[0], deflections=[900.0], increments=())
-    with pytest.raises(SolverFailure, match="no frame of the bending"):
-        bend(model)
+def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch) -> None:
+    find = ClosedMembrane.equilibrium
+
+    def inflates_only(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+        return None if self.bodies else find(self, u, pressure)
+
+    monkeypatch.setattr(ClosedMembrane, "equilibrium", inflates_only)
+    with pytest.raises(SolverFailure, match=r"no frame of the bending.*between 0 and 2 mm"):
+        bend(quarter[0])
+
+
+def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch) -> None:
+    find = ClosedMembrane.equilibrium
+
+    def tired(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+        if not self.bodies:
+            return find(self, u, pressure)
+        heights.append(self.bodies[-1].centre[1])
+        gone = heights[0] + INCREMENTS[0] - heights[-1]
+        return find(self, u, pressure) if gone < 8.5 else None
+
+    heights: list[float] = []
+    monkeypatch.setattr(ClosedMembrane, "equilibrium", tired)
+    history = bend(quarter[0])
+    assert history.load == pytest.approx(quarter[1].load[:2], rel=1e-6)
+    assert len(history.displacement) == len(history.cavity_volume) == 2
+    assert any("the run stopped early: no equilibrium between 8 and 12" in r
+               for r in history.remarks)  # fmt: skip
 
 
 def test_unknowns_are_ordered_ring_by_ring() -> None:
