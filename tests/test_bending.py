@@ -82,6 +82,17 @@ def test_ring_and_post_by_hand() -> None:
     assert stiffness[0, 1, 1] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("body", [POST, RING])
+def test_forces_are_on_all_nodes_that_are_inside(body: RigidCylinder) -> None:
+    rng = np.random.default_rng(3)
+    x = np.asarray(body.centre) + rng.uniform(-160, 160, (4000, 3))
+    gap, out, _ = gaps(body, x)
+    force, _, touched = contact_forces(body, x, np.full(len(x), 2.0))
+    np.testing.assert_array_equal(touched, np.flatnonzero(gap < 0))
+    assert 100 < len(touched) < len(x)
+    assert force == pytest.approx(np.where(gap[:, None] < 0, -2.0 * gap[:, None] * out, 0.0))
+
+
 def test_bodies_are_brought_to_touch() -> None:
     points = half_tube(16, 24, RADIUS, LENGTH).points
     way = np.array([0.0, -1.0, 0.0])

@@ -12,10 +12,13 @@ from ...models.inflated import InflatedModel, RigidCylinder
 from ..base import History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
+from .settling import settled
 
 Array = NDArray[np.float64]
 
-MOST_CUTS = 6
+MOST_CUTS, MOST_ITERATIONS = 3, 20
+#: A node further from where the last increments led to than this many times the collar's way.
+SNAP = 4.0
 #: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
 BITE = 0.02
 
@@ -47,7 +50,7 @@ def analyse(
     volume, _ = membrane.cavity.measure(position)
     membrane.gas = plan.gas.closed_in(pressure, volume)
     membrane.penalty = plan.penalty
-    membrane.keep_tangent = True
+    membrane.keep_tangent, membrane.most_iterations = True, MOST_ITERATIONS
 
     def bodies(moved: float) -> tuple[RigidCylinder, ...]:
         centre = np.asarray(collar.centre) + moved * way
@@ -57,6 +60,7 @@ def analyse(
     path, moves = [inflated], [0.0]
     wrinkle = membrane.wrinkle.copy()
     gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
+    snaps: list[float] = []
     wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(wall)], 0.0, 0.0
     for wanted in plan.displacements:
         start = path[-1]
@@ -68,6 +72,8 @@ def analyse(
             between = f"between {moves[-1]:.4g} and {wanted:.4g} mm of deflection"
             remarks.append(f"the run stopped early: no equilibrium {between}")
             break
+        if len(path) > 2 and np.abs(found - start).max() > SNAP * (wanted - moves[-1]):
+            snaps.append(wanted)
         work = membrane.wrinkle_work(wrinkle)
         wrinkle = membrane.wrinkle.copy()
         membrane.accept()
@@ -87,6 +93,10 @@ def analyse(
             frames.append(i + 1)
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
+    if snaps:
+        remarks.append(
+            f"snaps, or nearly, before {', '.join(f'{d:.4g}' for d in snaps)} mm of deflection"
+        )
     remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
     most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
@@ -118,6 +128,9 @@ def _reach(membrane, bodies, before, u_before, wanted, start, cuts):  # type: ig
     """Equilibrium with the collar at `wanted`, through halved ways from `before`."""
     membrane.bodies = bodies(wanted)
     found = membrane.equilibrium(start, membrane.pressure)
+    if found is None:
+        # Wrinkles that come and go leave Newton's iteration nowhere to go; so does a limit load.
+        found = settled(membrane, start)
     if found is not None or cuts == 0:
         return found
     middle = 0.5 * (before + wanted)

@@ -59,6 +59,7 @@ class ClosedMembrane(Membrane):
     bodies, penalty : rigid bodies at their present place, and their stiffness in MPa/mm.
     slack : MPa of artificial isotropic stress in the next tangent; it fades with every tangent
         and is in no residual, so that no equilibrium depends on it.
+    viscosity, anchor : MPa/mm times the distance (n, 3) from there resists; see `drag`.
     pressure, volume : at the last evaluation.
     """
 
@@ -67,6 +68,8 @@ class ClosedMembrane(Membrane):
     bodies: Sequence[RigidCylinder] = ()
     penalty: float = 5.0
     slack: float = 0.0
+    viscosity: float = 0.0
+    anchor: Array = field(init=False)
     pressure: float = 0.0
     volume: float = 0.0
     contact: list[Array] = field(default_factory=list)
@@ -110,6 +113,11 @@ class ClosedMembrane(Membrane):
         if with_tangent and self.slack > 0:
             self._add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= FADE
+        if self.viscosity > 0:
+            drag = self.viscosity * self.node_area[:, None]
+            self.residual += (drag * (u - self.anchor)).reshape(-1)
+            if with_tangent:
+                self._add(self.node_slot, drag[:, None] * np.eye(3))
         self.contact = []
         for body in self.bodies:
             push, stiffness, touched = contact_forces(
@@ -119,6 +127,10 @@ class ClosedMembrane(Membrane):
             self.contact.append(push)
             if with_tangent:
                 self._add(self.node_slot[touched], stiffness)
+
+    def drag(self, viscosity: float, anchor: Array) -> None:
+        """Resist (MPa/mm) every motion away from the displacement `anchor` (n, 3), or no more."""
+        self.viscosity, self.anchor = viscosity, anchor
 
     def wrinkled_share(self, wall: NDArray[np.bool_]) -> float:
         """Share of the reference surface of `wall` (elements,) without stress in one direction."""
