@@ -15,7 +15,6 @@ from .bend_setup import Pair
 from .bend_statements import Statement, statements
 from .results import STRAINS, beyond_card, versions
 
-
 #: What the solvers' remark on a run that stopped early says.
 EARLY = "stopped early"
 
