@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,10 +67,14 @@ def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[s
 
 def _table(annotation: Any) -> type[BaseModel]:
     """The section class of an annotation such as `PointsSection | None` or `list[CaseSection]`."""
+    return next(_sections(annotation))
+
+
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    inside = [a for a in getattr(annotation, "__args__", ()) if a is not type(None)]
-    return _table(inside[0])
+        yield annotation
+    for inside in getattr(annotation, "__args__", ()):
+        yield from _sections(inside)
 
 
 def _short(value: Any) -> str:
