@@ -52,9 +52,9 @@ class Says:
             ("loses", self.loses or ("nothing",)),
             ("to confirm", self.confirm),
         ):
+            found += [f"{head}:"] if texts else []
             for text in texts:
-                first = f"{head}: " if text is texts[0] else "  "
-                found += textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent="    ")
+                found += textwrap.wrap(text, WIDTH, initial_indent="  - ", subsequent_indent="    ")
         return found
 
 
@@ -82,8 +82,8 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
 
 
-def render(name: str, **context: Any) -> str:
-    """Text of the template `name` (a path below templates/)."""
+def render(template: str, /, **context: Any) -> str:
+    """Text of `template` (a path below templates/)."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         undefined=jinja2.StrictUndefined,
@@ -92,7 +92,14 @@ def render(name: str, **context: Any) -> str:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    return environment.get_template(name).render(context)
+    return environment.get_template(template).render(context)
+
+
+def density_remarks(options: Options) -> tuple[str, ...]:
+    """What a format that needs a density has to say of it."""
+    if options.density is not None:
+        return ()
+    return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
 
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
