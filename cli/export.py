@@ -46,7 +46,7 @@ USES = {
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="File to write [CARD-FORMAT.* in the current folder]; a second one goes beside it.",
+    help="File or folder to write to [CARD-FORMAT.* here]; a second file goes beside it.",
 )
 @click.option("--force", is_flag=True, help="Write over files that are there.")
 @click.option("--points", type=click.IntRange(2), help=f"Points of a table or curve [{POINTS}].")
@@ -89,31 +89,33 @@ def command(
         export = FORMATS[name](material, options)
     except InputError as error:
         raise InputError(card, error.field, error.problem) from None
-    written = _write(export, out or Path(f"{card.stem}-{name}"), out is not None, force)
-    if as_json:
-        said = {"carries": export.says.carries, "loses": export.says.loses}
-        content = {"format": name, **said, "confirm": export.says.confirm}
-        click.echo(json.dumps({"files": [str(path) for path in written], **content}, indent=1))
-        return
-    for line in export.says.lines():
-        click.echo(line)
-    click.echo(f"written to {', '.join(map(str, written))}")
-
-
-def _write(export: Export, target: Path, named: bool, force: bool) -> list[Path]:
-    """Write all files or none; the first has the very name that was asked for."""
-    suffixes = list(export.files)
-    paths = [target.with_name(target.name + suffixes[0])]
-    if named:
-        paths = [target]
-    paths += [paths[0].with_suffix(suffix) for suffix in suffixes[1:]]
-    if len(set(paths)) < len(paths):
-        problem = f"{', '.join(suffixes[1:])} is for the second file; use {suffixes[0]}"
-        raise InputError(None, "--out", f"{target}: {problem}")
+    paths = _targets(export, out, f"{card.stem}-{name}")
     for path in paths:
+        if path.exists() and path.samefile(card):
+            raise InputError(None, "--out", f"{path} is the card itself; name another file")
         if path.exists() and not force:
             raise OutputError(f"{path}: is already there; use --force or another --out")
     for path, text in zip(paths, export.files.values(), strict=True):
         with replacing(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
+    if as_json:
+        said = {"carries": export.says.carries, "loses": export.says.loses}
+        content = {"format": name, **said, "confirm": export.says.confirm}
+        click.echo(json.dumps({"files": [str(path) for path in paths], **content}, indent=1))
+        return
+    for line in export.says.lines():
+        click.echo(line)
+    click.echo(f"written to {', '.join(map(str, paths))}")
+
+
+def _targets(export: Export, out: Path | None, default: str) -> list[Path]:
+    """A path for each file; the first has the very name that was asked for."""
+    first, *others = export.files
+    target = Path(default + first) if out is None else out
+    if target.is_dir():
+        target = target / (default + first)
+    paths = [target, *(target.with_suffix(suffix) for suffix in others)]
+    if len(set(paths)) < len(paths):
+        problem = f"{', '.join(others)} is for the second file; use {first}"
+        raise InputError(None, "--out", f"{target}: {problem}")
     return paths
