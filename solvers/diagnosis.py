@@ -11,8 +11,9 @@ from .. import __version__
 from ..errors import BubblefitError
 from ..materials.law import HypoelasticLaw
 from ..materials.responses import bar
+from .bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from .calculix.executable import ADVICE, FOUND, NAMED, Executable, every_ccx
-from .calculix.proof import BARS, INCREMENTS, TOLERANCE, bar_law, prove
+from .calculix.proof import prove
 
 EMBEDDED = "embedded"
 
@@ -63,7 +64,7 @@ def _membrane() -> Diagnosis:
         _end_stress(bar_law(bar.model), bar.elongation, 0 if bar.direction == "warp" else 1)
         for bar in BARS
     )
-    off = _difference(stresses)
+    off = difference(stresses)
     good = off < TOLERANCE
     advice = "" if good else "the embedded law is broken; install bubblefit and numba again"
     return Diagnosis("membrane", __version__, None, EMBEDDED, True, None, good,
@@ -78,15 +79,11 @@ def _calculix(ccx: Executable) -> Diagnosis:
     else:
         try:
             stresses = prove(ccx.path)
-            usable, off = True, _difference(stresses)
+            usable, off = True, difference(stresses)
         except BubblefitError as error:
             advice = str(error).splitlines()[0]
     return Diagnosis("calculix", ccx.version, ccx.path, ccx.origin, expected, ccx.external,
                      usable, stresses, off, advice)  # fmt: skip
-
-
-def _difference(stresses: tuple[float, ...]) -> float:
-    return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
 
 
 def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
