@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,20 +12,25 @@ from .. import __version__
 from ..errors import BubblefitError
 from ..materials.law import HypoelasticLaw
 from ..materials.responses import bar
-from .bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
+from .bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference, strip_stresses
 from .calculix.executable import ADVICE, FOUND, NAMED, Executable, every_ccx
 from .calculix.proof import prove
+from .plugins import PlugIn, plug_ins
+from .registry import SOLVERS, checked, solver_named
+
+log = logging.getLogger(__name__)
 
 EMBEDDED = "embedded"
+Stresses = tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """One solver: what it is, where, and what the bars showed.
 
-    external_materials: whether it can load material libraries (None: embedded, or not to be
-    seen). stresses: end stresses of the bars (MPa) in the order of `proof.BARS`, difference: the
-    largest relative one from Marc's; None where the bars did not run. expected: somebody chose
+    external_materials: whether it can load material libraries (None: embedded, a plug-in, or not
+    to be seen). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference:
+    the largest relative one from Marc's; None where the bars did not run. expected: somebody chose
     this solver, so that it has to work. advice: one line, what to do; empty when usable.
     """
 
@@ -41,18 +47,21 @@ class Diagnosis:
 
 
 def diagnose(ccx: Path | str | None = None) -> list[Diagnosis]:
-    """The embedded solver, then every ccx (`ccx`: one more, by path), each tried.
+    """The embedded solver, every ccx (`ccx`: one more, by path), every plug-in, each tried.
 
     A ccx that is not there at all is one entry without a path, expected only if it was named.
     """
-    found = [_membrane()]
+    return [_membrane(), *_every_calculix(ccx), *(_plug_in(one) for one in plug_ins())]
+
+
+def _every_calculix(ccx: Path | str | None) -> list[Diagnosis]:
     try:
         candidates = every_ccx(ccx)
     except BubblefitError as error:
-        return [*found, _absent(str(error), NAMED, True)]
+        return [_absent(str(error), NAMED, True)]
     if not candidates:
-        return [*found, _absent(f"there is no ccx; {ADVICE}", "not found", False)]
-    return [*found, *(_calculix(candidate) for candidate in candidates)]
+        return [_absent(f"there is no ccx; {ADVICE}", "not found", False)]
+    return [_calculix(candidate) for candidate in candidates]
 
 
 def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
@@ -84,6 +93,40 @@ def _calculix(ccx: Executable) -> Diagnosis:
             advice = str(error).splitlines()[0]
     return Diagnosis("calculix", ccx.version, ccx.path, ccx.origin, expected, ccx.external,
                      usable, stresses, off, advice)  # fmt: skip
+
+
+def _plug_in(plug_in: PlugIn) -> Diagnosis:
+    """Its own word, and the bars where it runs strips; whatever it does, the others are told."""
+    origin = f"plug-in of {plug_in.distribution}"
+
+    def found(
+        version: str, advice: str, usable: bool = False, stresses: Stresses = None
+    ) -> Diagnosis:
+        off = None if stresses is None else difference(stresses)
+        return Diagnosis(plug_in.name, version, None, origin, False, None, usable,
+                         stresses, off, advice)  # fmt: skip
+
+    if plug_in.name in SOLVERS:
+        advice = f"{plug_in.name} is bubblefit's own: the plug-in needs another name"
+        return found("", f"{advice}; tell those who make it")
+    try:
+        solver = solver_named(plug_in.name)
+    except BubblefitError as error:
+        return found("", str(error).splitlines()[0])
+    check = checked(plug_in.name, solver)
+    if not (check.available and check.carries_law):
+        return found(check.version, check.advice or "says that it is not usable, and not why")
+    try:
+        stresses = strip_stresses(solver)
+    except BubblefitError as error:
+        # It may be for bubbles only.
+        log.info("%s: no bars: %s", plug_in.name, error)
+        return found(check.version, "", True)
+    except Exception as error:
+        return found(check.version, str(plug_in.failure("fails on a strip", error)))
+    off = difference(stresses)
+    advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
+    return found(check.version, advice, off < TOLERANCE, stresses)
 
 
 def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
