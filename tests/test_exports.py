@@ -333,6 +333,14 @@ def test_the_limits_of_each_target_are_named():
 
     assert "nu12" in loses("abaqus-fabric") and "Explicit only" in loses("abaqus-fabric")
     assert "nu12" in loses("ls-dyna-mat34") and "density" in loses("ls-dyna-mat34")
+    # The linear law in equal biaxial strain e: E1 (1 + nu21)/(1 - nu12 nu21) e on a width that is
+    # exp(e) times the first; the strip: E1 e on exp(-nu12 e) times it. Fill likewise.
+    linear = MaterialCard(HypoelasticLaw.linear(800.0, 140.0, 20.0), 0.8)
+    nu21, e = NU12 * 140 / 800, 0.05
+    both = (1 - NU12 * nu21) / (1 + np.array([nu21, NU12]))
+    warp, fill = 100 * (1 - both * np.exp(-e * (1 + np.array([NU12, nu21]))))
+    for name in ("abaqus-fabric", "ls-dyna-mat34"):
+        assert f"{warp:.2g} % along the warp and {fill:.2g} % along the fill" in loses(name, linear)
     assert "measure" in " ".join(export("ls-dyna-mat34").says.confirm)
     assert "density" not in loses("abaqus-fabric", density=1e-9)
     incompressible = MaterialCard(LAWS["incompressible"], 0.8)
