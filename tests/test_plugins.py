@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -198,6 +199,15 @@ def test_options_come_from_the_project_file(example, strips, monkeypatch):
     assert "calculix, homogeneous, membrane" in text
     path.write_text(before + "\n[solver]\nhomogeneous = 3\n")
     assert "solver.homogeneous" in simulate("\n[solver]\nhomogeneous = 3\n", 2)
+
+
+def test_the_code_in_the_documentation_is_that_of_the_example():
+    text = (ROOT / "docs" / "writing-a-solver-adapter.md").read_text()
+    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
+    sources = [path.read_text() for path in ADAPTER.iterdir() if path.is_file()]
+    assert len(blocks) > 4
+    for block in blocks:
+        assert any(block in source for source in sources), block
 
 
 # --- broken ones --------------------------------------------------------------------------------
