@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,8 +17,6 @@ from .calculix.proof import prove
 from .plugins import PlugIn, plug_ins
 from .registry import SOLVERS, checked, solver_named
 
-log = logging.getLogger(__name__)
-
 EMBEDDED = "embedded"
 Stresses = tuple[float, ...] | None
 
@@ -31,7 +28,7 @@ class Diagnosis:
     external_materials: whether it can load material libraries (None: embedded, a plug-in, or not
     to be seen). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference:
     the largest relative one from Marc's; None where the bars did not run. expected: somebody chose
-    this solver, so that it has to work. advice: one line, what to do; empty when usable.
+    this solver, so that it has to work. advice: one line, what to do or what was not tried.
     """
 
     name: str
@@ -119,9 +116,8 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
     try:
         stresses = strip_stresses(solver)
     except BubblefitError as error:
-        # It may be for bubbles only.
-        log.info("%s: no bars: %s", plug_in.name, error)
-        return found(check.version, "", True)
+        # It may be for bubbles only, or have failed: the reader knows which.
+        return found(check.version, f"its law was not tried: {str(error).splitlines()[0]}", True)
     except Exception as error:
         return found(check.version, str(plug_in.failure("fails on a strip", error)))
     off = difference(stresses)

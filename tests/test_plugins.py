@@ -339,7 +339,12 @@ CHECKS = {
     "short": (FINE, """
         from bubblefit.solvers.base import History
         import numpy as np
-        return History(np.ones(3), np.ones((3, 4, 3)), np.zeros(3), np.zeros(3))""", ""),
+        return History(np.ones(3), np.ones((3, 4, 3)), np.zeros(3), np.zeros(3))""",
+              "its law was not tried: acme: 3 frames of a strip of 100 elongations"),
+    "bubbles": (FINE, """
+        from bubblefit.errors import SolverFailure
+        raise SolverFailure('takes bubbles only', 'acme')""",
+                "its law was not tried: acme: takes bubbles only"),
 }  # fmt: skip
 
 
@@ -349,8 +354,8 @@ def test_doctor_tells_what_a_plug_in_does(packages, monkeypatch, what):
     install(packages, "acme", WORKING.format(run=run, check=check))
     monkeypatch.setattr("bubblefit.solvers.diagnosis._every_calculix", lambda ccx: [])
     done = CliRunner().invoke(main, ["doctor", "--solver", "acme"])
-    # One that runs no strips is taken at its word.
-    taken = what == "short"
+    # One that runs no strips is taken at its word, and the reader told.
+    taken = what in ("short", "bubbles")
     assert done.exit_code == (0 if taken else 4), (done.output, done.exception)
     assert words in done.output and "membrane    ok" in done.output
     assert ("NOT USABLE  version 9" in done.output) == (what in ("silent", "crashes", "wrong"))
