@@ -108,9 +108,9 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
         return found("", f"{advice}; tell those who make it")
     try:
         solver = solver_named(plug_in.name)
+        check = checked(plug_in.name, solver)
     except BubblefitError as error:
         return found("", str(error).splitlines()[0])
-    check = checked(plug_in.name, solver)
     if not (check.available and check.carries_law):
         return found(check.version, check.advice or "says that it is not usable, and not why")
     try:

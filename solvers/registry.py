@@ -43,13 +43,19 @@ def solver_named(name: str, **options: Any) -> Solver:
 
 
 def checked(name: str, solver: Solver) -> SolverCheck:
-    """What `check` finds of the solver `name`; a plug-in that fails there is not available."""
+    """What `check` finds of the solver `name`.
+
+    Raises
+    ------
+    SolverFailure : the check of a plug-in fails; names its distribution.
+    InputError : an option that the check does not like.
+    """
     try:
         return solver.check()
-    except BubblefitError as error:
-        return SolverCheck(name, False, "", False, str(error).splitlines()[0])
+    except BubblefitError:
+        raise
     except Exception as error:
         plug_in = None if name in SOLVERS else plug_in_named(name)
         if plug_in is None:
             raise
-        return SolverCheck(name, False, "", False, plug_in.failure("fails its check", error).reason)
+        raise plug_in.failure("fails its check", error) from error
