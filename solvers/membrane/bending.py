@@ -16,7 +16,7 @@ from .settling import settled
 
 Array = NDArray[np.float64]
 
-MOST_CUTS, MOST_ITERATIONS = 3, 20
+MOST_CUTS = 3
 #: A node further from where the last increments led to than this many times the collar's way.
 SNAP = 4.0
 #: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
@@ -50,7 +50,7 @@ def analyse(
     volume, _ = membrane.cavity.measure(position)
     membrane.gas = plan.gas.closed_in(pressure, volume)
     membrane.penalty = plan.penalty
-    membrane.keep_tangent, membrane.most_iterations = True, MOST_ITERATIONS
+    membrane.keep_tangent = True
 
     def bodies(moved: float) -> tuple[RigidCylinder, ...]:
         centre = np.asarray(collar.centre) + moved * way

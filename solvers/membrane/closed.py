@@ -17,6 +17,7 @@ from .cavity import Cavity
 from .contact import contact_forces
 from .factorisation import Tangent
 from .flexure import Flexure
+from .line_search import searched_equilibrium
 from .newton import Membrane, initial_moduli
 
 Array = NDArray[np.float64]
@@ -154,6 +155,12 @@ class ClosedMembrane(Membrane):
                 np.add.at(added, places[inside], values[:, k][inside])
             self._stiff = (self.law, self.flexure.matrix(self.law, len(self.reference)), added)
         return self._stiff[1], self._stiff[2]
+
+    def equilibrium(self, u: Array, pressure: float) -> Array | None:
+        """As of any membrane; with a line search where rigid bodies may touch it."""
+        if self.bodies:
+            return searched_equilibrium(self, u, pressure)
+        return super().equilibrium(u, pressure)
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
         if self.flexure is not None:
