@@ -14,8 +14,8 @@ from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
-from ..process import log_tail, run_process
-from ..scratch import fresh_folder, put_aside, remove
+from ..process import run_process
+from ..scratch import run_folder
 from . import bubble, cylinder_analysis, strip
 from .executable import ADVICE, Executable, find_ccx
 from .library import material_library
@@ -141,24 +141,8 @@ class CalculixSolver:
     ) -> T:
         """One run in a fresh scratch folder; what `read` makes of it, or `rescue` of a bad end."""
         program, library = self.executable().path, material_library()
-        folder = fresh_folder("ccx", parent)
-        try:
-            found = self._in(folder, program, library, files, timeout, read, rescue)
-        except SolverFailure as failure:
-            kept = put_aside(folder)
-            log.info("failed run kept in %s", kept)
-            tail = log_tail(kept / f"{JOB}.log")
-            raise SolverFailure(
-                failure.reason, self.name, failure.exit_number, tail, kept
-            ) from None
-        except BaseException:
-            remove(folder)  # interrupted, or never begun: there is nothing to look into
-            raise
-        if self.keep:
-            log.info("run kept in %s", folder)
-        else:
-            remove(folder)
-        return found
+        with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
+            return self._in(folder, program, library, files, timeout, read, rescue)
 
     def _in(
         self,
