@@ -99,7 +99,7 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
     ]
     along, across = fabric_frames(mesh, warp)
     # Adding zero turns -0 into 0.
-    rows = np.round(np.hstack([along, across]), SAME) + 0.0
+    rows = np.asarray(np.round(np.hstack([along, across]), SAME) + 0.0, float)
     frames = [
         {"set": name, "warp": rows[one, :3].tolist(), "fill": rows[one, 3:].tolist()}
         for name, one in groups(rows, "frame")
