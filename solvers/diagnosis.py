@@ -10,6 +10,7 @@ import numpy as np
 from .. import __version__
 from ..errors import BubblefitError
 from ..materials.law import HypoelasticLaw
+from ..materials.responses import bar
 from .calculix.executable import ADVICE, FOUND, NAMED, Executable, every_ccx
 from .calculix.proof import BARS, INCREMENTS, TOLERANCE, bar_law, prove
 
@@ -93,15 +94,5 @@ def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
 
     The law's own increments, the ones the membrane solver takes.
     """
-    free = 1 - pulled
-    strain, stress = np.zeros(3), np.zeros((1, 3))
-    for end in np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS):
-        new = strain.copy()
-        new[pulled] = end
-        # The modulus across is held at its end value, so that the second round is exact.
-        for _ in range(2):
-            trial, tangent = law.increment(strain, new, stress)
-            new[free] -= trial[0, free] / tangent[0, free, free]
-        stress, _ = law.increment(strain, new, stress)
-        strain = new
-    return float(stress[0, pulled])
+    ends = np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
+    return float(bar(law, pulled, ends)[1][-1, pulled])
