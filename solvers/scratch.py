@@ -58,7 +58,8 @@ def run_folder(
         kept = put_aside(folder)
         log.info("failed run kept in %s", kept)
         tail = failure.log_tail or log_tail(kept / logs)
-        raise SolverFailure(failure.reason, solver, failure.exit_number, tail, kept) from None
+        kind = type(failure)
+        raise kind(failure.reason, solver, failure.exit_number, tail, kept) from None
     except BaseException:
         remove(folder)  # interrupted, or never begun: there is nothing to look into
         raise

@@ -14,7 +14,7 @@ from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
-from ..process import run_process
+from ..process import Watch, run_process
 from ..scratch import run_folder
 from . import bubble, cylinder_analysis, strip
 from .executable import ADVICE, Executable, find_ccx
@@ -174,7 +174,7 @@ class CalculixSolver:
             folder / f"{JOB}.log",
             timeout,
             environment,
-            _Watch(sta, self.progress) if self.progress is not None else None,
+            None if self.progress is None else Watch(lambda: increments(sta), self.progress),
         )
         problem = reason(folder, JOB, outcome, timeout)
         done = increments(sta)
@@ -195,16 +195,3 @@ class CalculixSolver:
         if self._shells is None or self._shells[0] is not model.mesh:
             self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
         return self._shells[1]
-
-
-class _Watch:
-    """Tells of every increment once, as it appears in the .sta file."""
-
-    def __init__(self, sta: Path, tell: Callable[[Increment], None]) -> None:
-        self.sta, self.tell, self.told = sta, tell, 0
-
-    def __call__(self) -> None:
-        fresh = increments(self.sta)[self.told :]
-        self.told += len(fresh)
-        for increment in fresh:
-            self.tell(increment)

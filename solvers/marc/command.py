@@ -34,9 +34,7 @@ def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> lis
         words += ["-nte", str(settings.threads), "-nts", str(settings.threads)]
         if settings.processors > 1:
             words += ["-nps", str(settings.processors)]
-    if settings.program is not None:
-        words += ["-prog", settings.program]
-    elif subroutine is not None:
+    if subroutine is not None:
         words += ["-u", subroutine]
     return with_modules(settings.modules, [*words, *settings.arguments])
 

@@ -7,19 +7,24 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ... import __version__
 from ...errors import InputError
+from ...materials.exports.marc_hypela2 import STATE_VARIABLES
 from ...materials.law import HypoelasticLaw
+from ...materials.tables import ModulusTable, modulus_tables
 from ..decks import render
 from .settings import MarcSettings
-from .tables import modulus_table
 
 JOB = "job"
 #: Residual force and displacement, relative (thesis, section 2.2).
 TOLERANCE = 1e-3
 #: Name and number of the table of each modulus.
 TABLES = (("E1", "e1", 11), ("E2", "e2", 12), ("G12", "g12", 13))
-MEMBRANE = 18
+#: Strain beyond the ends of a table in which its modulus is held.
+GUARD = 1.0
+MEMBRANE, THICK = 18, 75
 ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
 
 
@@ -28,20 +33,31 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
 
     Raises
     ------
-    InputError : a law that Marc's shells do not carry.
+    InputError : a law that NLELAST does not carry.
     """
+    if settings.law == "hypela2":
+        kind = "thick shell" if settings.element == THICK else "membrane"
+        return {"law": "hypoelastic", "state_variables": STATE_VARIABLES[kind]}
     if law.thickness_change != "constant":
         problem = (
-            "'incompressible' is not in Marc's deck, where the thickness is constant; "
-            "use 'constant', or another solver"
+            "'incompressible' is nothing that NLELAST knows; use 'constant', or [solver.marc] "
+            "law = 'hypela2'"
         )
         raise InputError(None, "material.thickness_change", problem)
+    tables = modulus_tables(law)
     moduli = [
-        {"name": name, "number": number, "points": modulus_table(law, modulus).tolist()}
+        {"name": name, "number": number, "points": _held(tables[modulus])}
         for modulus, name, number in TABLES
     ]
-    word = "nlelast" if settings.law == "nlelast" else "hypoelastic"
-    return {"law": word, "moduli": moduli, "nu12": law.nu12}
+    return {"law": "nlelast", "state_variables": 0, "moduli": moduli, "nu12": law.nu12}
+
+
+def _held(table: ModulusTable) -> list[list[float]]:
+    """Its points, and one more beyond each end: held whether or not Marc extrapolates."""
+    strain, modulus = (np.pad(values, 1, mode="edge") for values in (table.strain, table.modulus))
+    strain[[0, -1]] += [-GUARD, GUARD]
+    found: list[list[float]] = np.column_stack([strain, modulus]).tolist()
+    return found
 
 
 def schedule(

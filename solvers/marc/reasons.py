@@ -22,7 +22,7 @@ _ERROR = re.compile(r"\*\*\*\s*error", re.IGNORECASE)
 _INSIDE_OUT = re.compile(r"inside[ -]out(?:\s+at\s+element\s+(\d+))?", re.IGNORECASE)
 _LICENCE = re.compile(r"licen[cs]e", re.IGNORECASE)
 _REFUSED = re.compile(
-    r"error|fail|denied|unable|could not|cannot|not available|unavailable|exhausted|no such feature",
+    r"error|fail|denied|unable|could not|cannot|(not |un)available|exhausted|no such feature",
     re.IGNORECASE,
 )
 

@@ -30,7 +30,7 @@ BLOCKS = (
     "stepping",
 )
 #: Keys whose values are paths, relative to the file that they are in.
-PATHS = ("scratch", "templates", "subroutine")
+PATHS = ("scratch", "templates")
 
 Seconds = Annotated[float, Field(gt=0, le=1e9)]
 Count = Annotated[int, Field(ge=1, le=1024)]
@@ -45,8 +45,8 @@ class MarcSettings(BaseModel):
     options : names of run_marc's options, "current" (-j, -nte, -nts) or "older" (-jid, -nprocd).
     processors, threads : of one run. arguments : more of them, to the end of the command.
     environment : variables of the run. modules : what `module load` is given before it.
-    law : NLELAST with tables, or HYPOELASTIC with HYPELA2. subroutine : the site's own Fortran
-    instead of ours. program : an executable that Marc made of it before (`-prog`).
+    law : NLELAST with tables, or HYPOELASTIC with HYPELA2, whose source says what own_state and
+    symmetric mean.
     element : 139 thin shell, 75 thick shell, 18 membrane.
     increments : least number of Marc increments of an analysis; 0: as many as the model has.
     pressure_type, pressure_sign : code of the pressure on shells, and the sign that inflates.
@@ -68,8 +68,8 @@ class MarcSettings(BaseModel):
     environment: dict[Word, str] = {}
     modules: list[Word] = []
     law: Literal["nlelast", "hypela2"] = "nlelast"
-    subroutine: str | None = None
-    program: str | None = None
+    own_state: bool = True
+    symmetric: bool = True
     element: Literal[139, 75, 18] = 139
     increments: Annotated[int, Field(ge=0, le=1_000_000)] = 100
     pressure_type: Annotated[int, Field(ge=0, le=1000)] = 2
@@ -89,10 +89,9 @@ class MarcSettings(BaseModel):
         for name in PATHS:
             if values[name] is not None:
                 values[name] = str(_beside(folder, values[name]))
-        for name in ("executable", "program"):
-            # A bare name is a program on the PATH, or in the folder that `modules` put there.
-            if values[name] is not None and os.sep in values[name]:
-                values[name] = str(_beside(folder, values[name]))
+        # A bare name is a program on the PATH, or in a folder that `modules` put there.
+        if values["executable"] is not None and os.sep in values["executable"]:
+            values["executable"] = str(_beside(folder, values["executable"]))
         if values["include"] is not None:
             values["include"] = {k: str(_beside(folder, v)) for k, v in values["include"].items()}
         return values
@@ -164,11 +163,6 @@ def _check_files(settings: MarcSettings) -> None:
             raise InputError(Path(file), f"solver.marc.include.{name}", "there is no such file")
     if settings.templates is not None and not Path(settings.templates).is_dir():
         raise InputError(Path(settings.templates), "templates", "there is no such folder")
-    if settings.subroutine is not None and not Path(settings.subroutine).is_file():
-        raise InputError(Path(settings.subroutine), "solver.marc.subroutine", "no such file")
-    for name in ("subroutine", "program"):
-        if getattr(settings, name) is not None and settings.law != "hypela2":
-            raise InputError(None, f"solver.marc.{name}", 'is only for law = "hypela2"')
 
 
 def _beside(folder: Path, given: str) -> Path:
