@@ -165,7 +165,11 @@ def common_settings(
         "tolerance": fit.tolerance,
         "modulus_unit": file.units.modulus,
         "modulus_scale": modulus,
-        "solver_options": {"calculix": _calculix(path, file.solver.calculix)},
+        "solver_options": {
+            "calculix": _calculix(path, file.solver.calculix),
+            # "marc" itself comes from the command line only.
+            "marc": {"marc": None, **file.solver.marc.given(path.parent)},
+        },
     }
 
 

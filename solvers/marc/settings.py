@@ -113,8 +113,13 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
     if site.endswith(".toml"):
         values = site_settings(Path(os.path.expanduser(site)))
     elif site:
-        values = {"executable": site}
-    mine = {name: value for name, value in given.items() if value is not None}
+        values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
+    # The command line gives paths as such.
+    mine = {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in given.items()
+        if value is not None
+    }
     if named is not None:
         mine.pop("executable", None)
     both = {**values, **mine}
@@ -166,4 +171,5 @@ def _check_files(settings: MarcSettings) -> None:
 
 
 def _beside(folder: Path, given: str) -> Path:
-    return folder / os.path.expanduser(given)
+    # Absolute: runs happen in a scratch folder.
+    return (folder / os.path.expanduser(given)).absolute()
