@@ -115,7 +115,7 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
     elif site:
         values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
     # The command line gives paths as such.
-    mine = {
+    mine: dict[str, Any] = {
         name: str(value) if isinstance(value, Path) else value
         for name, value in given.items()
         if value is not None

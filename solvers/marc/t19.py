@@ -101,7 +101,10 @@ class T19File:
                 raise self._wrong("an increment without its end (----): truncated")
             kind, version = self._begin()
             if kind == 517:
-                remeshed, frame.increment, *_ = [*self._integers_to_end(), 0, 0]
+                numbers = self._integers_to_end()
+                if len(numbers) < 12:
+                    raise self._wrong("a block 517 of fewer than 12 numbers")
+                remeshed, frame.increment = numbers[:2]
                 if remeshed:
                     raise self._wrong("an increment with a new mesh; switch remeshing off")
             elif kind == 518:
