@@ -26,6 +26,8 @@ def fingerprint(project: FitProject, problem: FitProblem) -> str:
     options = project.solver_options.get(project.solver, {})
     for name in DECK:
         digest.update(f"{name}={options.get(name)};".encode())
+    # A solver whose settings are not all in the project says itself what it is.
+    digest.update(getattr(problem.solver, "identity", "").encode())
     for experiment in problem.experiments:
         for data in experiment.objective.data:
             digest.update(np.ascontiguousarray(data).tobytes())

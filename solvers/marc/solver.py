@@ -32,6 +32,11 @@ log = logging.getLogger(__name__)
 
 SCREEN = "screen.txt"
 SUBROUTINE = "hypela2.f"
+#: Settings that change what the deck or the subroutine says.
+DECK_SETTINGS = (
+    "law", "element", "increments", "pressure_type", "pressure_sign", "own_state", "symmetric",
+    "templates",
+)  # fmt: skip
 Model = BubbleModel | UniaxialModel | CylinderModel
 T = TypeVar("T")
 #: Makes something of the .t19 file and the number of iterations.
@@ -68,6 +73,14 @@ class MarcSolver:
     ) -> None:
         self.settings: MarcSettings = marc_settings(settings, None if marc is None else str(marc))
         self.progress = progress
+
+    @property
+    def identity(self) -> str:
+        """All that changes a result: the settings of the deck, and the site's own blocks."""
+        return repr([
+            *(getattr(self.settings, name) for name in DECK_SETTINGS),
+            *((name, Path(file).read_bytes()) for name, file in self.settings.include.items()),
+        ])  # fmt: skip
 
     def check(self) -> SolverCheck:
         """Whether there is a run_marc. That it carries the law, `doctor` and docs/marc.md show."""
