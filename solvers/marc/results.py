@@ -42,6 +42,22 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
 
 
 def _whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
+    found = by_time(path, mesh)
+    for time in range(1, count + 1):
+        if time not in found:
+            raise InputError(path, f"time {time} of {count}", f"holds no {MOVED} of x, y and z")
+    return [found[time] for time in range(1, count + 1)]
+
+
+def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, Array]]:
+    """Vectors by name at every whole time that has displacements.
+
+    ended : as for `T19File.frames`.
+
+    Raises
+    ------
+    InputError : the file is not there, damaged, or of another mesh.
+    """
     file = T19File(path)
     nodes = len(mesh.points)
     if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):
@@ -50,15 +66,11 @@ def _whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
     if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
     found: dict[int, dict[str, Array]] = {}
-    for frame in file.frames():
-        time = round(frame.time)
-        if abs(frame.time - time) < NEAR_TIME:
+    for frame in file.frames(ended):
+        time, moved = round(frame.time), frame.fields.get(MOVED)
+        if abs(frame.time - time) < NEAR_TIME and moved is not None and moved.shape[1] >= 3:
             found[time] = frame.fields
-    for time in range(1, count + 1):
-        moved = found.get(time, {}).get(MOVED)
-        if moved is None or moved.shape[1] < 3:
-            raise InputError(path, f"time {time} of {count}", f"holds no {MOVED} of x, y and z")
-    return [found[time] for time in range(1, count + 1)]
+    return found
 
 
 def displacements(frames: Sequence[Mapping[str, Array]]) -> Array:

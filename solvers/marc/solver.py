@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import logging
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import InputError, SolverFailure
+from ...errors import SolverFailure
 from ...materials.exports.marc_hypela2 import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
-from ..process import Watch, run_process
 from ..pulls import as_the_membrane, corrected, direct, evenly
-from ..scratch import remove, run_folder
 from .bubble import bubble_deck
-from .command import find_marc, run_command
-from .deck import JOB
-from .reasons import ending
+from .command import find_marc
+from .cylinder import APPROACH, bending_deck, inflation_deck
+from .cylinder_results import cylinder_history, inflated
+from .job import Job, Reader, run_job
 from .results import bubble_history, opened, strip_history
 from .settings import MarcSettings, marc_settings
 from .strip import strip_deck
-from .sts import Increment, increments
+from .sts import Increment
 
-log = logging.getLogger(__name__)
-
-SCREEN = "screen.txt"
-SUBROUTINE = "hypela2.f"
 #: Settings that change what the deck or the subroutine says.
 DECK_SETTINGS = (
     "law", "element", "increments", "pressure_type", "pressure_sign", "own_state", "symmetric",
@@ -39,12 +32,6 @@ DECK_SETTINGS = (
 )  # fmt: skip
 Model = BubbleModel | UniaxialModel | CylinderModel
 T = TypeVar("T")
-#: Makes something of the .t19 file and the number of iterations.
-Reader = Callable[[Path, int], T]
-
-
-class NoLicence(SolverFailure):
-    """Marc never began, for want of a licence: another try may do."""
 
 
 class MarcSolver:
@@ -97,7 +84,7 @@ class MarcSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate or pull the model.
+        """Inflate, pull or bend the model.
 
         Parameters
         ----------
@@ -109,10 +96,16 @@ class MarcSolver:
         SolverFailure : it did not end well; the scratch folder is kept and named.
         InputError : a template or file that cannot be used, a Marc that cannot be started.
         """
-        repeats: list[int] = []
+        settings, repeats, early = self.settings, 0, ""
+        parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
 
-        def once(deck: str, units: int, read: Reader[T]) -> T:
-            return self._once(deck, law, units, read, scratch, timeout, repeats)
+        def once(deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None) -> T:
+            nonlocal repeats, early
+            job = Job(deck, units, self._subroutine(law))
+            found, end = run_job(job, settings, read, rescue, parent, timeout, self.progress)
+            repeats += end.repeated
+            early = early or end.problem or ""
+            return found
 
         if isinstance(model, BubbleModel):
             deck = bubble_deck(model, law, self.settings)
@@ -122,11 +115,11 @@ class MarcSolver:
         elif isinstance(model, UniaxialModel):
             history = self._strip(model, law, once)
         else:
-            raise InputError(None, "model", "Marc bends no cylinders yet")
-        if sum(repeats):
-            remark = f"{sum(repeats)} increments were repeated after they did not converge"
-            history = replace(history, remarks=(*history.remarks, remark))
-        return history
+            history = self._cylinder(model, law, once)
+        remarks = [*history.remarks, *([early] if early else [])]
+        if repeats:
+            remarks.append(f"{repeats} increments were repeated after they did not converge")
+        return replace(history, remarks=tuple(remarks))
 
     def _strip(
         self, model: UniaxialModel, law: HypoelasticLaw, once: Callable[..., Any]
@@ -147,72 +140,26 @@ class MarcSolver:
         history: History = once(strip_deck(model, law, self.settings, pulls), count, read)
         return history
 
-    def _once(
-        self,
-        deck: str,
-        law: HypoelasticLaw,
-        units: int,
-        read: Reader[T],
-        scratch: Path | None,
-        timeout: float | None,
-        repeats: list[int],
-    ) -> T:
-        """One run in a fresh scratch folder; again while there is no licence and time to wait."""
-        settings = self.settings
-        find_marc(settings)
-        parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
-        seconds = timeout or settings.timeout
-        last = time.monotonic() + settings.licence_wait
-        while True:
-            try:
-                with run_folder("marc", parent, settings.keep, self.name, SCREEN) as folder:
-                    return self._in(folder, deck, law, units, read, seconds, repeats)
-            except NoLicence as failure:
-                if time.monotonic() + settings.licence_retry > last:
-                    raise
-                log.info("%s; trying again in %g s", failure.reason, settings.licence_retry)
-                if failure.scratch is not None:
-                    remove(failure.scratch)
-                time.sleep(settings.licence_retry)
-
-    def _in(
-        self,
-        folder: Path,
-        deck: str,
-        law: HypoelasticLaw,
-        units: int,
-        read: Reader[T],
-        timeout: float,
-        repeats: list[int],
-    ) -> T:
-        """One run in a folder that is empty at its start."""
-        subroutine = None
-        try:
-            (folder / f"{JOB}.dat").write_text(deck, encoding="ascii", errors="replace")
-            if self.settings.law == "hypela2":
-                subroutine = SUBROUTINE
-                (folder / SUBROUTINE).write_text(self._source(law), encoding="ascii")
-        except OSError as error:
-            raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
-        outcome = run_process(
-            run_command(self.settings, JOB, subroutine),
-            folder,
-            folder / SCREEN,
-            timeout,
-            self.settings.environment,
-            self._watch(folder / f"{JOB}.sts"),
+    def _cylinder(
+        self, model: CylinderModel, law: HypoelasticLaw, once: Callable[..., Any]
+    ) -> History:
+        """Inflation alone, to know where collar and supports touch; then all, up to a collapse."""
+        shape = once(
+            inflation_deck(model, law, self.settings),
+            len(model.inflation),
+            lambda t19, _: inflated(t19, model),
         )
-        end = ending(folder, JOB, SCREEN, outcome, timeout, float(units))
-        if end.problem is not None:
-            kind = NoLicence if end.licence else SolverFailure
-            raise kind(end.problem, self.name, end.number, end.said)
-        repeats.append(end.repeated)
-        return read(folder / f"{JOB}.t19", end.iterations)
+        history: History = once(
+            bending_deck(model, law, self.settings, shape),
+            len(model.inflation) + APPROACH + len(model.increments),
+            lambda t19, n: cylinder_history(t19, model, n),
+            lambda t19, n: cylinder_history(t19, model, n, ended=False),
+        )
+        return history
 
-    def _source(self, law: HypoelasticLaw) -> str:
-        """The user subroutine with the law's constants."""
-        own_state, symmetric = self.settings.own_state, self.settings.symmetric
-        return hypela2_source({1: law}, own_state=own_state, symmetric=symmetric)
-
-    def _watch(self, sts: Path) -> Watch[Increment] | None:
-        return None if self.progress is None else Watch(lambda: increments(sts), self.progress)
+    def _subroutine(self, law: HypoelasticLaw) -> str | None:
+        """HYPELA2 with the law's constants, where it is the way that was chosen."""
+        settings = self.settings
+        if settings.law != "hypela2":
+            return None
+        return hypela2_source({1: law}, own_state=settings.own_state, symmetric=settings.symmetric)
