@@ -59,7 +59,8 @@ def reals(line):
 
 
 def parameter(deck, name):
-    (line,) = [line for line in lines_of(deck) if line[:20].rstrip() == name]
+    head = lines_of(deck)[: lines_of(deck).index("end")]
+    (line,) = [line for line in head if line[:20].rstrip() == name]
     return integers(line[20:])
 
 
