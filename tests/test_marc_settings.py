@@ -15,7 +15,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.projects.bubble import read_project
 from bubblefit.solvers.diagnosis import diagnose
-from bubblefit.solvers.marc.settings import MarcSettings, marc_settings
+from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings, marc_settings
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
@@ -241,3 +241,12 @@ def test_another_deck_is_another_study(tmp_path):
     assert MarcSolver(**given, element=18).identity != before
     block.write_text("two")
     assert MarcSolver(**given).identity != before
+
+
+def test_every_setting_and_block_is_documented_and_there():
+    root = Path(__file__).parents[1]
+    text = (root / "docs" / "marc.md").read_text()
+    for name in (*MarcSettings.model_fields, *BLOCKS):
+        assert name in text, name
+    for name in BLOCKS:
+        assert (root / "templates" / "marc" / f"{name}.dat.j2").is_file()
