@@ -11,7 +11,7 @@ from ..errors import InputError, OutputError
 from ..materials.card import read_card
 from ..materials.exports.abaqus_fabric import fabric
 from ..materials.exports.abaqus_umat import umat
-from ..materials.exports.base import Export, Format, Options
+from ..materials.exports.base import Export, Format, Options, check_positive
 from ..materials.exports.csv_tables import csv
 from ..materials.exports.ls_dyna_mat34 import mat34
 from ..materials.exports.marc_hypela2 import hypela2
@@ -86,6 +86,7 @@ def command(
     )
     material = read_card(card)
     try:
+        check_positive(material)
         export = FORMATS[name](material, options)
     except InputError as error:
         raise InputError(card, error.field, error.problem) from None

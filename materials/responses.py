@@ -52,7 +52,7 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
                 break
         trial, _ = law.increment(old, new, stress)
         if not np.isfinite(trial).all():
-            problem = f"a modulus is not positive at log strain {end:.4g} of a bar"
+            problem = f"a modulus or 1 - nu12 nu21 is not positive at log strain {end:.4g} of a bar"
             raise InputError(None, "beta", problem)
         old, stress = new, trial
         strains[i], stresses[i] = new, trial[0]
@@ -106,7 +106,9 @@ def trellis_curve(
         pk2, _, strain, stress = law.second_piola_kirchhoff(gradient, strain, stress)
         rows[i] = np.concatenate([pk2[0], strain[0], stress[0]])
     if not np.isfinite(rows).all():
-        raise InputError(None, "beta", "a modulus is not positive in a trellis shear")
+        raise InputError(
+            None, "beta", "a modulus or 1 - nu12 nu21 is not positive in a trellis shear"
+        )
     rows = _at(ends, rows)
     yarns, s12, area = rows[:, :2], rows[:, 2], np.exp(rows[:, 3] + rows[:, 4])
     if measure == "nominal":

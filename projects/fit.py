@@ -169,6 +169,7 @@ def common_settings(
             "calculix": _calculix(path, file.solver.calculix),
             # "marc" itself comes from the command line only.
             "marc": {"marc": None, **file.solver.marc.given(path.parent)},
+            **(file.solver.model_extra or {}),
         },
     }
 

@@ -86,7 +86,7 @@ def test_trellis_shear_does_the_work_of_the_membrane(name):
 
 def test_a_law_that_fails_on_the_way_has_no_curve():
     gone = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
-    with pytest.raises(InputError, match=r"not positive at log strain 0\.0495"):
+    with pytest.raises(InputError, match=r"is not positive at log strain 0\.0495"):
         uniaxial_curve(gone, 0, np.linspace(0, 0.1, 101), "true")
     weak = HypoelasticLaw(np.r_[0, 0, -1e3, 20.0, 0, 0, 0, 100.0, 0, 0, 0, 500.0])
     with pytest.raises(InputError, match="trellis"):
@@ -333,6 +333,14 @@ def test_the_limits_of_each_target_are_named():
 
     assert "nu12" in loses("abaqus-fabric") and "Explicit only" in loses("abaqus-fabric")
     assert "nu12" in loses("ls-dyna-mat34") and "density" in loses("ls-dyna-mat34")
+    # The linear law in equal biaxial strain e: E1 (1 + nu21)/(1 - nu12 nu21) e on a width that is
+    # exp(e) times the first; the strip: E1 e on exp(-nu12 e) times it. Fill likewise.
+    linear = MaterialCard(HypoelasticLaw.linear(800.0, 140.0, 20.0), 0.8)
+    nu21, e = NU12 * 140 / 800, 0.05
+    both = (1 - NU12 * nu21) / (1 + np.array([nu21, NU12]))
+    warp, fill = 100 * (1 - both * np.exp(-e * (1 + np.array([NU12, nu21]))))
+    for name in ("abaqus-fabric", "ls-dyna-mat34"):
+        assert f"{warp:.2g} % along the warp and {fill:.2g} % along the fill" in loses(name, linear)
     assert "measure" in " ".join(export("ls-dyna-mat34").says.confirm)
     assert "density" not in loses("abaqus-fabric", density=1e-9)
     incompressible = MaterialCard(LAWS["incompressible"], 0.8)
@@ -426,13 +434,30 @@ def test_a_bad_card_is_named_with_its_field(folder, old, new, words):
     assert list(folder.iterdir()) == [path]
 
 
-def test_a_card_that_fails_on_the_way_is_bad_input(folder):
-    law = HypoelasticLaw(
-        np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0], strain_range=[0.1, 0.1, 0.1]
-    )
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_card_without_stiffness_is_bad_input(folder, name):
+    gone = np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0]
+    for law, words in (
+        (HypoelasticLaw(gone, strain_range=[0.1, 0.1, 0.1]),
+         "beta: E1 is -500 MPa at log strain 0.1, where the card is to hold; expected > 0"),
+        (HypoelasticLaw(np.zeros(12)), "beta: E1 is 0 MPa at log strain 0,"),
+        (HypoelasticLaw.linear(1.0, 1000.0, 20.0),
+         "nu12: nu12 nu21 is not below 1 at zero strain, for nu12 = 0.24"),
+    ):  # fmt: skip
+        write_card(MaterialCard(law, 0.8), folder / "material.toml")
+        text = run("material.toml", "--format", name, code=2)
+        assert text.startswith(f"bubblefit: material.toml: {words}") and text.count("\n") == 1
+    assert [path.name for path in folder.iterdir()] == ["material.toml"]
+
+
+def test_a_card_that_fails_beyond_its_range_is_bad_input_where_a_curve_goes_there(folder):
+    """A cubic without a range may well run out before the curve's end."""
+    law = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
     write_card(MaterialCard(law, 0.8), folder / "material.toml")
     text = run("material.toml", "--format", "csv", code=2)
-    assert text.startswith("bubblefit: material.toml: beta: a modulus is not positive")
+    assert text.startswith("bubblefit: material.toml: beta: a modulus or 1 - nu12 nu21 is not pos")
+    run("material.toml", "--format", "csv", "--reach", 0.04)
+    run("material.toml", "--format", "abaqus-umat")
 
 
 def test_options_that_mean_nothing_are_refused(folder):

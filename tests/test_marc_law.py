@@ -43,13 +43,14 @@ class Point:
         """Stress, D and state at the end; the arguments that are not for shells are NaN."""
         n = self.ngens
         d, g = np.full((n, n), 77.0, order="F"), np.full(n, 77.0)
-        s, t = self.stress.copy(), self.states.copy()
+        # What lies behind an array is somebody else's.
+        s, t = np.append(self.stress, [77.0] * 9), np.append(self.states, [77.0] * 9)
         # With own states the subroutine must not look at what Marc says of e and s.
         e = np.full(n, np.nan) if self.own_state else self.strain
         if self.own_state:
-            s[:] = np.nan
+            s[:n] = np.nan
         else:
-            t[1:] = np.nan
+            t[1:-9] = np.nan
         nothing, de = np.full(99, np.nan), reals(*increment)
         empty = address(nothing)
         whole = [np.array(v, dtype=self.integer) for v in (
@@ -64,7 +65,8 @@ class Point:
             empty, empty, empty, empty, empty, ncrd, itel, ndeg, ndm, nnode, jtype, lclass,
             ifr, ifu,
         )  # fmt: skip
-        return s, d, g, t
+        assert (s[n:] == 77.0).all() and (t[-9:] == 77.0).all()
+        return s[:n], d, g, t[:-9]
 
     def commit(self, increment):
         s, d, _, t = self.call(increment)

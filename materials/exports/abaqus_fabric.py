@@ -25,8 +25,8 @@ def fabric(card: MaterialCard, options: Options) -> Export:
             "and shear stress by change of angle: both elastic, path-independent",
         ),
         loses=(
-            f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; under "
-            "biaxial tension this is softer than the card (each curve holds for a strip)",
+            f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; "
+            + curves.uncoupled,
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
             f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
             "hypoelasticity: the curves are total ones; unloading is along the same curve",

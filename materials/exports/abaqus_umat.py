@@ -25,7 +25,7 @@ def umat(card: MaterialCard, options: Options) -> Export:
             "no Abaqus was at hand: the interface is the documented one, compiled and compared "
             "point by point; pull one element",
             "STRAN is the sum of increments along axes that turn with the material: log strain "
-            "exactly as long as warp and fill stay principal, nearly so in shear",
+            "but for 1e-6 on paths of proportional stretch and shear (docs/exports.md)",
         ),
     )
     context = {

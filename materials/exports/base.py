@@ -9,15 +9,20 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from ... import __version__
+from ...errors import InputError
 from ..card import MaterialCard
+from ..moduli import MODULI, UNLIMITED
 from ..responses import Measure
 from ..tables import POINTS, REACH
 
 TEMPLATES = Path(__file__).resolve().parent.parent.parent / "templates"
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
+#: Strains a modulus at which a card is looked at.
+CHECKED = 501
 WIDTH = 70
 
 
@@ -70,6 +75,28 @@ class Export:
 Format = Callable[[MaterialCard, Options], Export]
 
 
+def check_positive(card: MaterialCard) -> None:
+    """No program can use a law without stiffness.
+
+    Raises
+    ------
+    InputError : a modulus is not positive somewhere in the card's range (at zero strain where it
+        has none), or 1 - nu12 nu21 is not at zero strain.
+    """
+    law = card.law
+    for name, (_, component) in MODULI.items():
+        end = law.strain_range[component]
+        strain = np.linspace(0.0, end if end < UNLIMITED else 0.0, CHECKED)
+        values = law.modulus(name, strain)
+        if not (values > 0).all():
+            worst = int(np.argmin(values))
+            problem = f"{name} is {values[worst]:.4g} MPa at log strain {strain[worst]:.4g}"
+            raise InputError(None, "beta", f"{problem}, where the card is to hold; expected > 0")
+    if not law.nu12**2 * float(law.E2(0.0) / law.E1(0.0)) < 1:
+        problem = f"nu12 nu21 is not below 1 at zero strain, for nu12 = {law.nu12:g}"
+        raise InputError(None, "nu12", f"{problem} and E2/E1 of the card")
+
+
 def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
     """The comment that begins every file: which card, which format, what it carries and loses."""
     lines = [f"{what}, written by bubblefit {__version__}."]
@@ -104,7 +131,7 @@ def density_remarks(options: Options) -> tuple[str, ...]:
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
     """What a tabulated format has to say of strain ranges."""
-    if (card.law.strain_range < 1e9).all():
+    if (card.law.strain_range < UNLIMITED).all():
         return ()
     return (
         "the card has no valid_strain in at least one direction: there the curve ends at log "

@@ -41,8 +41,7 @@ def mat34(card: MaterialCard, options: Options) -> Export:
             "step and contact",
         ),
         loses=(
-            "nu12: FORM 14 with curves does not couple warp and fill; under biaxial tension "
-            "this is softer than the card (each curve holds for a strip)",
+            "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
             f"{curves.yarns:.3g} MPa in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
