@@ -269,6 +269,8 @@ def test_control_is_the_thesis():
     (data,) = blocks_of(bubble_deck(bubble(), LAW, MarcSettings()), "control")
     fields = integers(data[0])
     assert fields[3] == 5 and fields[5] == 1 and len(fields) == 16
+    # Of the whole job, all load cases: never the limit.
+    assert fields[0] == 99999
     assert reals(data[1])[0] == reals(data[2])[0] == 0.001
 
 
