@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
+from ..solvers.marc.settings import MarcSettings
 
 #: MPa per unit, MPa per unit, mm per unit.
 MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
@@ -162,6 +163,7 @@ class SolverSection(Section):
     __pydantic_extra__: dict[str, dict[str, Any]] = Field(init=False)
 
     calculix: CalculixSection = CalculixSection()
+    marc: MarcSettings = MarcSettings()
 
 
 class CommonFile(Section):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,10 @@ from ..materials.responses import bar
 from .bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference, strip_stresses
 from .calculix.executable import ADVICE, FOUND, NAMED, Executable, every_ccx
 from .calculix.proof import prove
+from .marc.command import find_marc
+from .marc.proof import prove as prove_marc
+from .marc.settings import VARIABLE
+from .marc.solver import MarcSolver
 from .plugins import PlugIn, plug_ins
 from .registry import SOLVERS, checked, solver_named
 
@@ -43,22 +48,42 @@ class Diagnosis:
     advice: str = ""
 
 
-def diagnose(ccx: Path | str | None = None) -> list[Diagnosis]:
-    """The embedded solver, every ccx (`ccx`: one more, by path), every plug-in, each tried.
+def diagnose(ccx: Path | str | None = None, marc: Path | str | None = None) -> list[Diagnosis]:
+    """The embedded solver, every ccx (`ccx`: one more, by path), Marc, every plug-in, each tried.
 
-    A ccx that is not there at all is one entry without a path, expected only if it was named.
+    A ccx that is not there at all is one entry without a path, expected only if it was named. A
+    Marc (`marc`: the one to look at) has an entry only if it is there or was named.
     """
-    return [_membrane(), *_every_calculix(ccx), *(_plug_in(one) for one in plug_ins())]
+    plugged = (_plug_in(one) for one in plug_ins())
+    return [_membrane(), *_every_calculix(ccx), *_marc(marc), *plugged]
 
 
-def _every_calculix(ccx: Path | str | None) -> list[Diagnosis]:
+def _every_calculix(named: Path | str | None) -> list[Diagnosis]:
     try:
-        candidates = every_ccx(ccx)
+        candidates = every_ccx(named)
     except BubblefitError as error:
         return [_absent(str(error), NAMED, True)]
     if not candidates:
         return [_absent(f"there is no ccx; {ADVICE}", "not found", False)]
     return [_calculix(candidate) for candidate in candidates]
+
+
+def _marc(named: Path | str | None) -> list[Diagnosis]:
+    origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else FOUND
+    expected = origin != FOUND
+    path, stresses, off, advice, version = None, None, None, "", ""
+    try:
+        solver = MarcSolver(named)
+        version = solver.settings.version or "?"
+        path = find_marc(solver.settings)
+        stresses = prove_marc(solver)
+        off = difference(stresses)
+    except BubblefitError as error:
+        if path is None and not expected:
+            return []
+        advice = str(error).splitlines()[0]
+    return [Diagnosis("marc", version, path, origin, expected, None, stresses is not None,
+                      stresses, off, advice)]  # fmt: skip
 
 
 def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:

@@ -17,7 +17,17 @@ def _calculix(**options: Any) -> Solver:
     return CalculixSolver(**options)
 
 
-SOLVERS: dict[str, Callable[..., Solver]] = {"calculix": _calculix, "membrane": MembraneSolver}
+def _marc(**options: Any) -> Solver:
+    from .marc.solver import MarcSolver
+
+    return MarcSolver(**options)
+
+
+SOLVERS: dict[str, Callable[..., Solver]] = {
+    "calculix": _calculix,
+    "marc": _marc,
+    "membrane": MembraneSolver,
+}
 
 
 def solver_names() -> list[str]:
