@@ -232,6 +232,7 @@ def _thirds(ends: tuple[float, float, float]) -> Array:
 def solver_options(path: Path, section: SolverSection) -> dict[str, dict[str, Any]]:
     """By name of a solver, what its constructor is given; those that plug in among them."""
     return {
+        "membrane": section.membrane.model_dump(),
         "calculix": _calculix(path, section.calculix),
         # "marc" itself comes from the command line only.
         "marc": {"marc": None, **section.marc.given(path.parent)},

@@ -156,12 +156,20 @@ class CalculixSection(Section):
     threads: Annotated[int, Field(ge=1)] = 1
 
 
+class MembraneSection(Section):
+    """What a closed membrane's wall does where it is pressed together; for bendings."""
+
+    wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None
+    bending_stiffness: Annotated[float, Field(ge=0)] = 1.0
+
+
 class SolverSection(Section):
     """Options by solver; tables of other names are for plug-ins, which check what is in them."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, dict[str, Any]] = Field(init=False)
 
+    membrane: MembraneSection = MembraneSection()
     calculix: CalculixSection = CalculixSection()
     marc: MarcSettings = MarcSettings()
 
