@@ -13,6 +13,7 @@ COMMANDS = {
     "bubble": ("bubble", "Fit a material to a bubble inflation test."),
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests."),
     "joint": ("joint", "Fit a material to a bubble and strips together."),
+    "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
