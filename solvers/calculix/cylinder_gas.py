@@ -1,0 +1,49 @@
+"""The gas in the cylinder, which CalculiX does not know: its pressure from the volumes found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models.cylinder import CylinderModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class GasCurve:
+    """Gauge pressure (n,) MPa over increasing deflection (n,) mm; constant beyond both ends."""
+
+    deflection: Array
+    pressure: Array
+
+    def at(self, deflection: Array) -> Array:
+        """Gauge pressure in MPa at deflections in mm."""
+        return np.interp(deflection, self.deflection, self.pressure)
+
+
+def compliance(pressures: Array, volumes: Array) -> float:
+    """dV/dp (mm^3/MPa) at the end of inflation, from (n,) MPa and mm^3; n > 1."""
+    return float(np.gradient(volumes, pressures, edge_order=min(2, len(volumes) - 1))[-1])
+
+
+def gas_pressure(model: CylinderModel, volumes: Array, filled: float) -> Array:
+    """Gauge pressure (n,) MPa of the model's gas in volumes (n,) mm^3, closed in in `filled`."""
+    return np.array([model.gas.gauge_pressure(float(v), model.pressure, filled) for v in volumes])
+
+
+def better_pressure(
+    model: CylinderModel, volumes: Array, filled: float, given: Array, slope: float
+) -> Array:
+    """Gauge pressure (n,) MPa for the next pass, from the volumes found at the `given` ones.
+
+    One step of Newton's method on gas(V(p)) = p, the cylinder at any deflection as compliant as
+    the inflated one (`slope`, dV/dp in mm^3/MPa): without it four passes, with it two.
+    """
+    gas = gas_pressure(model, volumes, filled)
+    steep = np.array(
+        [model.gas.pressure_slope(float(v), model.pressure, filled) for v in volumes]
+    )
+    return np.asarray(given + (gas - given) / (1.0 - steep * slope))
