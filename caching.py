@@ -19,8 +19,8 @@ KERNELS = (
     "materials/point_moduli.py",
     "materials/point_law.py",
     "materials/law.py",
+    "meshes/volume.py",
     "solvers/membrane/kernel.py",
-    "solvers/membrane/cavity.py",
     "solvers/membrane/sensitivity.py",
 )
 

@@ -2,7 +2,8 @@
 
 By the divergence theorem V = 1/3 * integral of x . n over the surface. A plane of symmetry through
 the origin adds nothing, so that a quarter needs no lids: its volume is a quarter of the whole for
-as long as its open edges stay in their planes.
+as long as its open edges stay in their planes. One compiled loop serves meshes, CalculiX' results
+and every iteration of the membrane solver.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..caching import compiled
+
 Array = NDArray[np.float64]
 
-#: Both ways to cut a quad into two triangles; their mean is the volume below the bilinear patch.
-TRIANGLES = ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))
 _G = 1 / np.sqrt(3)
 _AT = _G * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 _CORNER = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -25,6 +26,7 @@ _SLOPES = 0.25 * np.stack(
         _CORNER[:, 1] * (1 + _AT[:, None, 0] * _CORNER[:, 0]),
     ]
 )
+_EVEN, _ORIGIN = np.full(3, 1 / 3), np.zeros(3)
 
 
 def enclosed_volume(points: Array, quads: NDArray[np.intp]) -> float:
@@ -35,12 +37,7 @@ def enclosed_volume(points: Array, quads: NDArray[np.intp]) -> float:
     points : (n, 3) mm, deformed or not. quads : (m, 4), closed but for edges in planes through
         the origin.
     """
-    corner = points[quads]
-    total = 0.0
-    for a, b, c in TRIANGLES:
-        normal = np.cross(corner[:, b], corner[:, c])
-        total += float(np.einsum("mx,mx->", corner[:, a], normal))
-    return total / 12
+    return volume_and_gradient(points, quads)[0]
 
 
 def volume_gradient(points: Array, quads: NDArray[np.intp]) -> Array:
@@ -50,9 +47,48 @@ def volume_gradient(points: Array, quads: NDArray[np.intp]) -> Array:
     the force of that pressure on each node. On an open edge it is the derivative for moves in the
     plane of that edge, and the force on the part that is meshed.
     """
-    corner = points[quads]
-    base = np.einsum("ipn,mnx->impx", _SLOPES, corner)
-    normal = np.cross(base[0], base[1])  # its length is the area of a Gauss point
-    gradient = np.zeros_like(points, dtype=float)
-    np.add.at(gradient, quads, np.einsum("pn,mpx->mnx", _VALUES, normal))
-    return gradient
+    return volume_and_gradient(points, quads)[1]
+
+
+def volume_and_gradient(
+    points: Array, quads: NDArray[np.intp], weight: Array = _EVEN, origin: Array = _ORIGIN
+) -> tuple[float, Array]:
+    """Volume (mm^3) and its derivative (n, 3) mm^2.
+
+    Parameters
+    ----------
+    weight : (3,) adding to one: V = sum_k weight_k * integral of (x_k - origin_k) n_k. A surface
+        that is open in direction k at both ends has weight 0 there.
+    origin : (3,) mm, in the planes of symmetry.
+    """
+    gradient = np.zeros(points.shape)
+    points = np.ascontiguousarray(points, dtype=float)
+    return _enclosed(points, quads, _VALUES, _SLOPES, weight, origin, gradient), gradient
+
+
+@compiled()
+def _enclosed(points, quads, values, slopes, weight, origin, gradient):  # type: ignore[no-untyped-def]
+    """Volume; adds its derivative to `gradient` (n, 3). All Gauss weights are one."""
+    volume = 0.0
+    x, a, normal = np.empty((4, 3)), np.empty((2, 3)), np.empty(3)
+    for e in range(quads.shape[0]):
+        for n in range(4):
+            for k in range(3):
+                x[n, k] = points[quads[e, n], k]
+        for g in range(4):
+            for i in range(2):
+                for k in range(3):
+                    a[i, k] = 0.0
+                    for n in range(4):
+                        a[i, k] += slopes[i, g, n] * x[n, k]
+            # Its length is the area of the Gauss point.
+            normal[0] = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
+            normal[1] = a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2]
+            normal[2] = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
+            for k in range(3):
+                at = -origin[k]
+                for n in range(4):
+                    at += values[g, n] * x[n, k]
+                    gradient[quads[e, n], k] += values[g, n] * normal[k]
+                volume += weight[k] * at * normal[k]
+    return volume

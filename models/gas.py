@@ -36,15 +36,27 @@ class Gas:
         """Mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""
         return self.density * 1e-9 * volume * (gauge + self.ambient) / self.ambient
 
-    def gauge_pressure(self, volume: float, filled_to: float, filled_volume: float) -> float:
-        """Gauge pressure in `volume` of gas that was closed in at `filled_to`, MPa; p V constant.
+    def closed_in(self, gauge: float, volume: float) -> ClosedGas:
+        """The gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
+        return ClosedGas((gauge + self.ambient) * volume, self.ambient)
 
-        Parameters
-        ----------
-        volume, filled_volume : mm^3, now and when the gas was closed in.
-        """
-        return (filled_to + self.ambient) * filled_volume / volume - self.ambient
 
-    def pressure_slope(self, volume: float, filled_to: float, filled_volume: float) -> float:
-        """Derivative of `gauge_pressure` with respect to `volume`, MPa/mm^3."""
-        return -(filled_to + self.ambient) * filled_volume / volume**2
+@dataclass(frozen=True)
+class ClosedGas:
+    """A constant mass at constant temperature: absolute pressure times volume stays.
+
+    Parameters
+    ----------
+    amount : MPa mm^3, absolute pressure times volume. ambient : MPa outside.
+    """
+
+    amount: float
+    ambient: float
+
+    def pressure(self, volume: float) -> float:
+        """Gauge pressure (MPa) in `volume` (mm^3)."""
+        return self.amount / volume - self.ambient
+
+    def stiffness(self, volume: float) -> float:
+        """Loss of pressure per volume, -dp/dV (MPa/mm^3)."""
+        return self.amount / volume**2

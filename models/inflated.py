@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..meshes.mesh import Mesh
+from .gas import Gas
 
 Vector = tuple[float, float, float]
 
@@ -20,7 +21,7 @@ class RigidCylinder:
 
     Parameters
     ----------
-    name : of its reaction in the history.
+    name : of its reaction in the history; bodies of one name are added up.
     axis : unit vector. centre : mm.
     radius : mm, outside of a post, inside of a ring.
     ring : the membrane is inside.
@@ -44,9 +45,10 @@ class Bending:
     ----------
     supports : bodies at rest; each is brought up along minus `direction` to touch first.
     collar : the body that moves along `direction`; it is brought down to touch first.
-    displacements : mm of the collar from touching, increasing: increments and frames.
+    displacements : mm of the collar from touching, increasing: the increments.
+    reported : index of each of them that is a frame; all unless given.
     released : node set held only while inflating.
-    penalty : MPa/mm of contact. atmosphere : MPa.
+    penalty : MPa/mm of contact. gas : what is closed in.
     """
 
     supports: Sequence[RigidCylinder]
@@ -55,7 +57,8 @@ class Bending:
     direction: Vector = (0.0, -1.0, 0.0)
     released: str | None = None
     penalty: float = 5.0
-    atmosphere: float = 0.101
+    gas: Gas = field(default_factory=Gas)
+    reported: Sequence[int] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,13 +63,14 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run:
     for number in range(1, PASSES + 1):
         context = bending_context(model, solids, start, gas)
         found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, True)
-        given, full = gas.at(found.deflection), float(found.volume[0])
-        gap = gas_pressure(model, found.volume, full) - given
+        given = gas.at(found.deflection)
+        closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
+        gap = gas_pressure(closed, found.volume) - given
         left = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
         log.info("pass %d to %.4g mm: p V within %.1e", number, found.deflection[-1], left)
         if left <= SETTLED or number == PASSES:
             break
-        better = better_pressure(model, found.volume, full, given, slope)
+        better = better_pressure(closed, found.volume, given, slope)
         gas = GasCurve(found.deflection, better)
     history = bending_history(model, found, gas)
     rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.cylinder import CylinderModel
+from ...models.gas import ClosedGas
 
 Array = NDArray[np.float64]
 
@@ -29,21 +29,16 @@ def compliance(pressures: Array, volumes: Array) -> float:
     return float(np.gradient(volumes, pressures, edge_order=min(2, len(volumes) - 1))[-1])
 
 
-def gas_pressure(model: CylinderModel, volumes: Array, filled: float) -> Array:
-    """Gauge pressure (n,) MPa of the model's gas in volumes (n,) mm^3, closed in in `filled`."""
-    return np.array([model.gas.gauge_pressure(float(v), model.pressure, filled) for v in volumes])
+def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
+    """Gauge pressure (n,) MPa of the gas in volumes (n,) mm^3."""
+    return np.array([gas.pressure(float(v)) for v in volumes])
 
 
-def better_pressure(
-    model: CylinderModel, volumes: Array, filled: float, given: Array, slope: float
-) -> Array:
+def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) -> Array:
     """Gauge pressure (n,) MPa for the next pass, from the volumes found at the `given` ones.
 
     One step of Newton's method on gas(V(p)) = p, the cylinder at any deflection as compliant as
     the inflated one (`slope`, dV/dp in mm^3/MPa): without it four passes, with it two.
     """
-    gas = gas_pressure(model, volumes, filled)
-    steep = np.array(
-        [model.gas.pressure_slope(float(v), model.pressure, filled) for v in volumes]
-    )
-    return np.asarray(given + (gas - given) / (1.0 - steep * slope))
+    stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
+    return np.asarray(given + (gas_pressure(gas, volumes) - given) / (1.0 + stiffness * slope))

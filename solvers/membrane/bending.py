@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...models.inflated import InflatedModel, RigidCylinder
 from ..base import History
-from .cavity import Gas
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
 
@@ -28,7 +27,7 @@ def analyse(
     pressure: float,
     extremes: tuple[Array, Array],
 ) -> History:
-    """Frames of the bending: first the inflated state, then one for every collar displacement.
+    """Frames of the bending: first the inflated state, then one for every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
     all bodies on it. Where no equilibrium is found on the way, the history ends with the last
@@ -36,7 +35,7 @@ def analyse(
 
     Raises
     ------
-    SolverFailure : there is not even the first displacement.
+    SolverFailure : there is not even the first reported displacement.
     """
     plan = model.bending
     assert plan is not None
@@ -45,7 +44,7 @@ def analyse(
     posts = [brought_to_touch(body, position, -way, BITE) for body in plan.supports]
     collar = brought_to_touch(plan.collar, position, way, 0.0)
     volume, _ = membrane.cavity.measure(position)
-    membrane.gas = Gas((pressure + plan.atmosphere) * volume, plan.atmosphere)
+    membrane.gas = plan.gas.closed_in(pressure, volume)
     membrane.penalty = plan.penalty
     membrane.keep_tangent = True
 
@@ -64,9 +63,8 @@ def analyse(
             start = start + ahead * (path[-1] - path[-2])
         found = _reach(membrane, bodies, moves[-1], path[-1], wanted, start, MOST_CUTS)
         if found is None:
-            if len(path) == 1:
-                raise SolverFailure(f"no equilibrium with the collar at {wanted:.4g} mm")
-            remarks.append(f"no equilibrium between {moves[-1]:.4g} and {wanted:.4g} mm of collar")
+            between = f"between {moves[-1]:.4g} and {wanted:.4g} mm of deflection"
+            remarks.append(f"the run stopped early: no equilibrium {between}")
             break
         membrane.accept()
         path.append(found)
@@ -77,18 +75,26 @@ def analyse(
         deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
         np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
         np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
+    frames = [0]
+    for i in range(len(plan.displacements)) if plan.reported is None else plan.reported:
+        if i + 1 < len(path):
+            frames.append(i + 1)
+    if len(frames) == 1:
+        raise SolverFailure(f"no frame of the bending: {remarks[0]}")
     remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
     # What is normal to a symmetry plane is taken up by the other half.
-    force = model.copies * np.array(pushes) * ~membrane.cavity.symmetric
-    named = [(body.name, force[:, i]) for i, body in enumerate((*posts, collar))]
+    force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
+    reactions: dict[str, Array] = {}
+    for i, body in enumerate((*posts, collar)):
+        reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
     return History(
         force[:, -1] @ way,
-        np.array(path),
+        np.array(path)[frames],
         low,
         high,
-        dict(named),
-        cavity_pressure=np.array([p for p, _ in gas]),
-        cavity_volume=model.copies * np.array([v for _, v in gas]),
+        reactions,
+        cavity_pressure=np.array([p for p, _ in gas])[frames],
+        cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations,
         path=np.array(path),
         remarks=tuple(remarks),

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.gas import ClosedGas
 from ...models.inflated import RigidCylinder
-from .cavity import Cavity, Gas
+from .cavity import Cavity
 from .contact import contact_forces
 from .factorisation import Tangent
 from .newton import Membrane
@@ -61,7 +62,7 @@ class ClosedMembrane(Membrane):
     """
 
     cavity: Cavity
-    gas: Gas | None = None
+    gas: ClosedGas | None = None
     bodies: Sequence[RigidCylinder] = ()
     penalty: float = 5.0
     slack: float = 0.0

@@ -52,7 +52,7 @@ def closed_membrane(
         tolerance,
         # A slack step much larger than a facet folds the mesh.
         step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
-        cavity=closed_cavity(points, quads, elements, fixed),
+        cavity=closed_cavity(points, quads, fixed),
     )
 
 

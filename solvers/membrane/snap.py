@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .cavity import Gas
+from ...models.gas import ClosedGas
 from .closed import ClosedMembrane
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
     volume, pressure, step, slope = first, before, STEP, np.zeros_like(u)
     try:
         while step >= LEAST_STEP and volume < MOST_GROWTH * first:
-            membrane.gas = Gas((outside + pressure) * volume * (1.0 + step), outside)
+            membrane.gas = ClosedGas((outside + pressure) * volume * (1.0 + step), outside)
             found = membrane.equilibrium(u + step * slope, 0.0)
             if found is None and step < 0.5 * STEP:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.

@@ -13,15 +13,17 @@ from ... import __version__
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
+from ...models.cylinder import CylinderModel
 from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
 from ..base import PARAMETERS, History, SolverCheck
 from . import bubble, inflated, strip
 from .closed import ClosedMembrane
+from .cylinder import closed_membrane_of
 from .newton import Membrane
 
 Array = NDArray[np.float64]
-Model = BubbleModel | UniaxialModel | InflatedModel
+Model = BubbleModel | UniaxialModel | InflatedModel | CylinderModel
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
@@ -57,7 +59,7 @@ class MembraneSolver:
         pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> History:
-        """Inflate or pull the model (scratch and timeout are for external solvers and not used).
+        """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
         Parameters
         ----------
@@ -100,6 +102,8 @@ class MembraneSolver:
         membrane = self._membrane(model, law)
         if isinstance(model, UniaxialModel):
             return strip.analyse(membrane, model, parameters, pressure_offset, guess)
+        if isinstance(model, CylinderModel):
+            model = closed_membrane_of(model)
         if isinstance(model, InflatedModel):
             assert isinstance(membrane, ClosedMembrane)
             return inflated.analyse(membrane, model, parameters, pressure_offset, guess)
@@ -111,6 +115,8 @@ class MembraneSolver:
             membrane: Membrane
             if isinstance(model, UniaxialModel):
                 membrane = strip.prepare(model, law, self.tolerance)
+            elif isinstance(model, CylinderModel):
+                membrane = inflated.prepare(closed_membrane_of(model), law, self.tolerance)
             elif isinstance(model, InflatedModel):
                 membrane = inflated.prepare(model, law, self.tolerance)
             else:
