@@ -79,14 +79,15 @@ def bending_context(
         node, element = node + len(body.points), element + len(body.elements)
     way = ABOVE + model.deflections[-1]
     gas = gas or GasCurve(np.zeros(1), np.full(1, model.pressure))
-    after = gas.deflection > 0  # the gas is closed in with the collar still above
-    times = REST + ABOVE + gas.deflection[after]
+    pressures = [(0.0, model.pressure), (REST + ABOVE, model.pressure)]
+    for deflection, pressure in zip(gas.deflection, gas.pressure, strict=True):
+        if deflection > 0:  # before, the collar is not on the cylinder
+            pressures.append((REST + ABOVE + float(deflection), float(pressure)))
     return {
         "bodies": listed,
         "stiffness": STIFFNESS,
         "path": [[0.0, 0.0], [REST, 0.0], [REST + way, way]],
-        "pressures": [[0.0, model.pressure], [REST + ABOVE, model.pressure]]
-        + np.stack([times, gas.pressure[after]], axis=1).tolist(),
+        "pressures": pressures,
         "first": FIRST,
         "least": LEAST,
         "longest": min(LONGEST, float(np.diff(model.increments, prepend=0.0).max())),
