@@ -33,7 +33,7 @@ Run = Callable[[dict[str, str], Read, bool], Any]
 
 #: Most passes at the pressures that the last one's volumes give, and what may be left between the
 #: gas and the deck, over absolute pressure: p V is constant to that.
-PASSES, SETTLED = 4, 1e-4
+PASSES, SETTLED = 4, 3e-4
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run: Run) -> History:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,8 @@ class GasCurve:
 
 def compliance(pressures: Array, volumes: Array) -> float:
     """dV/dp (mm^3/MPa) at the end of inflation, from (n,) MPa and mm^3; n > 1."""
-    return float(np.gradient(volumes, pressures, edge_order=min(2, len(volumes) - 1))[-1])
+    order: Literal[1, 2] = 2 if len(volumes) > 2 else 1
+    return float(np.gradient(volumes, pressures, edge_order=order)[-1])
 
 
 def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
