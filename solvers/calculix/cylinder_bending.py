@@ -19,7 +19,7 @@ from .solids import SolidMesh
 Array = NDArray[np.float64]
 
 #: MPa/mm: 0.2 to 5 change the load by less than 1 % (DESIGN.md, 4a).
-STIFFNESS = 1.0
+STIFFNESS = 5.0
 #: CalculiX' own, and more than enough: the load is a sum over many nodes.
 TOLERANCES = (5e-3, 1e-2)
 #: mm that the support begins inside the cylinder, so that it touches, and that the collar begins
