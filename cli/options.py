@@ -15,9 +15,10 @@ import click
 from ..errors import BubblefitError, InputError, OutputError
 
 if TYPE_CHECKING:
+    from ..projects.bend import BendProject
     from ..projects.fit import FitProject
 
-Project = TypeVar("Project", bound="FitProject")
+Project = TypeVar("Project", bound="FitProject | BendProject")
 INTERRUPTED = 130
 
 

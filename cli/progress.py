@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -33,18 +33,17 @@ def run_progress(solver: Any, steps: int, quiet: bool) -> Iterator[None]:
             solver.progress = None
 
 
-class StudyProgress:
-    """Starts done, best objective, time left; on stderr, so that stdout stays for results."""
+class CountProgress:
+    """Tasks done and a note; on stderr, so that stdout stays for results."""
 
-    def __init__(self, total: int, done: int, quiet: bool, best: float | None = None) -> None:
-        self.total, self.done, self.best = total, done, best
-        self.already, self.analyses = done, 0
+    def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
+        self.what, self.total, self.done, self.already = what, total, done, done
         self.begun = self.said = time.monotonic()
         self.quiet = quiet
         self.bar: Progress | None = None
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
-                TextColumn("starts"),
+                TextColumn(what),
                 BarColumn(),
                 MofNCompleteColumn(),
                 TextColumn("{task.fields[note]}"),
@@ -52,9 +51,9 @@ class StudyProgress:
                 console=Console(stderr=True),
                 transient=True,
             )
-            self.task = self.bar.add_task("starts", total=total, completed=done, note="")
+            self.task = self.bar.add_task(what, total=total, completed=done, note="")
 
-    def __enter__(self) -> StudyProgress:
+    def __enter__(self) -> Self:
         if self.bar is not None:
             self.bar.start()
         return self
@@ -68,6 +67,35 @@ class StudyProgress:
         if self.bar is not None:
             self.bar.stop()
 
+    def show(self) -> None:
+        """On a terminal at once, elsewhere a plain line a minute."""
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done, note=self.note())
+        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            words = f"{self.done} of {self.total} {self.what}, {self.note()}"
+            print(words, file=sys.stderr, flush=True)
+
+    def note(self) -> str:
+        """What to say beside the count."""
+        return self.left()
+
+    def left(self) -> str:
+        """Time left, from the tasks done so far."""
+        fresh = self.done - self.already
+        if not fresh:
+            return "? left"
+        each = (time.monotonic() - self.begun) / fresh
+        return f"{each * (self.total - self.done):.0f} s left"
+
+
+class StudyProgress(CountProgress):
+    """Starts done, best objective, time left."""
+
+    def __init__(self, total: int, done: int, quiet: bool, best: float | None = None) -> None:
+        super().__init__("starts", total, done, quiet)
+        self.best, self.analyses = best, 0
+
     def saw(self, record: EvaluationRecord | StartRecord | None) -> None:
         """Take note of a record, or of time passing."""
         if isinstance(record, EvaluationRecord):
@@ -76,18 +104,28 @@ class StudyProgress:
             self.done += 1
             if record.objective is not None:
                 self.best = min(self.best or record.objective, record.objective)
-        if self.bar is not None:
-            self.bar.update(self.task, completed=self.done, note=self.note())
-        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
-            self.said = time.monotonic()
-            print(f"{self.done} of {self.total} starts, {self.note()}", file=sys.stderr, flush=True)
+        self.show()
 
     def note(self) -> str:
         """Best objective so far, analyses, time left."""
         best = "none yet" if self.best is None else f"{self.best:.3g}"
-        fresh = self.done - self.already
-        left = "?"
-        if fresh:
-            per_start = (time.monotonic() - self.begun) / fresh
-            left = f"{per_start * (self.total - self.done):.0f} s"
-        return f"best e {best}, {self.analyses} analyses, {left} left"
+        return f"best e {best}, {self.analyses} analyses, {self.left()}"
+
+
+class RunsProgress(CountProgress):
+    """Runs done, how the last one ended, time left."""
+
+    def __init__(self, total: int, done: int, quiet: bool) -> None:
+        super().__init__("runs", total, done, quiet)
+        self.last = ""
+
+    def saw(self, words: str | None) -> None:
+        """Take note of a run that ended, in words, or of time passing."""
+        if words is not None:
+            self.done += 1
+            self.last = f"last: {words}; "
+        self.show()
+
+    def note(self) -> str:
+        """How the last run ended, and time left."""
+        return self.last + self.left()

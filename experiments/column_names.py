@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-#: Words that make a column one of elongation, load or time, in English and German exports.
+#: Words that make a column one of these quantities, in English and German exports.
 WORDS = {
     "elongation": frozenset(
         "elongation extension displacement disp crosshead stroke travel position"
@@ -13,6 +13,7 @@ WORDS = {
     ),
     "load": frozenset("load force kraft standardkraft prüfkraft".split()),
     "time": frozenset("time zeit prüfzeit".split()),
+    "deflection": frozenset("deflection displacement durchbiegung weg".split()),
 }
 #: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
 OTHERS = frozenset(
@@ -23,6 +24,7 @@ OTHERS = frozenset(
 LABELS = {
     "specimen": frozenset({"specimen", "specimen id", "specimen label", "sample id"})
     | {"specimen name", "specimen number", "specimen no", "sample name", "probe"},
+    "repetition": frozenset({"repetition", "repeat", "run", "trial", "wiederholung"}),
     "direction": frozenset({"direction", "series", "test direction", "orientation", "richtung"}),
 }
 
@@ -50,7 +52,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def means(name: str, quantity: str) -> bool:
-    """Whether a column holds `quantity`: elongation, load, time, specimen or direction."""
+    """Whether a column holds `quantity`, one of those in `WORDS` and `LABELS`."""
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]

@@ -170,6 +170,48 @@ def stress_update(
 
 
 @compiled()
+def referred_stress(
+    m: float,
+    q: float,
+    c: float,
+    ratio: float,
+    growth: tuple[float, float, float],
+    s: Array,
+    pk2: Array,
+    stiffness: Array,
+    p: Array,
+    law_tangent: Array,
+    pull: Array,
+    work: Array,
+) -> None:
+    """2nd Piola-Kirchhoff stress and d(pk2)/dE of the Cauchy stress s, law_tangent = ds/dh.
+
+    ratio: the stress resultant over s t0; growth (3,): the derivative of its logarithm by h. The
+    rest is as in `membrane_stress`.
+    """
+    t0, t1, t2 = s[0], s[1], s[2]
+    s[0] *= ratio
+    s[1] *= ratio
+    s[2] *= ratio
+    pull_back(m, q, c, s, pk2, pull, stiffness)
+    s[0], s[1], s[2] = t0, t1, t2
+    for i in range(3):
+        for j in range(3):
+            pull[i, j] *= ratio
+    for i in range(3):
+        a0 = law_tangent[i, 0] + s[i] * growth[0]
+        a1 = law_tangent[i, 1] + s[i] * growth[1]
+        a2 = law_tangent[i, 2] + s[i] * growth[2]
+        for j in range(3):
+            work[i, j] = a0 * p[0, j] + a1 * p[1, j] + a2 * p[2, j]
+    for i in range(3):
+        for j in range(3):
+            stiffness[i, j] += (
+                pull[i, 0] * work[0, j] + pull[i, 1] * work[1, j] + pull[i, 2] * work[2, j]
+            )
+
+
+@compiled()
 def membrane_stress(
     m: float,
     q: float,
@@ -201,25 +243,6 @@ def membrane_stress(
     if not stress_update(beta, nu, limits, h, h_old, s_old, s_new, law_tangent, slopes):
         return False
     ratio = math.exp(area_power * (h[0] + h[1]))
-    t0, t1, t2 = s_new[0], s_new[1], s_new[2]
-    s_new[0] *= ratio
-    s_new[1] *= ratio
-    s_new[2] *= ratio
-    pull_back(m, q, c, s_new, pk2, pull, stiffness)
-    s_new[0], s_new[1], s_new[2] = t0, t1, t2
-    for i in range(3):
-        for j in range(3):
-            pull[i, j] *= ratio
-    for i in range(3):
-        grow = area_power * s_new[i]
-        a0 = law_tangent[i, 0] + grow
-        a1 = law_tangent[i, 1] + grow
-        a2 = law_tangent[i, 2]
-        for j in range(3):
-            work[i, j] = a0 * p[0, j] + a1 * p[1, j] + a2 * p[2, j]
-    for i in range(3):
-        for j in range(3):
-            stiffness[i, j] += (
-                pull[i, 0] * work[0, j] + pull[i, 1] * work[1, j] + pull[i, 2] * work[2, j]
-            )
+    growth = (area_power, area_power, 0.0)
+    referred_stress(m, q, c, ratio, growth, s_new, pk2, stiffness, p, law_tangent, pull, work)
     return True

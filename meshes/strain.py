@@ -27,6 +27,29 @@ def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
     return log_strain_of(gradient)
 
 
+def surface_strain(mesh: Mesh, displacement: Array) -> Array:
+    """(quads, 3) log strain (eps1, eps2, gamma12) in the middle of the quads of a curved mesh.
+
+    mesh : with the direction of its `warp` in each quad, which is projected on the quad's tangent
+    plane. displacement : (nodes, 3) mm.
+    """
+    if mesh.warp is None:
+        raise ValueError("surface_strain: the mesh has no direction of the warp in each quad")
+    rest = mesh.points[mesh.quads]
+    tangents = np.einsum("mni,nj->mij", rest, MIDDLE)
+    normal = np.cross(tangents[..., 0], tangents[..., 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = np.einsum("mi,mi->m", mesh.warp, normal)[:, None]
+    warp = mesh.warp - along * normal
+    warp = warp / np.linalg.norm(warp, axis=1, keepdims=True)
+    yarns = np.stack([warp, np.cross(normal, warp)], axis=1)
+    # Slopes along the two yarns, from those along the quad's own two directions.
+    inverse = np.linalg.inv(np.einsum("mki,mij->mkj", yarns, tangents))
+    slopes = np.einsum("nj,mjk->mnk", MIDDLE, inverse)
+    gradient = np.einsum("mni,mnk->mik", rest + displacement[mesh.quads], slopes)
+    return log_strain_of(gradient)
+
+
 def log_strain_of(gradient: Array) -> Array:
     """Log strain (..., 3) of surface gradients (..., 3, 2): eps1, eps2, gamma12.
 

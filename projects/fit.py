@@ -15,11 +15,11 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from .bounds import read_bounds
-from .schema import FORMS, MODULUS_UNITS, CalculixSection, CommonFile, Form
+from .schema import FORMS, MODULUS_UNITS, CalculixSection, CommonFile, Form, Section
 from .schema_errors import first_error
 
 Array = NDArray[np.float64]
-File = TypeVar("File", bound=CommonFile)
+File = TypeVar("File", bound=Section)
 
 #: Most analyses of one start, unless the file says otherwise.
 DEFAULT_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
@@ -120,7 +120,7 @@ def parse(path: Path, kinds: Mapping[str, type[File]]) -> File:
     kind = section.get("kind") if isinstance(section, dict) else None
     if kind is not None and kind not in list(kinds):  # a list: what is not text has no hash
         known = " or ".join(repr(k) for k in kinds)
-        other = kind in ["bubble", "uniaxial", "joint"]
+        other = kind in ["bubble", "uniaxial", "joint", "bend"]
         advice = f"; run `bubblefit {kind}`" if other else ""
         raise InputError(path, "project.kind", f"expected {known}, got {kind!r}{advice}")
     file = kinds.get(kind) if isinstance(kind, str) else None
@@ -165,7 +165,7 @@ def common_settings(
         "tolerance": fit.tolerance,
         "modulus_unit": file.units.modulus,
         "modulus_scale": modulus,
-        "solver_options": {"calculix": _calculix(path, file.solver.calculix)},
+        "solver_options": {"calculix": calculix_options(path, file.solver.calculix)},
     }
 
 
@@ -221,7 +221,7 @@ def _thirds(ends: tuple[float, float, float]) -> Array:
     return np.outer(ends, [1 / 3, 2 / 3])
 
 
-def _calculix(path: Path, section: CalculixSection) -> dict[str, Any]:
+def calculix_options(path: Path, section: CalculixSection) -> dict[str, Any]:
     """Options of CalculixSolver; paths in a project file are beside that file."""
     options = section.model_dump()
     for name in ("templates", "scratch"):

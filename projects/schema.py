@@ -39,7 +39,7 @@ class Section(BaseModel):
 
 
 class ProjectSection(Section):
-    kind: Literal["bubble", "uniaxial", "joint"]
+    kind: Literal["bubble", "uniaxial", "joint", "bend"]
     title: str = ""
 
 

@@ -60,14 +60,17 @@ def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[s
     """Allowed keys of the table that holds `location`."""
     table = file
     for part in location[:-1]:
-        table = _table(table.model_fields[str(part)].annotation)
+        if isinstance(part, str):  # a number counts the tables of a list
+            table = _table(table.model_fields[part].annotation)
     return list(table.model_fields)
 
 
 def _table(annotation: Any) -> type[BaseModel]:
-    """The section class of an annotation such as `PointsSection | None`."""
-    options = getattr(annotation, "__args__", (annotation,))
-    return next(o for o in options if isinstance(o, type) and issubclass(o, BaseModel))
+    """The section class of an annotation such as `PointsSection | None` or `list[CaseSection]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    inside = [a for a in getattr(annotation, "__args__", ()) if a is not type(None)]
+    return _table(inside[0])
 
 
 def _short(value: Any) -> str:

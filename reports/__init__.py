@@ -1,5 +1,14 @@
 """Figures, the HTML report and VTU files."""
 
+from .beam import BeamBodies, plot_beam
+from .bending import (
+    BendLine,
+    BendPanel,
+    BendReadings,
+    plot_bending,
+    plot_bending_cases,
+    plot_gas,
+)
 from .convergence import ConvergencePanel, plot_convergence
 from .html import Report, StartRow, Table, percent, write_report
 from .laws import LawRow, plot_laws
@@ -17,6 +26,10 @@ from .vtu import write_vtu
 
 __all__ = [
     "PUBLISHED_OPTIMA",
+    "BeamBodies",
+    "BendLine",
+    "BendPanel",
+    "BendReadings",
     "ConvergencePanel",
     "LawRow",
     "OrderErrors",
@@ -25,7 +38,11 @@ __all__ = [
     "StripCurves",
     "Table",
     "percent",
+    "plot_beam",
+    "plot_bending",
+    "plot_bending_cases",
     "plot_convergence",
+    "plot_gas",
     "plot_heights",
     "plot_laws",
     "plot_loads",

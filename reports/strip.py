@@ -7,18 +7,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
-from .style import BLACK, GREY, new_figure, quiet, save
+from .style import BLACK, GREY, new_figure, quiet, save, strain_colours
 
 Array = NDArray[np.float64]
 
 #: Height of what is drawn of a grip, as a share of the strip's length.
 GRIP = 0.06
-#: Shear of the other sign below this share is not worth a map with two ends.
-ONE_SIGN = 0.05
 
 
 def plot_strip(
@@ -57,7 +54,7 @@ def plot_strip(
     # As tall as the strip asks for, with room for the colour bar beside and the legend beneath.
     figure = new_figure(3.8, float(np.clip(1.6 + 2.3 * size[1] / size[0], 4.0, 8.5)))
     axes = figure.subplots()
-    colours, norm = _scale(gamma)
+    colours, norm = strain_colours(gamma)
     faces = PolyCollection(now[cells], array=gamma, cmap=colours, norm=norm, edgecolor="face")
     faces.set_linewidth(0.3)
     axes.add_collection(faces)
@@ -78,17 +75,6 @@ def plot_strip(
     axes.grid(False)
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
     return save(figure, path)
-
-
-def _scale(gamma: Array) -> tuple[str, Normalize]:
-    """Dark is large; zero is in the middle where both signs matter, else at one end."""
-    low, high = float(np.nanmin(gamma)), float(np.nanmax(gamma))
-    most = max(abs(low), abs(high)) or 1.0
-    if min(-low, high) > ONE_SIGN * most:
-        return "PuOr", Normalize(-most, most)
-    if high > -low or most == 1.0:
-        return "viridis_r", Normalize(min(low, 0.0), max(high, 0.0) or 1.0)
-    return "viridis", Normalize(low, max(high, 0.0))
 
 
 def _outline(quads: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
@@ -28,6 +29,8 @@ DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 DOTS_PER_INCH = 150
 #: A ratio of values above which a logarithmic axis is easier to read than a linear one.
 DECADE = 10.0
+#: Strain of the other sign below this share is not worth a map with two ends.
+ONE_SIGN = 0.05
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -89,6 +92,17 @@ def legend_above(figure: Figure, entries: Mapping[str, Any], columns: int) -> No
 def pressure_colours(count: int) -> list[Any]:
     """Light to dark with rising pressure; none so light that it fades on paper."""
     return [colormaps["viridis_r"](t) for t in np.linspace(0.12, 1.0, count)]
+
+
+def strain_colours(strain: ArrayLike) -> tuple[str, Normalize]:
+    """Dark is large; zero is in the middle where both signs matter, else at one end."""
+    low, high = float(np.nanmin(strain)), float(np.nanmax(strain))
+    most = max(abs(low), abs(high)) or 1.0
+    if min(-low, high) > ONE_SIGN * most:
+        return "PuOr", Normalize(-most, most)
+    if high > -low or most == 1.0:
+        return "viridis_r", Normalize(min(low, 0.0), max(high, 0.0) or 1.0)
+    return "viridis", Normalize(low, max(high, 0.0))
 
 
 def save(figure: Figure, path: Path | str) -> Path:

@@ -131,7 +131,7 @@ def common_result(
         "external_runs": sum(r.external_runs for r in records),
         "warnings": _warnings(project, problem, found),
         "wall_s": wall_s,
-        "versions": _versions(),
+        "versions": versions(),
     }
     if project.breaks is not None:
         result["breaks"] = dict(zip(STRAINS, project.breaks.tolist(), strict=True))
@@ -163,7 +163,8 @@ def _warnings(project: FitProject, problem: FitProblem, found: BestFit) -> list[
     return words
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of what computes, by name."""
     found = {name: importlib.metadata.version(name) for name in PACKAGES}
     return {"bubblefit": __version__, "python": platform.python_version(), **found}
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,18 +20,36 @@ from ..solvers.registry import solver_named
 SURROGATE = "membrane"
 
 
-def project_solver(project: FitProject) -> Solver:
+class Settings(Protocol):
+    """The part of a project that says what runs it."""
+
+    @property
+    def path(self) -> Path:
+        """The project's file."""
+
+    @property
+    def solver(self) -> str:
+        """The solver's name."""
+
+    @property
+    def solver_options(self) -> Mapping[str, Mapping[str, Any]]:
+        """By name of a solver, what its constructor is given."""
+
+
+def project_solver(project: Settings, key: str = "fit.solver") -> Solver:
     """A new solver, as the project file or the command line names it, with its options.
+
+    key : where the file names it.
 
     Raises
     ------
     InputError : there is no such solver (says in which file), or an option is wrong.
     SolverFailure : it is not installed, or does not carry the law.
     """
-    return project_solvers(project, 1)[0]
+    return project_solvers(project, 1, key)[0]
 
 
-def project_solvers(project: FitProject, count: int) -> list[Solver]:
+def project_solvers(project: Settings, count: int, key: str = "fit.solver") -> list[Solver]:
     """`count` of them, so that each can keep what it prepares for its model; checked once."""
     name = project.solver
     try:
@@ -37,7 +57,7 @@ def project_solvers(project: FitProject, count: int) -> list[Solver]:
     except InputError as error:
         if error.field != "solver":
             raise
-        raise InputError(project.path, "fit.solver (or --solver)", error.problem) from None
+        raise InputError(project.path, f"{key} (or --solver)", error.problem) from None
     # Once here, in one line, rather than as the failure of every analysis.
     if solvers and solvers[0].external:
         found = solvers[0].check()

@@ -88,6 +88,8 @@ def test_bodies_are_brought_to_touch() -> None:
     ring = brought_to_touch(RING, points, way, 0.0)
     assert post.centre == pytest.approx((0.0, -RADIUS - 50.0 + 0.02, 400.0), abs=1e-6)
     assert ring.centre == pytest.approx((0.0, RADIUS - 120.0, 0.0), abs=1e-6)
+    with pytest.raises(InputError, match="no node of the mesh lies where 'support' could touch"):
+        brought_to_touch(replace(POST, centre=(0.0, 0.0, 900.0)), points, -way, 0.02)
 
 
 def test_collar_and_supports_balance(bent: tuple[InflatedModel, History]) -> None:

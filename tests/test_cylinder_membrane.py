@@ -14,6 +14,8 @@ from bubblefit.models.cylinder import CylinderModel
 from bubblefit.models.gas import Gas
 from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.factorisation import BandedTangent, tangent_for
+from bubblefit.solvers.membrane.ordering import swept
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 # Thesis Table 4.2, "solution", GPa.
@@ -122,3 +124,26 @@ def test_a_first_step_without_equilibrium_is_a_failure(quarter) -> None:
     model = replace(quarter[0], deflections=[900.0], increments=())
     with pytest.raises(SolverFailure, match="no frame of the bending"):
         bend(model)
+
+
+def test_unknowns_are_ordered_ring_by_ring() -> None:
+    """The band is a ring and a node wide; Cuthill and McKee from one node need two rings."""
+    mesh = thesis_case().mesh
+    ring = len(mesh.node_sets["mid_span"])
+    widths = []
+    for order in swept(mesh.quads, mesh.points):
+        np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.points)))
+        rank = np.argsort(order)[mesh.quads]
+        widths.append(int(np.ptp(rank, axis=1).max()))
+    assert min(widths) <= ring + 1
+    tangent = tangent_for(mesh.quads, mesh.points.size, np.arange(mesh.points.size), mesh.points)
+    assert isinstance(tangent, BandedTangent)
+    assert tangent.width == 3 * min(widths) + 2
+
+
+def test_a_surface_in_two_pieces_is_ordered_too() -> None:
+    mesh = thesis_case().mesh
+    both = np.concatenate([mesh.points, 0.5 * mesh.points])
+    quads = np.concatenate([mesh.quads, mesh.quads + len(mesh.points)])
+    for order in swept(quads, both):
+        np.testing.assert_array_equal(np.sort(order), np.arange(len(both)))

@@ -26,12 +26,13 @@ def analyse(
     inflated: Array,
     pressure: float,
     extremes: tuple[Array, Array],
+    wall: NDArray[np.bool_],
 ) -> History:
     """Frames of the bending: first the inflated state, then one for every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
-    all bodies on it. Where no equilibrium is found on the way, the history ends with the last
-    good frame and says so.
+    all bodies on it, `wrinkled` a share of `wall` (elements,). Where no equilibrium is found on
+    the way, the history ends with the last good frame and says so.
 
     Raises
     ------
@@ -54,8 +55,9 @@ def analyse(
 
     low, high = (extreme.copy() for extreme in extremes)
     path, moves = [inflated], [0.0]
+    wrinkle = membrane.wrinkle.copy()
     gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
-    deepest = 0.0
+    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(wall)], 0.0, 0.0
     for wanted in plan.displacements:
         start = path[-1]
         if len(path) > 2:
@@ -66,11 +68,15 @@ def analyse(
             between = f"between {moves[-1]:.4g} and {wanted:.4g} mm of deflection"
             remarks.append(f"the run stopped early: no equilibrium {between}")
             break
+        work = membrane.wrinkle_work(wrinkle)
+        wrinkle = membrane.wrinkle.copy()
         membrane.accept()
         path.append(found)
         moves.append(wanted)
         gas.append((membrane.pressure, membrane.volume))
         pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
+        wrinkled.append(membrane.wrinkled_share(wall))
+        of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
         now = membrane.reference + found
         deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
         np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
@@ -82,6 +88,12 @@ def analyse(
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
     remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
+    most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
+    if membrane.wrinkle_stiffness is not None and most > 0:
+        remarks.append(
+            f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
+            f"fabric's) carries {100 * of_wrinkles / most:.2g} % of the largest load"
+        )
     # What is normal to a symmetry plane is taken up by the other half.
     force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
     reactions: dict[str, Array] = {}
@@ -97,6 +109,7 @@ def analyse(
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations,
         path=np.array(path),
+        wrinkled=np.array(wrinkled)[frames] if membrane.wrinkle_stiffness is not None else None,
         remarks=tuple(remarks),
     )
 

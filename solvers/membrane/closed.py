@@ -13,7 +13,7 @@ from ...models.inflated import RigidCylinder
 from .cavity import Cavity
 from .contact import contact_forces
 from .factorisation import Tangent
-from .newton import Membrane
+from .newton import Membrane, initial_moduli
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,35 @@ class ClosedMembrane(Membrane):
             self.contact.append(push)
             if with_tangent:
                 self._add(self.node_slot[touched], stiffness)
+
+    def wrinkled_share(self, wall: NDArray[np.bool_]) -> float:
+        """Share of the reference surface of `wall` (elements,) without stress in one direction."""
+        area = self.elements.area[wall]
+        folded = (self.wrinkle[wall] != 0.0).any(axis=2)
+        return float(area[folded].sum() / area.sum())
+
+    def wrinkle_work(self, wrinkle: Array) -> float:
+        """Work (N mm, of the meshed part) done on what stiffness is left to the wrinkles.
+
+        From the last `accept` (before the next one), where they were `wrinkle` (elements, 4, 3),
+        to the last evaluation.
+        """
+        if not self.wrinkle_stiffness:
+            return 0.0
+        e1, e2, g12 = initial_moduli(self.law)
+        nu = self.law.nu12
+        whole = 1.0 / (1.0 - nu**2 * e2 / e1)
+        stiffness = self.wrinkle_stiffness * np.array(
+            [
+                [e1 * whole, nu * e2 * whole, 0.0],
+                [nu * e2 * whole, e2 * whole, 0.0],
+                [0.0, 0.0, g12],
+            ]
+        )
+        stress = -0.5 * np.einsum("ij,mpj->mpi", stiffness, self.wrinkle + wrinkle)
+        change = self.strain_new - self.wrinkle - (self.strain_old - wrinkle)
+        weight = self.elements.area * self.section[:, None]
+        return float(np.einsum("mp,mpi,mpi", weight, stress, change))
 
     def _add(self, slot: NDArray[np.int64], entries: Array) -> None:
         slot, entries = np.broadcast_arrays(slot, entries)

@@ -7,9 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...models.inflated import RigidCylinder
 
 Array = NDArray[np.float64]
+
+#: mm to which the first touch is found, and places looked at at once on the way to it.
+TOUCH, WAYS = 1e-9, 500
 
 
 def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
@@ -60,27 +64,34 @@ def contact_forces(
 def brought_to_touch(
     body: RigidCylinder, position: Array, direction: Array, bite: float
 ) -> RigidCylinder:
-    """The body moved along `direction` until it is `bite` (mm) into the surface."""
-    centre = np.asarray(body.centre, dtype=float)
+    """The body moved along `direction` until it is `bite` (mm) into the surface.
 
-    def moved(way: float) -> RigidCylinder:
-        return replace(body, centre=tuple((centre + way * direction).tolist()))
-
+    Raises
+    ------
+    InputError : no node lies on its way.
+    """
+    centre, axis = np.asarray(body.centre, dtype=float), np.asarray(body.axis, dtype=float)
     arm = position - centre
-    reach = float(np.ptp(position, axis=0).max()) + 2 * body.radius
-    # The first touch from outside is the one wanted; a ring starts around the membrane's middle.
-    start = -reach
     if body.ring:
-        heights = arm[np.abs(arm @ np.asarray(body.axis)) < 0.5 * body.length] @ direction
-        start = 0.5 * float(heights.min() + heights.max())
-    ways = np.linspace(start, reach, 2001)
-    least = np.array([gaps(moved(w), position)[0].min() for w in ways])
-    first = int(np.argmax(least < -bite))
-    low, high = ways[max(first - 1, 0)], ways[first]
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        if gaps(moved(middle), position)[0].min() < -bite:
-            high = middle
-        else:
-            low = middle
-    return moved(float(low))
+        near = np.abs(arm @ axis) < 0.5 * body.length
+    else:
+        near = np.abs(arm @ np.cross(axis, direction)) < body.radius
+    if not near.any():
+        problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
+        raise InputError(None, "mesh", problem)
+    nodes, heights = position[near], arm[near] @ direction
+    low, high = float(heights.min()) - 2 * body.radius, float(heights.max()) + 2 * body.radius
+    # The first touch from outside is the one wanted; a ring starts around the membrane's middle.
+    if body.ring:
+        low = 0.5 * float(heights.min() + heights.max())
+
+    def least(ways: Array) -> Array:
+        """Smallest gap with the body moved by each of them: the nodes move the other way."""
+        shifted = nodes - ways[:, None, None] * direction
+        return gaps(body, shifted.reshape(-1, 3))[0].reshape(len(ways), -1).min(axis=1)
+
+    while high - low > TOUCH:
+        ways = np.linspace(low, high, WAYS)
+        first = int(np.argmax(least(ways) < -bite))
+        low, high = float(ways[max(first - 1, 0)]), float(ways[first])
+    return replace(body, centre=tuple((centre + low * direction).tolist()))

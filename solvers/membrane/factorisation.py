@@ -17,6 +17,8 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
+from .ordering import swept
+
 Array = NDArray[np.float64]
 # Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
 LARGEST_BAND = 2_000_000
@@ -42,8 +44,13 @@ class Tangent(Protocol):
         """Solve for free degrees of freedom, rhs (free,) or (free, k)."""
 
 
-def tangent_for(quads: NDArray[np.intp], size: int, free: NDArray[np.intp]) -> Tangent:
-    """Storage for the tangent of `quads` restricted to the `free` of `size` unknowns."""
+def tangent_for(
+    quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
+) -> Tangent:
+    """Storage for the tangent of `quads` restricted to the `free` of `size` unknowns.
+
+    points : (n, 3) mm, of a long surface: it may be ordered along its length.
+    """
     dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
     place = np.full(size, -1, dtype=np.int64)
     place[free] = np.arange(len(free))
@@ -53,10 +60,13 @@ def tangent_for(quads: NDArray[np.intp], size: int, free: NDArray[np.intp]) -> T
     pattern = sp.csr_matrix(
         (np.ones(int(inside.sum())), (rows[inside], columns[inside])), shape=(len(free),) * 2
     )
-    order = reverse_cuthill_mckee(pattern, symmetric_mode=True)
-    rank = np.empty(len(free), dtype=np.int64)
-    rank[order] = np.arange(len(free))
-    width = int(np.abs(rank[rows[inside]] - rank[columns[inside]]).max())
+    orders = [reverse_cuthill_mckee(pattern, symmetric_mode=True)]
+    for nodes in [] if points is None else swept(quads, points):
+        unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
+        orders.append(unknowns[unknowns >= 0])
+    ranks = [np.argsort(order) for order in orders]
+    widths = [int(np.abs(rank[rows[inside]] - rank[columns[inside]]).max()) for rank in ranks]
+    width, rank = min(widths), ranks[int(np.argmin(widths))]
     if (3 * width + 1) * len(free) <= LARGEST_BAND:
         return BandedTangent(rank, rows, columns, inside, width)
     return SparseTangent(rows, columns, inside, len(free))

@@ -27,13 +27,19 @@ MOST_CUTS = 8
 MOST_GROWTH = 0.1
 
 
-def prepare(model: InflatedModel, law: HypoelasticLaw, tolerance: float) -> ClosedMembrane:
+def prepare(
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wrinkle_stiffness: float | None
+) -> ClosedMembrane:
     """What does not change from one law to the next."""
-    return closed_membrane(model, law, tolerance, model.fixed())
+    return closed_membrane(model, law, tolerance, model.fixed(), wrinkle_stiffness)
 
 
 def closed_membrane(
-    model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp]
+    model: InflatedModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    fixed: NDArray[np.intp],
+    wrinkle_stiffness: float | None = None,
 ) -> ClosedMembrane:
     """The membrane of a model with these unknowns held."""
     points = np.array(model.mesh.points, dtype=float)
@@ -48,10 +54,11 @@ def closed_membrane(
         np.asarray(model.thickness, dtype=float),
         law,
         free,
-        BorderedTangent(tangent_for(quads, points.size, free)),
+        BorderedTangent(tangent_for(quads, points.size, free, points)),
         tolerance,
         # A slack step much larger than a facet folds the mesh.
         step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
+        wrinkle_stiffness=wrinkle_stiffness,
         cavity=closed_cavity(points, quads, fixed),
     )
 
@@ -78,9 +85,10 @@ def analyse(
         )
     levels, shape = np.array(model.pressures), membrane.reference.shape
     path, forces = (np.zeros((len(levels), *shape)) for _ in range(2))
-    volume = np.zeros(len(levels))
+    volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
     low, high = np.zeros(3), np.zeros(3)
     remarks: list[str] = []
+    wall = outside_caps(model)
     membrane.keep_tangent = False
     for i in range(len(levels)):
         path[i], snapped = _increment(membrane, path[:i], levels, i)
@@ -91,13 +99,18 @@ def analyse(
             )
         membrane.accept()
         forces[i], volume[i] = membrane.residual.reshape(shape), membrane.volume
+        wrinkled[i] = membrane.wrinkled_share(wall)
         np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
         np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
     if model.bending is not None:
-        bent = closed_membrane(model, membrane.law, membrane.tolerance, model.fixed(bent=True))
+        bent = closed_membrane(
+            model, membrane.law, membrane.tolerance, model.fixed(bent=True),
+            membrane.wrinkle_stiffness,
+        )  # fmt: skip
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
+        bent.wrinkle[:] = membrane.wrinkle
         bent.iterations = membrane.iterations
-        history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high))
+        history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high), wall)
         history = replace(history, remarks=(*remarks, *history.remarks))
     else:
         reactions = {
@@ -113,9 +126,17 @@ def analyse(
             cavity_volume=model.copies * volume,
             iterations=membrane.iterations,
             path=path,
+            wrinkled=wrinkled if membrane.wrinkle_stiffness is not None else None,
             remarks=tuple(remarks),
         )
     return history, np.zeros((*history.displacement.shape, 0))
+
+
+def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
+    """(elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
+    wall = np.ones(len(model.mesh.quads), dtype=bool)
+    wall[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
+    return wall
 
 
 def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> tuple[Array, bool]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...caching import compiled
 from ...materials.point_law import FAST, SLOPES, membrane_stress
+from ...materials.relaxation import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
 
@@ -42,12 +43,16 @@ def metric(f):  # type: ignore[no-untyped-def]
 def assemble(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure,
     beta, nu, limits, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
+    share, wrinkle,
 ):  # fmt: skip
     """Internal minus pressure forces at `position`, and the tangent.
 
     position (n, 3) mm; thickness (elements,) mm; h_*, s_* (elements, 4, 3) log strain and stress
     before (old) and at this position (new, written); slot (elements, 144) place of each element
-    entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written.
+    entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written;
+    share : of the stiffness, left to wrinkles; below 0 the membrane does not wrinkle, otherwise
+    strain and stress are those of the fabric and wrinkle (elements, 4, 3), its strain less that
+    of the surface, is written (see materials/relaxation.py).
 
     Returns the largest nodal pressure force of an element (N), or -1 when a point has no valid
     stress.
@@ -57,7 +62,7 @@ def assemble(  # type: ignore[no-untyped-def]
         data[:] = 0.0
     p, law = np.empty((3, 3)), np.empty((3, 3))
     pull, work, stiff = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    pk2, steep = np.empty(3), np.empty(SLOPES)
+    pk2, steep, total = np.empty(3), np.empty(SLOPES), np.empty(3)
     x, f = np.empty((4, 3)), np.empty((2, 3))
     left = np.empty((3, 12))  # rows: a_m K00 + d_m K01
     right = np.empty((3, 12))
@@ -77,7 +82,15 @@ def assemble(  # type: ignore[no-untyped-def]
             dn = slopes[e, g]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
-            if not membrane_stress(
+            if share >= 0.0:
+                if relaxed_membrane_stress(
+                    m, q, c, beta, nu, limits, power, share, h_old[e, g], s_old[e, g], total,
+                    h_new[e, g], s_new[e, g], pk2, stiff, p, law, steep, pull, work,
+                ) < 0:  # fmt: skip
+                    return -1.0
+                for k in range(3):
+                    wrinkle[e, g, k] = h_new[e, g, k] - total[k]
+            elif not membrane_stress(
                 m, q, c, beta, nu, limits, power, h_old[e, g], s_old[e, g], h_new[e, g],
                 s_new[e, g], pk2, stiff, p, law, steep, pull, work,
             ):  # fmt: skip

@@ -38,6 +38,9 @@ class Membrane:
     strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal correction of one
     iteration; keep_tangent: end every increment with the tangent of its
     equilibrium assembled (sensitivities want it; in a chord step it costs little more).
+    wrinkle_stiffness: share of the stiffness left to wrinkles; None: the membrane carries
+    compression as it carries tension. wrinkle (elements, 4, 3): strain of the fabric less that of
+    the surface at the last evaluation.
     """
 
     reference: Array
@@ -51,6 +54,8 @@ class Membrane:
     step_limit: float
     keep_tangent: bool = False
     iterations: int = 0
+    wrinkle_stiffness: float | None = None
+    wrinkle: Array = field(init=False)
     section: Array = field(init=False)
     strain_old: Array = field(init=False)
     stress_old: Array = field(init=False)
@@ -63,6 +68,7 @@ class Membrane:
         self.section = np.array(np.broadcast_to(self.thickness, len(self.quads)), dtype=float)
         self.strain_old, self.stress_old = np.zeros(shape), np.zeros(shape)
         self.strain_new, self.stress_new = np.zeros(shape), np.zeros(shape)
+        self.wrinkle = np.zeros(shape)
         self.residual = np.zeros(3 * len(self.reference))
 
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
@@ -73,6 +79,7 @@ class Membrane:
             law.beta, law.nu12, law.limits, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
+            -1.0 if self.wrinkle_stiffness is None else self.wrinkle_stiffness, self.wrinkle,
         )  # fmt: skip
         self.iterations += 1
         if force < 0:

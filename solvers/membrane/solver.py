@@ -37,13 +37,16 @@ class MembraneSolver:
     ----------
     tolerance : largest residual force over the largest nodal pressure force (a strip: over the
         largest reaction of a node).
+    wrinkle_stiffness : share of its stiffness that a closed membrane keeps across its wrinkles
+        (tension field, materials/relaxation.py); None: it carries compression as it carries
+        tension, as bubbles and strips do.
     """
 
     name = "membrane"
     external = False
 
-    def __init__(self, tolerance: float = 1e-8) -> None:
-        self.tolerance = tolerance
+    def __init__(self, tolerance: float = 1e-8, wrinkle_stiffness: float | None = 0.001) -> None:
+        self.tolerance, self.wrinkle_stiffness = tolerance, wrinkle_stiffness
         self._prepared: tuple[Model, Membrane] | None = None
 
     def check(self) -> SolverCheck:
@@ -115,10 +118,9 @@ class MembraneSolver:
             membrane: Membrane
             if isinstance(model, UniaxialModel):
                 membrane = strip.prepare(model, law, self.tolerance)
-            elif isinstance(model, CylinderModel):
-                membrane = inflated.prepare(closed_membrane_of(model), law, self.tolerance)
-            elif isinstance(model, InflatedModel):
-                membrane = inflated.prepare(model, law, self.tolerance)
+            elif isinstance(model, CylinderModel | InflatedModel):
+                closed = closed_membrane_of(model) if isinstance(model, CylinderModel) else model
+                membrane = inflated.prepare(closed, law, self.tolerance, self.wrinkle_stiffness)
             else:
                 membrane = bubble.prepare(model, law, self.tolerance)
             self._prepared = (model, membrane)

@@ -1,0 +1,202 @@
+"""Load over deflection of bent cylinders (Figs 6.12 to 6.20) and their gas (Fig. 6.11)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
+
+from .style import BLACK, GREY, legend_above, named_look, new_figure, quiet, save
+
+Point = tuple[float, float]
+
+DOTS: dict[str, Any] = {
+    "color": GREY, "marker": "o", "markersize": 3.6, "linestyle": "", "alpha": 0.85,
+}  # fmt: skip
+BAND = "#E0E0E0"
+MEAN: dict[str, Any] = {"color": "#777777", "linewidth": 4.0, "alpha": 0.45}
+KNEE: dict[str, Any] = {"marker": "D", "markersize": 5.5, "markerfacecolor": "white"}
+LIMIT: dict[str, Any] = {"marker": "^", "markersize": 7.0, "markerfacecolor": "white"}
+MM3_PER_LITRE = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class BendLine:
+    """The curve of one card.
+
+    Parameters
+    ----------
+    name : of the card. rank : of its colour, the same in every figure.
+    deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3.
+    knee, limit : where they are, mm and N.
+    rms : N, against what was measured.
+    """
+
+    name: str
+    rank: int
+    deflection: ArrayLike
+    load: ArrayLike
+    pressure: ArrayLike = ()
+    volume: ArrayLike = ()
+    knee: Point | None = None
+    limit: Point | None = None
+    rms: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BendReadings:
+    """What was measured: every repetition's readings, their mean and scatter on one grid (k,)."""
+
+    readings: Sequence[tuple[ArrayLike, ArrayLike]]
+    deflection: ArrayLike
+    mean: ArrayLike
+    deviation: ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class BendPanel:
+    """One case: what it is called, a curve a card, and what was measured."""
+
+    title: str
+    lines: Sequence[BendLine] = ()
+    measured: BendReadings | None = None
+
+
+def plot_bending(path: Path | str, panel: BendPanel) -> Path:
+    """Draw one case; beneath it, where there are readings, what the cards miss.
+
+    Raises
+    ------
+    OutputError : the file cannot be written.
+    """
+    rows = 2 if panel.measured is not None else 1
+    figure = new_figure(7.6, 4.9 if rows == 1 else 6.4)
+    ratios = [2.3, 1.0][:rows]
+    panels = figure.subplots(rows, 1, squeeze=False, sharex=True, height_ratios=ratios)[:, 0]
+    _loads(panels[0], panel)
+    along = "deflection of the collar, mm"
+    quiet(panels[0], along if rows == 1 else "", "load, N", panel.title)
+    if panel.measured is not None:
+        panels[0].tick_params(labelbottom=False)
+        _misses(panels[1], panel)
+        quiet(panels[1], along, "model $-$ mean, N")
+    legend_above(figure, _entries([panel]), 3)
+    return save(figure, path)
+
+
+def plot_bending_cases(path: Path | str, panels: Sequence[BendPanel], columns: int) -> Path:
+    """Draw all cases small, the same loads in a row; panels without a title are left free.
+
+    Parameters
+    ----------
+    panels : row by row, `columns` in each.
+
+    Raises
+    ------
+    ValueError : no panels. OutputError : the file cannot be written.
+    """
+    if not panels:
+        raise ValueError("plot_bending_cases: no cases to draw")
+    rows = ceil(len(panels) / columns)
+    figure = new_figure(1.0 + 3.4 * columns, 1.0 + 2.5 * rows)
+    drawn = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey="row")
+    for place, axes in enumerate(drawn.ravel()):
+        column = place % columns
+        panel = panels[place] if place < len(panels) else BendPanel("")
+        if not panel.title:
+            axes.set_axis_off()
+            continue
+        _loads(axes, panel)
+        below = place + columns >= len(panels) or not panels[place + columns].title
+        axes.tick_params(labelbottom=below)
+        x = "deflection, mm" if below else ""
+        quiet(axes, x, "load, N" if column == 0 else "", panel.title)
+    legend_above(figure, _entries(panels), 2 * columns)
+    return save(figure, path)
+
+
+def plot_gas(path: Path | str, panel: BendPanel) -> Path:
+    """Draw gauge pressure against change of volume (as Fig. 6.11) and against deflection.
+
+    Raises
+    ------
+    OutputError : the file cannot be written.
+    """
+    figure = new_figure(9.6, 4.3)
+    left, right = figure.subplots(1, 2, sharey=True)
+    entries: dict[str, Any] = {}
+    for line in panel.lines:
+        pressure = 1e3 * np.asarray(line.pressure, dtype=float)
+        volume = np.asarray(line.volume, dtype=float) / MM3_PER_LITRE
+        name = f"{line.name}, from {volume[0]:.4g} litres"
+        volume = volume - volume[0]
+        look = {"linewidth": 1.6, **named_look(line.rank)}
+        left.plot(volume, pressure, **look)
+        entries[name] = Line2D([], [], **look)
+        right.plot(np.asarray(line.deflection, dtype=float), pressure, **look)
+    right.set_xlim(left=0.0)
+    quiet(left, "volume less that when inflated, litres", "gauge pressure, kPa", panel.title)
+    quiet(right, "deflection of the collar, mm", "")
+    legend_above(figure, entries, 3)
+    return save(figure, path)
+
+
+def _loads(axes: Axes, panel: BendPanel) -> None:
+    if panel.measured is not None:
+        seen = panel.measured
+        grid, mean = np.asarray(seen.deflection, float), np.asarray(seen.mean, float)
+        spread = np.asarray(seen.deviation, float)
+        axes.fill_between(grid, mean - spread, mean + spread, color=BAND, linewidth=0, zorder=0)
+        axes.plot(grid, mean, zorder=1, **MEAN)
+        for reading in seen.readings:
+            axes.plot(*reading, zorder=2, **DOTS)
+    drawn = []
+    for line in panel.lines:
+        look = named_look(line.rank)
+        drawn.append(axes.plot(line.deflection, line.load, linewidth=1.6, **look)[0])
+        for point, marker in ((line.knee, KNEE), (line.limit, LIMIT)):
+            if point is not None:
+                axes.plot(*point, color=look["color"], linestyle="", zorder=6, **marker)
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    known = [(h, x.rms) for h, x in zip(drawn, panel.lines, strict=True) if x.rms is not None]
+    if known:
+        axes.legend(
+            [handle for handle, _ in known], [f"{rms:.3g} N" for _, rms in known],
+            title="RMS error", title_fontsize=9, fontsize=9, framealpha=0.85, edgecolor="none",
+        )  # fmt: skip
+
+
+def _misses(axes: Axes, panel: BendPanel) -> None:
+    seen = panel.measured
+    assert seen is not None
+    grid, mean = np.asarray(seen.deflection, float), np.asarray(seen.mean, float)
+    spread = np.asarray(seen.deviation, float)
+    axes.fill_between(grid, -spread, spread, color=BAND, linewidth=0, zorder=0)
+    axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1)
+    for line in panel.lines:
+        x, y = np.asarray(line.deflection, float), np.asarray(line.load, float)
+        there = np.interp(grid, x, y, left=np.nan, right=np.nan) - mean
+        axes.plot(grid, there, linewidth=1.6, **named_look(line.rank))
+
+
+def _entries(panels: Sequence[BendPanel]) -> dict[str, Any]:
+    entries: dict[str, Any] = {}
+    for line in sorted((x for p in panels for x in p.lines), key=lambda x: x.rank):
+        entries[line.name] = Line2D([], [], linewidth=1.6, **named_look(line.rank))
+    if any(p.measured for p in panels):
+        entries["measured"] = Line2D([], [], **DOTS)
+        entries["mean"] = Line2D([], [], **MEAN)
+        entries["scatter of repetitions (±)"] = Patch(color=BAND)
+    for name, kind, marker in (("knee", "knee", KNEE), ("limit point", "limit", LIMIT)):
+        if any(getattr(x, kind) is not None for p in panels for x in p.lines):
+            entries[name] = Line2D([], [], color=BLACK, linestyle="", **marker)
+    return entries
