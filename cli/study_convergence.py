@@ -45,7 +45,7 @@ def result_of(study: Study, what: What, runs: Runs) -> dict[str, Any]:
     return {
         "command": "study mesh",
         "project": str(study.project.path),
-        "card": str(study.card_path),
+        "card": study.card_path,
         "solver": study.solver.name,
         "refined": what,
         "models": {name: _model(several, noise(study.solver)) for name, several in runs.items()},
@@ -76,8 +76,10 @@ def _model(runs: Sequence[LevelRun], accuracy: float) -> dict[str, Any]:
     sizes = [run.level.size for run in good]
     own = next((run for run in good if run.level.factor == 1), None)
     for name, finest in _values(good[-1]).items():
-        seen = [_values(run)[name] for run in good]
-        study = convergence(sizes, seen, accuracy)
+        # A run that stopped early has no loads from there on.
+        having = [run for run in good if name in _values(run)]
+        seen = [_values(run)[name] for run in having]
+        study = convergence([run.level.size for run in having], seen, accuracy)
         best = finest if study.limit is None else study.limit
         found["quantities"][name] = {
             "finest": finest,
@@ -85,7 +87,7 @@ def _model(runs: Sequence[LevelRun], accuracy: float) -> dict[str, Any]:
             "order_one_coarser": study.previous,
             "limit": study.limit,
             "remark": study.remark,
-            "own_error": None if own is None else _values(own)[name] / best - 1.0,
+            "own_error": None if own not in having else _values(own)[name] / best - 1.0,
             "own_error_against": "finest" if study.limit is None else "limit",
         }
     changes = rms_changes(runs)
@@ -115,6 +117,9 @@ def rows(runs: Runs, what: What) -> list[list[object]]:
                 level.size, run.seconds, run.iterations,
             ]  # fmt: skip
             for quantity, value in _values(run).items():
+                if quantity not in finest:
+                    table.append([*start, quantity, value, "", ""])
+                    continue
                 off = value - finest[quantity]
                 table.append([*start, quantity, value, off, 100 * off / finest[quantity]])
             if run in good and good.index(run) < len(changes):
@@ -131,7 +136,7 @@ def panels(runs: Runs) -> list[ConvergencePanel]:
         good = ended(several)
         changes: dict[str, list[float]] = {}
         for quantity, last in (_values(good[-1]) if good else {}).items():
-            seen = np.array([_values(run)[quantity] for run in good])
+            seen = np.array([_values(run).get(quantity, np.nan) for run in good])
             changes[quantity] = (100 * np.abs(np.diff(seen) / last)).tolist()
         rms = rms_changes(several)
         if rms:

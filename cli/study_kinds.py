@@ -6,7 +6,7 @@ Another kind of problem is another entry of `KINDS`.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,11 +15,15 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import InputError
+from ..materials.card import MaterialCard, read_card
 from ..models.bubble import BubbleModel
+from ..projects.bend import BendProject, read_bend
 from ..projects.bubble import BubbleProject, read_project
 from ..projects.fit import FitProject
 from ..projects.uniaxial import UniaxialProject, read_uniaxial
 from ..solvers.base import History
+from ..studies.bend_convergence import deflection_curve, loads, quantities, refined_cylinder
+from ..studies.bend_setup import KEY, chosen
 from ..studies.bubble_setup import bubble_model
 from ..studies.poisson import PUBLISHED_SPREAD
 from ..studies.refinement import Curve, Level, edge_length
@@ -29,25 +33,35 @@ What = Literal["elements", "increments"]
 Values = Mapping[str, float]
 
 
+def _no_cases(project: FitProject, cases: Sequence[str], card: str) -> tuple[Any, MaterialCard]:
+    if cases:
+        raise InputError(project.path, "--case", "only a project of bending has cases")
+    return project, read_card(Path(card))
+
+
 @dataclass(frozen=True)
 class StudyKind:
     """How a kind of project is studied.
 
-    read : the project, with the folder of its data, which need not be there. models : by name,
-    with elements (edges) or increments divided by a factor; steps : the load levels of a model.
+    read : the project, with the folder of its data, which need not be there; solver_key : where
+    its file names the solver. pick : the project with the chosen cases only, and a card by its
+    file, or by its name where the project has cards. models : by name, with elements (edges) or
+    increments divided by a factor, and the card's thickness; steps : the load levels of a model.
     quantities : of interest in a mesh study; curve : along which levels are compared, (x, y).
     responses : of a study of nu12; response : what they are; published : within which part of the
     base they stayed in the thesis, where it says.
     """
 
     read: Callable[[Path, Path | None], Any]
-    models: Callable[[Any, What, float], Mapping[str, Any]]
+    models: Callable[[Any, What, float, float], Mapping[str, Any]]
     steps: Callable[[Any], Any]
     quantities: Callable[[Any, History], Values]
     responses: Callable[[Any, History], Values]
     response: str
     published: float | None = None
     curve: Callable[[Any, History], Curve] | None = None
+    pick: Callable[[Any, Sequence[str], str], tuple[Any, MaterialCard]] = _no_cases
+    solver_key: str = "fit.solver"
 
 
 def study_kind(path: Path) -> StudyKind:
@@ -69,7 +83,7 @@ def study_kind(path: Path) -> StudyKind:
 
 
 def levels(
-    kind: StudyKind, project: FitProject, what: What, factor: float, thickness: float
+    kind: StudyKind, project: Any, what: What, factor: float, thickness: float
 ) -> dict[str, Level]:
     """One refinement of every model of a project, with the thickness (mm) of a card.
 
@@ -78,7 +92,7 @@ def levels(
     InputError : a mesh or increments that cannot be had.
     """
     try:
-        models = kind.models(project, what, factor)
+        models = kind.models(project, what, factor, thickness)
     except InputError as error:
         if error.path is not None:
             raise
@@ -88,11 +102,14 @@ def levels(
     for name, model in models.items():
         steps = len(kind.steps(model))
         size = edge_length(model.mesh) if what == "elements" else 1.0 / steps
-        found[name] = Level(factor, replace(model, thickness=thickness), steps, size)
+        found[name] = Level(factor, model, steps, size)
     return found
 
 
-def _bubble_models(project: BubbleProject, what: What, factor: float) -> dict[str, Any]:
+def _bubble_models(
+    project: BubbleProject, what: What, factor: float, thickness: float
+) -> dict[str, Any]:
+    project = replace(project, thickness=thickness)
     if what == "elements":
         return {"bubble": _refined_bubble(project, factor)}
     if factor != int(factor):
@@ -127,7 +144,10 @@ def _bubble_responses(model: Any, history: History) -> dict[str, float]:
     return {f"{p:.4g} kPa": float(u) for p, u in zip(1e3 * history.load, largest, strict=True)}
 
 
-def _strip_models(project: UniaxialProject, what: What, factor: float) -> Mapping[str, Any]:
+def _strip_models(
+    project: UniaxialProject, what: What, factor: float, thickness: float
+) -> Mapping[str, Any]:
+    project = replace(project, thickness=thickness)
     if what == "elements":
         return strip_models(project, refinement=factor)
     return strip_models(replace(project, increments=max(1, round(project.increments * factor))))
@@ -139,6 +159,18 @@ def _end_load(model: Any, history: History) -> dict[str, float]:
 
 def _load_curve(model: Any, history: History) -> Curve:
     return np.array(model.elongations), history.load
+
+
+def _cylinders(project: BendProject, what: What, factor: float, thickness: float) -> dict[str, Any]:
+    return {case.name: refined_cylinder(case, thickness, what, factor) for case in project.cases}
+
+
+def _case_and_card(
+    project: BendProject, cases: Sequence[str], card: str
+) -> tuple[BendProject, MaterialCard]:
+    picked = chosen(project, cases, [card])
+    (found,) = picked.cards.values()
+    return picked, found.card
 
 
 KINDS: dict[str, StudyKind] = {
@@ -159,5 +191,16 @@ KINDS: dict[str, StudyKind] = {
         responses=_end_load,
         response="load",
         curve=_load_curve,
+    ),
+    "bend": StudyKind(
+        read=lambda path, data: read_bend(path, data, need_data=False),
+        models=_cylinders,
+        steps=lambda model: (*model.inflation, *model.increments),
+        quantities=quantities,
+        responses=loads,
+        response="load",
+        curve=deflection_curve,
+        pick=_case_and_card,
+        solver_key=KEY,
     ),
 }

@@ -110,7 +110,7 @@ def _result(study: Study, found: Mapping[str, ModelFound]) -> dict[str, Any]:
     return {
         "command": "study nu12",
         "project": str(study.project.path),
-        "card": str(study.card_path),
+        "card": study.card_path,
         "solver": study.solver.name,
         "base_nu12": study.card.law.nu12,
         "response": study.kind.response,

@@ -12,7 +12,8 @@ from typing import Any
 import click
 
 from ..experiments.tables import write_table
-from ..materials.card import MaterialCard, read_card
+from ..materials.card import MaterialCard
+from ..projects.bend import BendProject
 from ..projects.fit import FitProject
 from ..solvers.base import History, Solver
 from ..studies.results import UNSTABLE, beyond_card, strains_of
@@ -27,9 +28,9 @@ class Study:
     """A project, the card it is run with, and where the results go."""
 
     kind: StudyKind
-    project: FitProject
+    project: FitProject | BendProject
     card: MaterialCard
-    card_path: Path
+    card_path: str
     solver: Solver
     folder: Path
 
@@ -44,18 +45,23 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
     path = click.Path(path_type=Path)
     decorators: list[Callable[..., Any]] = [
         click.argument("project", type=path),
-        click.option("--card", "card_path", type=path, required=True, help="The material card."),
+        click.option(
+            "--card", "card_path", required=True,
+            help="The material card's file, or the name of a card of a bending project.",
+        ),
+        click.option("--case", "cases", multiple=True, help="A case of bending; several [all]."),
         click.option("--out", type=path, help="Output folder [out/NAME-STUDY]."),
         click.option("--data", type=path, help="Folder of the measured data."),
         solver_choice,
         click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
         click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
-    ]
+    ]  # fmt: skip
 
     @functools.wraps(command)
     def opened(
         project: Path,
-        card_path: Path,
+        card_path: str,
+        cases: tuple[str, ...],
         out: Path | None,
         data: Path | None,
         solver_given: dict[str, Any],
@@ -64,10 +70,11 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         def open_study(name: str) -> Study:
             kind = study_kind(project)
-            settings = with_solver(kind.read(project, data), solver_given)
-            card = read_card(card_path)
+            read, card = kind.pick(kind.read(project, data), cases, card_path)
+            settings = with_solver(read, solver_given)
             folder = result_folder(project, name, out, overwrite)
-            return Study(kind, settings, card, card_path, project_solver(settings), folder)
+            solver = project_solver(settings, kind.solver_key)
+            return Study(kind, settings, card, card_path, solver, folder)
 
         return command(open_study, **kwargs)
 

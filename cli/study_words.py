@@ -19,13 +19,17 @@ def convergence_lines(result: Mapping[str, Any]) -> list[str]:
             if level["values"] is None:
                 lines.append(start + f"failed: {level['failed']}{own}")
                 continue
-            numbers = [f"{level['values'][h]:<{len(h)}.7g}" for h in head if h]
+            numbers = [_number(level["values"].get(h), len(h)) for h in head if h]
             lines.append((start + "   ".join(numbers) + own).rstrip())
         lines += [_quantity(*item) for item in model["quantities"].items()]
         if "rms_N" in model:
             lines.append(_rms(model["rms_N"]))
         lines += [f"note: {name}, finest: {words}" for words in model["warnings"]]
     return lines
+
+
+def _number(value: float | None, width: int) -> str:
+    return f"{'-':<{width}}" if value is None else f"{value:<{width}.7g}"
 
 
 def _quantity(name: str, found: Mapping[str, Any]) -> str:

@@ -49,9 +49,9 @@ def by_response(
 ) -> dict[str, Ratios]:
     """Ratios of every response that the run at the base nu12 has.
 
-    responses : of each nu12, by name; None where the run failed.
+    responses : of each nu12, by name; None where the run failed, without those it did not reach.
     """
     return {
-        name: ratios(nu12, [np.nan if r is None else r[name] for r in responses], value)
+        name: ratios(nu12, [np.nan if r is None else r.get(name, np.nan) for r in responses], value)
         for name, value in base.items()
     }

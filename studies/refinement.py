@@ -91,7 +91,10 @@ def rms_between(coarse: Curve, fine: Curve) -> float:
     """Root mean square of the difference of two curves (x, y), at the places of the coarse one.
 
     The fine one is interpolated linearly where it has no point there; both start at the origin.
+    Where it stopped early they are compared up to there.
     """
     (x, y), (fx, fy) = coarse, fine
+    both = x <= fx[-1] * (1 + 1e-9)
+    x, y = x[both], y[both]
     there = np.interp(x, np.append(0.0, fx), np.append(0.0, fy))
     return float(np.sqrt(np.mean((y - there) ** 2)))
