@@ -38,7 +38,7 @@ def main() -> None:
     size = float(sys.argv[1]) if len(sys.argv) > 1 else SIZE
     with threadpool_limits(1):
         # Compiled before the clock runs.
-        MembraneSolver().run(inflated_cylinder(150, 0.14, THICKNESS, 90.0, deflections=[2.0]), LAW)
+        MembraneSolver().run(inflated_cylinder(150, 0.14, THICKNESS, 60.0, deflections=[2.0]), LAW)
         for case in sys.argv[2:] or CASES:
             diameter, pressure = (float(part) for part in case.split("/"))
             compare(inflated_cylinder(diameter, 1e-3 * pressure, THICKNESS, size), case)
