@@ -16,6 +16,7 @@ KINDS = {
     "known": ("bubble-known-solution", "bubblefit bubble {}", "project.toml"),
     "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
     "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
+    "bend": ("bend-valmex7318", "bubblefit bend {}", "project.toml"),
     "joint": ("joint-valmex7318", "bubblefit joint {} --data DIR", "test1.toml"),
 }
 
@@ -27,7 +28,8 @@ KINDS = {
     type=click.Choice(list(KINDS)),
     default="known",
     show_default=True,
-    help="A bubble from a known solution; from measured DIC files; strip tests; both together.",
+    help="A bubble from a known solution; from measured DIC files; strip tests; bending;"
+    " bubble and strips together.",
 )
 @exits
 def command(folder: Path, example: str) -> None:

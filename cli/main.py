@@ -13,10 +13,12 @@ COMMANDS = {
     "bubble": ("bubble", "Fit a material to a bubble inflation test."),
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests."),
     "joint": ("joint", "Fit a material to a bubble and strips together."),
+    "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
     "study": ("study_command", "What refinement, or nu12, changes in an analysis."),
+    "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("init", "Write a commented example project."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }

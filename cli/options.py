@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,6 +15,7 @@ import click
 from ..errors import BubblefitError, InputError, OutputError
 
 if TYPE_CHECKING:
+    from ..materials.card import MaterialCard
     from ..projects.bend import BendProject
     from ..projects.fit import FitProject
 
@@ -105,3 +106,24 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
             raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
     options = {**project.solver_options, name: {**known, **mine}}
     return replace(project, solver=name, solver_options=options)
+
+
+def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
+    """Cards by a name each: the card's own, else its file's, told apart where they agree.
+
+    Raises
+    ------
+    InputError : what is no card; one that is given twice.
+    """
+    from ..materials.card import read_card
+
+    named: dict[str, MaterialCard] = {}
+    for path in cards:
+        card = read_card(path)
+        name = card.name or path.stem
+        if name in named:
+            name = f"{name} ({path})"
+        if name in named:
+            raise InputError(path, "--card", "is given twice")
+        named[name] = card
+    return named

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError, SolverFailure
-from ..materials.card import MaterialCard, read_card
+from ..errors import SolverFailure
 from ..projects.uniaxial import read_uniaxial
 from ..solvers.base import Solver
 from ..studies.cards_on_strips import cards_lines, cards_result, run_cards, write_cards
 from ..writing import replacing
-from .options import exits, result_folder, solver_choice, with_solver
+from .options import exits, named_cards, result_folder, solver_choice, with_solver
 from .progress import run_progress
 
 
@@ -55,7 +53,7 @@ def simulate_uniaxial(
     strip is left out there, and named; when nothing ends well the exit code is 4.
     """
     settings = with_solver(read_uniaxial(project, data, need_data=False), solver_given)
-    named = _named(cards)
+    named = named_cards(cards)
     folder = result_folder(project, "simulated", out, overwrite)
 
     def progress(solver: Solver, increments: int) -> AbstractContextManager[None]:
@@ -76,17 +74,3 @@ def simulate_uniaxial(
     for words in cards_lines(result):
         click.echo(words)
     click.echo(f"written to {folder}")
-
-
-def _named(cards: Sequence[Path]) -> dict[str, MaterialCard]:
-    """Cards by a name each: the card's own, else its file's, told apart where they agree."""
-    named: dict[str, MaterialCard] = {}
-    for path in cards:
-        card = read_card(path)
-        name = card.name or path.stem
-        if name in named:
-            name = f"{name} ({path})"
-        if name in named:
-            raise InputError(path, "--card", "is given twice")
-        named[name] = card
-    return named

@@ -80,19 +80,19 @@ def model_error(
 
     Returns
     -------
-    None where the model reaches no reading.
+    None where the model reaches no reading of a load.
     """
     x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
     way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
     read = np.concatenate([c.load for c in curves]) if curves else np.empty(0)
     inside = (way >= x[0]) & (way <= x[-1])
-    if not inside.any():
+    largest = float(np.abs(read[inside]).max(initial=0.0))
+    if not largest > 0:
         return None
     off = np.interp(way[inside], x, y) - read[inside]
-    rms, largest = float(np.sqrt(np.mean(off**2))), float(np.abs(read[inside]).max())
-    relative = rms / largest if largest > 0 else float("inf")
+    rms = float(np.sqrt(np.mean(off**2)))
     return BendingError(
-        rms, float(off.mean()), relative, int(inside.sum()), int((way > x[-1]).sum())
+        rms, float(off.mean()), rms / largest, int(inside.sum()), int((way > x[-1]).sum())
     )
 
 

@@ -99,7 +99,13 @@ def read_bend(path: Path, data_folder: Path | None = None, need_data: bool = Tru
         file. Cases that make no model are found here, before anything runs.
     """
     path = Path(path)
-    file = parse(path, {"bend": BendFile})
+    return bend_project(path, parse(path, {"bend": BendFile}), data_folder, need_data)
+
+
+def bend_project(
+    path: Path, file: BendFile, data_folder: Path | None = None, need_data: bool = True
+) -> BendProject:
+    """The project of a parsed file at `path`; see `read_bend`."""
     cards = read_cards(path, file)
     folder = data_folder if data_folder is not None else path.parent / file.measured.folder
     settings = case_settings(path, file, Path(folder), need_data)

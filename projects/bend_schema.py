@@ -18,7 +18,7 @@ from .schema import (
     UnitsSection,
 )
 
-Name = Annotated[str, Field(min_length=1, max_length=60)]
+Name = Annotated[str, Field(min_length=1, max_length=300)]
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]
 Deflections = Annotated[list[Positive], Field(min_length=1)]

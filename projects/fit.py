@@ -165,7 +165,10 @@ def common_settings(
         "tolerance": fit.tolerance,
         "modulus_unit": file.units.modulus,
         "modulus_scale": modulus,
-        "solver_options": {"calculix": calculix_options(path, file.solver.calculix)},
+        "solver_options": {
+            "calculix": calculix_options(path, file.solver.calculix),
+            **(file.solver.model_extra or {}),
+        },
     }
 
 

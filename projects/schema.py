@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -156,6 +156,11 @@ class CalculixSection(Section):
 
 
 class SolverSection(Section):
+    """Options by solver; tables of other names are for plug-ins, which check what is in them."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, dict[str, Any]] = Field(init=False)
+
     calculix: CalculixSection = CalculixSection()
 
 

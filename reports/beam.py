@@ -67,7 +67,9 @@ def plot_beam(
     grid = figure.add_gridspec(2, 2, height_ratios=[1.0, 1.25], width_ratios=[2.3, 1.0])
     whole, close = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
     cut = figure.add_subplot(grid[1, 1])
-    colours, norm = strain_colours(colour)
+    # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
+    most = max(float(colour.max()), 1e-6)
+    colours, norm = strain_colours(np.clip(colour, -most, most))
     # Of the two halves the eye sees one; what is nearer hides what is behind.
     seen = np.flatnonzero(now[cells, 0].mean(axis=1) >= 0)
     seen = seen[np.argsort(now[cells[seen], 0].mean(axis=1))]
@@ -94,7 +96,8 @@ def plot_beam(
     _cut(cut, section, bodies)
     for axes in (whole, close, cut):
         axes.grid(False)
-    bar = figure.colorbar(faces, ax=[whole], shrink=0.9, pad=0.01)
+    wrinkles = "min" if colour.min() < -most else "neither"
+    bar = figure.colorbar(faces, ax=[whole], shrink=0.9, pad=0.01, extend=wrinkles)
     bar.set_label("log strain along the axis", fontsize=9)
     bar.ax.tick_params(labelsize=8.5, color=GREY)
     return save(figure, path)

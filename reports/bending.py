@@ -108,6 +108,7 @@ def plot_bending_cases(path: Path | str, panels: Sequence[BendPanel], columns: i
     rows = ceil(len(panels) / columns)
     figure = new_figure(1.0 + 3.4 * columns, 1.0 + 2.5 * rows)
     drawn = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey="row")
+    longest = max(map(_longest, panels))
     for place, axes in enumerate(drawn.ravel()):
         column = place % columns
         panel = panels[place] if place < len(panels) else BendPanel("")
@@ -119,6 +120,10 @@ def plot_bending_cases(path: Path | str, panels: Sequence[BendPanel], columns: i
         axes.tick_params(labelbottom=below)
         x = "deflection, mm" if below else ""
         quiet(axes, x, "load, N" if column == 0 else "", panel.title)
+    for row in range(rows):
+        highest = [_highest(p) for p in panels[row * columns : (row + 1) * columns]]
+        drawn[row, 0].set_ylim(0.0, 1.06 * max(highest) or 1.0)
+    drawn[0, 0].set_xlim(0.0, 1.03 * longest or 1.0)
     legend_above(figure, _entries(panels), 2 * columns)
     return save(figure, path)
 
@@ -165,14 +170,30 @@ def _loads(axes: Axes, panel: BendPanel) -> None:
         for point, marker in ((line.knee, KNEE), (line.limit, LIMIT)):
             if point is not None:
                 axes.plot(*point, color=look["color"], linestyle="", zorder=6, **marker)
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(0.0, 1.03 * _longest(panel) or 1.0)
+    axes.set_ylim(0.0, 1.06 * _highest(panel) or 1.0)
     known = [(h, x.rms) for h, x in zip(drawn, panel.lines, strict=True) if x.rms is not None]
     if known:
         axes.legend(
             [handle for handle, _ in known], [f"{rms:.3g} N" for _, rms in known],
             title="RMS error", title_fontsize=9, fontsize=9, framealpha=0.85, edgecolor="none",
         )  # fmt: skip
+
+
+def _highest(panel: BendPanel) -> float:
+    """The largest load drawn, N."""
+    loads = [np.asarray(x.load, dtype=float) for x in panel.lines]
+    if panel.measured is not None:
+        loads += [np.asarray(y, dtype=float) for _, y in panel.measured.readings]
+    return max((float(y.max()) for y in loads), default=0.0)
+
+
+def _longest(panel: BendPanel) -> float:
+    """The largest deflection drawn, mm."""
+    ways = [np.asarray(x.deflection, dtype=float) for x in panel.lines]
+    if panel.measured is not None:
+        ways += [np.asarray(x, dtype=float) for x, _ in panel.measured.readings]
+    return max((float(x.max()) for x in ways), default=0.0)
 
 
 def _misses(axes: Axes, panel: BendPanel) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,8 @@ from .style import DASHES, GREY, NAMED, legend_above, new_figure, pressure_colou
 SMALLEST = 1e-5
 #: A ratio of the ends of an axis below which 2 and 5 are labelled beside 1.
 DENSE = 100.0
+#: Quantities at one load or place after the other.
+SERIES = r"apex at |load at \d"
 SIZES = {"elements": "mean edge, mm", "increments": "step, share of the load"}
 
 
@@ -104,10 +108,10 @@ def _guide(order: int) -> dict[str, Any]:
 
 
 def _looks(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Light to dark along a series of pressures, named colours for the rest."""
-    series = [name for name in names if name.startswith("apex at ")]
+    """Light to dark along a series of pressures or deflections, named colours for the rest."""
+    series = [name for name in names if re.match(SERIES, name)]
     shades = dict(zip(series, pressure_colours(len(series)), strict=True))
-    others = iter(NAMED)
+    others = cycle(NAMED)
     return {
         name: {"color": shades[name] if name in shades else next(others), "linewidth": 1.5}
         for name in names

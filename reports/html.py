@@ -26,12 +26,16 @@ class StartRow:
 
 @dataclass(frozen=True)
 class Table:
-    """A further table; numbers are written with four significant digits, text as it is."""
+    """A further table; numbers are written with four significant digits, text as it is.
+
+    text : columns that are words: set from the left, as the first always is.
+    """
 
     title: str
     header: Sequence[str]
     rows: Sequence[Sequence[object]]
     note: str = ""
+    text: Sequence[int] = ()
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,10 @@ class BendFolder:
         OutputError : it cannot be written, or holds runs and neither `resume` nor `overwrite` is
             given.
         """
-        held = [p for p in (self.path / RUNS).glob("*.npz")]
-        if (held or (self.path / RESULT).exists()) and not (resume or overwrite):
+        # A name with a dot before it is a file whose writing was cut off.
+        held = list((self.path / RUNS).glob("*.npz"))
+        whole = [p for p in held if not p.name.startswith(".")]
+        if (whole or (self.path / RESULT).exists()) and not (resume or overwrite):
             raise OutputError(
                 f"{self.path}: already holds a study; continue it with --resume, replace it "
                 "with --overwrite, or name another folder with --out"
@@ -44,8 +46,9 @@ class BendFolder:
             (self.path / RUNS).mkdir(parents=True, exist_ok=True)
             # Gone while runs are missing: where it is, the output is complete.
             (self.path / RESULT).unlink(missing_ok=True)
-            for path in held if overwrite else []:
-                path.unlink(missing_ok=True)
+            for path in held:
+                if overwrite or path not in whole:
+                    path.unlink(missing_ok=True)
         except OSError as error:
             reason = error.strerror or str(error)
             raise OutputError(

@@ -14,7 +14,7 @@ from ..projects.fit import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
 FREE = {"path", "title", "starts", "data", "solver_options"}
-# Of an external solver's options, what does.
+# Of CalculiX' options, what does; of a plug-in's any may.
 DECK = ("element", "templates")
 
 
@@ -24,7 +24,8 @@ def fingerprint(project: FitProject, problem: FitProblem) -> str:
     for setting in _settings(project):
         digest.update(setting.encode())
     options = project.solver_options.get(project.solver, {})
-    for name in DECK:
+    names = DECK if project.solver == "calculix" else sorted({*DECK, *options})
+    for name in names:
         digest.update(f"{name}={options.get(name)};".encode())
     for experiment in problem.experiments:
         for data in experiment.objective.data:

@@ -13,6 +13,7 @@ from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.contact import brought_to_touch, contact_forces, gaps
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .closed_meshes import half_tube, tube_warp
@@ -81,6 +82,17 @@ def test_ring_and_post_by_hand() -> None:
     assert stiffness[0, 1, 1] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("body", [POST, RING])
+def test_forces_are_on_all_nodes_that_are_inside(body: RigidCylinder) -> None:
+    rng = np.random.default_rng(3)
+    x = np.asarray(body.centre) + rng.uniform(-160, 160, (4000, 3))
+    gap, out, _ = gaps(body, x)
+    force, _, touched = contact_forces(body, x, np.full(len(x), 2.0))
+    np.testing.assert_array_equal(touched, np.flatnonzero(gap < 0))
+    assert 100 < len(touched) < len(x)
+    assert force == pytest.approx(np.where(gap[:, None] < 0, -2.0 * gap[:, None] * out, 0.0))
+
+
 def test_bodies_are_brought_to_touch() -> None:
     points = half_tube(16, 24, RADIUS, LENGTH).points
     way = np.array([0.0, -1.0, 0.0])
@@ -124,6 +136,18 @@ def test_the_start_of_each_frame_does_not_matter(bent: tuple[InflatedModel, Hist
     """A linear law's strain path is short here: more frames on the way change little."""
     finer = bend(beam((1.0, 2.0, 4.0, 6.0, 8.0, 10.0)))[0]
     assert finer.load[-1] == pytest.approx(bent[1].load[-1], rel=1e-3)
+
+
+def test_the_line_search_finds_what_plain_newton_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A little way, which both manage; and in one go."""
+    model = beam((1.0, 3.0))
+    with_search = bend(model)[0]
+    with monkeypatch.context() as patch:
+        patch.setattr(ClosedMembrane, "equilibrium", Membrane.equilibrium)
+        plain = bend(model)[0]
+    assert with_search.load == pytest.approx(plain.load, rel=1e-6)
+    in_one = bend(beam((3.0,)))[0]
+    assert in_one.load[-1] == pytest.approx(plain.load[-1], rel=1e-3)
 
 
 def test_work_of_the_collar_is_what_gas_and_fabric_store() -> None:

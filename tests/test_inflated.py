@@ -9,11 +9,15 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.strain import log_strain_of
 from bubblefit.models.gas import ClosedGas
 from bubblefit.models.inflated import InflatedModel
 from bubblefit.solvers.membrane.cavity import closed_cavity
-from bubblefit.solvers.membrane.element import reference_elements
+from bubblefit.solvers.membrane.closed import Wall
+from bubblefit.solvers.membrane.element import GAUSS_POINTS, reference_elements
+from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.inflated import closed_membrane
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -85,6 +89,31 @@ def test_frames_of_twisted_facets_hold_the_projected_warp() -> None:
     assert (np.einsum("mk,mpk->mp", warp, frame[:, :, 0]) > 0).all()
 
 
+def test_patch_of_a_curved_surface_in_an_even_deformation() -> None:
+    """Every point of twisted facets finds the strain of the gradient that all were moved by."""
+    points, quads, warp = twisted()
+    elements = reference_elements(points, quads, warp)
+    free = np.arange(points.size)
+    m = Membrane(
+        points, quads, elements, THICKNESS, ISOTROPIC, free,
+        tangent_for(quads, points.size, free), 1e-9, step_limit=1.0,
+    )  # fmt: skip
+    gradient = np.eye(3) + 0.1 * np.random.default_rng(7).uniform(-1, 1, (3, 3))
+    assert np.isfinite(m.unbalance(points @ gradient.T - points, 0.01, with_tangent=False))
+    corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    for e, facet in enumerate(quads):
+        for g, (a, b) in enumerate(GAUSS_POINTS):
+            # Tangents of the bilinear facet, by hand.
+            slopes = [[0.25 * i * (1 + j * b), 0.25 * j * (1 + i * a)] for i, j in corner]
+            normal = np.cross(*(np.array(slopes).T @ points[facet]))
+            normal /= np.linalg.norm(normal)
+            along = warp[e] - (warp[e] @ normal) * normal
+            along /= np.linalg.norm(along)
+            yarns = np.stack([along, np.cross(normal, along)], axis=1)
+            exact = log_strain_of(gradient @ yarns)
+            assert m.strain_new[e, g] == pytest.approx(exact, abs=1e-12)
+
+
 def test_rotation_of_a_stressed_tube_leaves_stress_and_balance() -> None:
     model = tube(8, 4, 100.0, [0.02, 0.05])
     history, m = run(model, LAW)
@@ -154,7 +183,7 @@ def test_gas_keeps_pressure_times_volume_when_the_tube_is_dented() -> None:
         (model.mesh.points[:, 1] > RADIUS - 1e-6) & (model.mesh.points[:, 2] < 1e-6)
     )
     fixed = np.union1d(model.fixed(), 3 * dent + 1)
-    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed)
+    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed, Wall())
     m.strain_old[:], m.stress_old[:] = inflated.strain_old, inflated.stress_old
     u = history.displacement[-1].copy()
     m.gas = ClosedGas((0.05 + 0.101) * history.cavity_volume[-1] / model.copies, 0.101)

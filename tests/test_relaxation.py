@@ -9,6 +9,7 @@ from bubblefit.materials.point_law import SLOPES
 from bubblefit.materials.relaxation import relaxed_update
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.models.inflated import InflatedModel
+from bubblefit.solvers.membrane.closed import Wall
 from bubblefit.solvers.membrane.inflated import closed_membrane
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -123,7 +124,7 @@ class PlaneEnds:
         supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
         model = InflatedModel(mesh, THICKNESS, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4)
         law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2.6, 0.3)
-        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), share)
+        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
         self.displacement = np.zeros_like(self.points)
         self.stretched = 0.2 * PRESSURE * RADIUS / (THICKNESS * MODULUS)
         self.displacement[self.end, 2] = LENGTH * self.stretched

@@ -12,10 +12,13 @@ from ...models.inflated import InflatedModel, RigidCylinder
 from ..base import History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
+from .settling import settled
 
 Array = NDArray[np.float64]
 
-MOST_CUTS = 6
+MOST_CUTS = 3
+#: A node further from where the last increments led to than this many times the collar's way.
+SNAP = 4.0
 #: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
 BITE = 0.02
 
@@ -26,12 +29,12 @@ def analyse(
     inflated: Array,
     pressure: float,
     extremes: tuple[Array, Array],
-    wall: NDArray[np.bool_],
+    sides: NDArray[np.bool_],
 ) -> History:
     """Frames of the bending: first the inflated state, then one for every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
-    all bodies on it, `wrinkled` a share of `wall` (elements,). Where no equilibrium is found on
+    all bodies on it, `wrinkled` a share of `sides` (elements,). Where no equilibrium is found on
     the way, the history ends with the last good frame and says so.
 
     Raises
@@ -57,7 +60,8 @@ def analyse(
     path, moves = [inflated], [0.0]
     wrinkle = membrane.wrinkle.copy()
     gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
-    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(wall)], 0.0, 0.0
+    snaps: list[float] = []
+    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
     for wanted in plan.displacements:
         start = path[-1]
         if len(path) > 2:
@@ -68,6 +72,8 @@ def analyse(
             between = f"between {moves[-1]:.4g} and {wanted:.4g} mm of deflection"
             remarks.append(f"the run stopped early: no equilibrium {between}")
             break
+        if len(path) > 2 and np.abs(found - start).max() > SNAP * (wanted - moves[-1]):
+            snaps.append(wanted)
         work = membrane.wrinkle_work(wrinkle)
         wrinkle = membrane.wrinkle.copy()
         membrane.accept()
@@ -75,7 +81,7 @@ def analyse(
         moves.append(wanted)
         gas.append((membrane.pressure, membrane.volume))
         pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
-        wrinkled.append(membrane.wrinkled_share(wall))
+        wrinkled.append(membrane.wrinkled_share(sides))
         of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
         now = membrane.reference + found
         deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
@@ -87,6 +93,10 @@ def analyse(
             frames.append(i + 1)
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
+    if snaps:
+        remarks.append(
+            f"snaps, or nearly, before {', '.join(f'{d:.4g}' for d in snaps)} mm of deflection"
+        )
     remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
     most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
@@ -109,7 +119,7 @@ def analyse(
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations,
         path=np.array(path),
-        wrinkled=np.array(wrinkled)[frames] if membrane.wrinkle_stiffness is not None else None,
+        wrinkled=np.array(wrinkled)[frames],
         remarks=tuple(remarks),
     )
 
@@ -118,6 +128,9 @@ def _reach(membrane, bodies, before, u_before, wanted, start, cuts):  # type: ig
     """Equilibrium with the collar at `wanted`, through halved ways from `before`."""
     membrane.bodies = bodies(wanted)
     found = membrane.equilibrium(start, membrane.pressure)
+    if found is None:
+        # Wrinkles that come and go leave Newton's iteration nowhere to go; so does a limit load.
+        found = settled(membrane, start)
     if found is not None or cuts == 0:
         return found
     middle = 0.5 * (before + wanted)

@@ -52,13 +52,26 @@ def contact_forces(
 
     stiffness (n,) N/mm: penalty times the node's share of the reference surface.
     """
-    gap, out, hessian = gaps(body, position)
-    touched = np.flatnonzero(gap < 0)
-    k, g, n = stiffness[touched], gap[touched], out[touched]
+    near = _within_reach(body, position)
+    gap, out, hessian = gaps(body, position[near])
+    inside = gap < 0
+    touched = near[inside]
+    k, g, n = stiffness[touched], gap[inside], out[inside]
     force = np.zeros_like(position)
     force[touched] = -(k * g)[:, None] * n
-    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[touched]
+    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[inside]
     return force, k[:, None, None] * slope, touched
+
+
+def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
+    """The few nodes that may be inside the body: all that are, without their distances."""
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ np.asarray(body.axis, dtype=float)
+    square = np.einsum("ni,ni->n", arm, arm) - along**2
+    if body.ring:
+        # The mouth opens from the inner radius outwards.
+        return np.flatnonzero((square > body.radius**2) & (np.abs(along) < 0.5 * body.length))
+    return np.flatnonzero(square < body.radius**2)
 
 
 def brought_to_touch(
