@@ -40,7 +40,8 @@ def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) 
     """Gauge pressure (n,) MPa for the next pass, from the volumes found at the `given` ones.
 
     One step of Newton's method on gas(V(p)) = p, the cylinder at any deflection as compliant as
-    the inflated one (`slope`, dV/dp in mm^3/MPa): without it four passes, with it two.
+    the inflated one (`slope`, dV/dp in mm^3/MPa). With the gas' own pressure instead the error
+    falls to a quarter in each pass only.
     """
     stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
     return np.asarray(given + (gas_pressure(gas, volumes) - given) / (1.0 + stiffness * slope))
