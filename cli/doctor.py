@@ -9,7 +9,9 @@ from pathlib import Path
 
 import click
 
+from ..errors import InputError
 from ..solvers.diagnosis import Diagnosis, diagnose
+from ..solvers.registry import solver_names
 from .options import exits
 
 UNUSABLE = 4
@@ -17,17 +19,24 @@ UNUSABLE = 4
 
 @click.command("doctor")
 @click.option("--ccx", metavar="PATH", help="A CalculiX to look at beside the ones found.")
+@click.option("--marc", metavar="PATH", help="The Marc (run_marc, or a site's .toml) to look at.")
+@click.option("--solver", metavar="NAME", help="A solver, such as a plug-in, that has to work.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings on stdout as JSON.")
 @exits
-def command(ccx: str | None, as_json: bool) -> None:
+def command(ccx: str | None, marc: str | None, solver: str | None, as_json: bool) -> None:
     """List every solver found and prove each with bars whose end stresses are published.
 
     Exit code 0 when the embedded solver works and so does every other one that was named (--ccx,
-    BUBBLEFIT_CCX) or built (make calculix); 4 otherwise. A ccx that merely lies on the PATH is
-    reported, but does not count.
+    BUBBLEFIT_CCX, --marc, BUBBLEFIT_MARC, --solver) or built (make calculix); 4 otherwise. A ccx
+    or Marc that merely lies on the PATH, or a plug-in that is installed, is reported, but does not
+    count.
     """
-    found = diagnose(ccx)
+    if solver is not None and solver not in (names := solver_names()):
+        raise InputError(None, "--solver", f"{solver!r} is not one of: {', '.join(names)}")
+    found = diagnose(ccx, marc)
     good = all(one.usable for one in found if one.expected)
+    if solver is not None:
+        good = good and any(one.usable for one in found if one.name == solver)
     if as_json:
         solvers = [{**asdict(one), "path": _text(one.path)} for one in found]
         click.echo(json.dumps({"ok": good, "solvers": solvers}, indent=1))
@@ -46,7 +55,7 @@ def _line(one: Diagnosis) -> str:
     state = "ok" if one.usable else "NOT USABLE"
     where = f"{one.path} ({one.origin})" if one.path else one.origin
     words = [f"{one.name:10}  {state}", f"version {one.version}" if one.version else "", where]
-    if one.path:
+    if one.path and one.name == "calculix":
         carries = {True: "yes", False: "no", None: "cannot be seen"}[one.external_materials]
         words.append(f"external materials: {carries}")
     if one.difference is not None:

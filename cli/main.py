@@ -18,6 +18,7 @@ COMMANDS = {
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
     "study": ("study_command", "What refinement, or nu12, changes in an analysis."),
+    "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("init", "Write a commented example project."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }

@@ -72,20 +72,28 @@ def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option("--solver", metavar="NAME", help="Solver that runs the model.")
     @click.option("--ccx", metavar="PATH", help="The CalculiX to run.")
+    @click.option("--marc", metavar="PATH", help="The Marc to run: run_marc, or a site's .toml.")
     @click.option(
         "--templates", type=click.Path(path_type=Path), help="Folder of your own input decks."
     )
-    @click.option("--element", metavar="NAME", help="Shell element of CalculiX: S8R or S4.")
+    @click.option(
+        "--element",
+        metavar="NAME",
+        help="Shell element: S8R or S4 (CalculiX), 139, 75 or 18 (Marc).",
+    )
     @functools.wraps(command)
     def wrapped(
         *args: Any,
         solver: str | None,
         ccx: str | None,
+        marc: str | None,
         templates: Path | None,
         element: str | None,
         **kwargs: Any,
     ) -> Any:
-        given = {"solver": solver, "ccx": ccx, "templates": templates, "element": element}
+        given = {
+            "solver": solver, "ccx": ccx, "marc": marc, "templates": templates, "element": element
+        }  # fmt: skip
         return command(*args, solver_given=given, **kwargs)
 
     return wrapped

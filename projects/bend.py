@@ -17,7 +17,7 @@ from ..models.gas import Gas
 from .bend_cards import BendCard, read_cards
 from .bend_cases import case_settings
 from .bend_schema import BendFile
-from .fit import calculix_options, parse
+from .fit import parse, solver_options
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -123,6 +123,6 @@ def bend_project(
         cases=tuple(cases),
         cards=cards,
         solver=file.run.solver,
-        solver_options={"calculix": calculix_options(path, file.solver.calculix)},
+        solver_options=solver_options(path, file.solver),
         jobs=file.run.jobs,
     )

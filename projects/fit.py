@@ -15,7 +15,15 @@ from pydantic import ValidationError
 
 from ..errors import InputError
 from .bounds import read_bounds
-from .schema import FORMS, MODULUS_UNITS, CalculixSection, CommonFile, Form, Section
+from .schema import (
+    FORMS,
+    MODULUS_UNITS,
+    CalculixSection,
+    CommonFile,
+    Form,
+    Section,
+    SolverSection,
+)
 from .schema_errors import first_error
 
 Array = NDArray[np.float64]
@@ -165,7 +173,7 @@ def common_settings(
         "tolerance": fit.tolerance,
         "modulus_unit": file.units.modulus,
         "modulus_scale": modulus,
-        "solver_options": {"calculix": calculix_options(path, file.solver.calculix)},
+        "solver_options": solver_options(path, file.solver),
     }
 
 
@@ -221,7 +229,18 @@ def _thirds(ends: tuple[float, float, float]) -> Array:
     return np.outer(ends, [1 / 3, 2 / 3])
 
 
-def calculix_options(path: Path, section: CalculixSection) -> dict[str, Any]:
+def solver_options(path: Path, section: SolverSection) -> dict[str, dict[str, Any]]:
+    """By name of a solver, what its constructor is given; those that plug in among them."""
+    return {
+        "membrane": section.membrane.model_dump(),
+        "calculix": _calculix(path, section.calculix),
+        # "marc" itself comes from the command line only.
+        "marc": {"marc": None, **section.marc.given(path.parent)},
+        **(section.model_extra or {}),
+    }
+
+
+def _calculix(path: Path, section: CalculixSection) -> dict[str, Any]:
     """Options of CalculixSolver; paths in a project file are beside that file."""
     options = section.model_dump()
     for name in ("templates", "scratch"):

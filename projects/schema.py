@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
+from ..solvers.marc.settings import MarcSettings
 
 #: MPa per unit, MPa per unit, mm per unit.
 MODULUS_UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
@@ -155,8 +156,22 @@ class CalculixSection(Section):
     threads: Annotated[int, Field(ge=1)] = 1
 
 
+class MembraneSection(Section):
+    """What a closed membrane's wall does where it is pressed together; for bendings."""
+
+    wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None
+    bending_stiffness: Annotated[float, Field(ge=0)] = 1.0
+
+
 class SolverSection(Section):
+    """Options by solver; tables of other names are for plug-ins, which check what is in them."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, dict[str, Any]] = Field(init=False)
+
+    membrane: MembraneSection = MembraneSection()
     calculix: CalculixSection = CalculixSection()
+    marc: MarcSettings = MarcSettings()
 
 
 class CommonFile(Section):

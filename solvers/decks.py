@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,19 @@ from ..errors import InputError
 OURS = Path(__file__).resolve().parent.parent / "templates"
 
 
-def render(solver: str, name: str, context: Mapping[str, Any], folder: Path | None = None) -> str:
+def render(
+    solver: str,
+    name: str,
+    context: Mapping[str, Any],
+    folder: Path | None = None,
+    instead: Mapping[str, Path] | None = None,
+) -> str:
     """The deck that template `name` of `solver` makes of `context`.
 
     Parameters
     ----------
     folder : the user's own templates; `name` must be there, and may include or extend ours.
+    instead : files of the user's that stand in for templates which `name` includes.
 
     Raises
     ------
@@ -33,15 +40,21 @@ def render(solver: str, name: str, context: Mapping[str, Any], folder: Path | No
             problem = f"holds no {name}; copy {OURS / solver / name} there and change it"
             raise InputError(folder, "templates", problem)
         folders.insert(0, folder)
+    files = dict(instead or {})
     environment = SandboxedEnvironment(
-        loader=jinja2.FileSystemLoader(folders),
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.FunctionLoader(lambda wanted: _of_file(files, wanted)),
+                jinja2.FileSystemLoader(folders),
+            ]
+        ),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters["number"] = _number
+    environment.filters |= {"number": _number, "i10": _i10, "e20": _e20}
     try:
         return environment.get_template(name).render(context)
     except jinja2.TemplateSyntaxError as error:
@@ -51,8 +64,10 @@ def render(solver: str, name: str, context: Mapping[str, Any], folder: Path | No
         raise InputError(folders[0] / name, "include", f"no template {error.name}") from None
     except UnicodeDecodeError:
         raise InputError(folders[0] / name, "", "is not a text file in UTF-8") from None
+    except InputError:
+        raise
     except Exception as error:  # whatever the template's expressions do
-        where, line = _place(error, folders[0] / name)
+        where, line = _place(error, folders[0] / name, [str(file) for file in files.values()])
         known = ""
         if isinstance(error, jinja2.UndefinedError):
             known = f"; there are: {', '.join(sorted(context))}"
@@ -67,9 +82,37 @@ def _number(value: float) -> str:
     return f"{value:.13g}"
 
 
-def _place(error: BaseException, default: Path) -> tuple[Path, int]:
+def _i10(values: int | Sequence[int]) -> str:
+    """Whole numbers, 10 columns each (Marc's extended format)."""
+    numbers = [values] if isinstance(values, int) else values
+    fields = [f"{number:10d}" for number in numbers]
+    if any(len(field) > 10 for field in fields):
+        raise ValueError(f"a number of more than 10 digits: {max(numbers)}")
+    return "".join(fields)
+
+
+def _e20(values: float | Sequence[float]) -> str:
+    """Numbers, 20 columns and 13 digits each."""
+    numbers = [values] if isinstance(values, int | float) else values
+    return "".join(f"{number:20.12E}" for number in numbers)
+
+
+def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | None:
+    """What Jinja2 asks a loader for; None where no file stands in."""
+    if wanted not in files:
+        return None
+    path = files[wanted]
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    # The next block begins on a line of its own.
+    return text if text.endswith("\n") else text + "\n", str(path), None
+
+
+def _place(error: BaseException, default: Path, files: Sequence[str] = ()) -> tuple[Path, int]:
     """Template file and line where an error arose: Jinja2 puts them into the traceback."""
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        if frame.filename.endswith(".j2"):
+        if frame.filename.endswith(".j2") or frame.filename in files:
             return Path(frame.filename), frame.lineno or 0
     return default, 0

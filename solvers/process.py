@@ -12,8 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 from ..errors import InputError
+
+T = TypeVar("T")
 
 POLL_S = 0.05
 #: Lines of the log that an error carries.
@@ -95,6 +98,20 @@ def run_process(
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
     return Outcome(process.returncode, timed_out, time.monotonic() - begun)
+
+
+class Watch(Generic[T]):
+    """Tells of every increment once, as it appears: `look` finds all there are so far."""
+
+    def __init__(self, look: Callable[[], list[T]], tell: Callable[[T], None]) -> None:
+        self.look, self.tell, self.told = look, tell, 0
+
+    def __call__(self) -> None:
+        """Look once."""
+        fresh = self.look()[self.told :]
+        self.told += len(fresh)
+        for increment in fresh:
+            self.tell(increment)
 
 
 def log_tail(log: Path, lines: int = TAIL) -> str:

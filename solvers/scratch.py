@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import OutputError
+from ..errors import OutputError, SolverFailure
+from .process import log_tail
+
+log = logging.getLogger(__name__)
 
 MEMORY = Path("/dev/shm")
 #: Free space (bytes) below which runs go to the disk instead; a bubble takes about 2 MB.
@@ -28,6 +34,39 @@ def fresh_folder(name: str, parent: Path | None = None) -> Path:
     except OSError as error:
         problem = f"no scratch folder can be made: {error.strerror}; choose another"
         raise OutputError(f"{place}: {problem}") from None
+
+
+@contextmanager
+def run_folder(
+    name: str, parent: Path | None, keep: bool, solver: str, logs: str
+) -> Iterator[Path]:
+    """The fresh folder of one run: removed after a good end unless `keep`, kept after a failure.
+
+    Parameters
+    ----------
+    logs : name of the log in the folder whose tail a failure carries, where it has none yet.
+
+    Raises
+    ------
+    SolverFailure : the one that the run raised, with the folder and the log. OutputError : as
+        `fresh_folder`.
+    """
+    folder = fresh_folder(name, parent)
+    try:
+        yield folder
+    except SolverFailure as failure:
+        kept = put_aside(folder)
+        log.info("failed run kept in %s", kept)
+        tail = failure.log_tail or log_tail(kept / logs)
+        kind = type(failure)
+        raise kind(failure.reason, solver, failure.exit_number, tail, kept) from None
+    except BaseException:
+        remove(folder)  # interrupted, or never begun: there is nothing to look into
+        raise
+    if keep:
+        log.info("run kept in %s", folder)
+    else:
+        remove(folder)
 
 
 def default_parent() -> Path:

@@ -114,6 +114,10 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
     if order is None:
         return Convergence(remark=_no_order(changes[-2:]))
     limit = richardson(h[-2:], f[-2:], order)
+    if abs(limit - f[-1]) > abs(f[-1] - f[-3]):
+        # An order below a half where sizes are halved: the limit would be anybody's guess.
+        words = f"changes that fall so slowly (order {order:.2g}) show no limit: refine further"
+        return Convergence(remark=words)
     previous = None
     if len(f) > 3 and (np.abs(changes[-3:]) > least).all():
         previous = observed_order(h[-4:-1], changes[-3:-1])

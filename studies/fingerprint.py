@@ -14,7 +14,7 @@ from ..projects.fit import FitProject
 
 # Where the files lie, how many starts there are and what they are called changes no result.
 FREE = {"path", "title", "starts", "data", "solver_options"}
-# Of an external solver's options, what does.
+# Of CalculiX' options, what does (Marc says more itself); of a plug-in's any may.
 DECK = ("element", "templates")
 
 
@@ -24,8 +24,12 @@ def fingerprint(project: FitProject, problem: FitProblem) -> str:
     for setting in _settings(project):
         digest.update(setting.encode())
     options = project.solver_options.get(project.solver, {})
-    for name in DECK:
+    ours = project.solver in ("calculix", "marc")
+    names = DECK if ours else sorted({*DECK, *options})
+    for name in names:
         digest.update(f"{name}={options.get(name)};".encode())
+    # A solver whose settings are not all in the project says itself what it is.
+    digest.update(getattr(problem.solver, "identity", "").encode())
     for experiment in problem.experiments:
         for data in experiment.objective.data:
             digest.update(np.ascontiguousarray(data).tobytes())

@@ -14,7 +14,7 @@ from ..identification.problem import FitProblem
 from ..materials.law import HypoelasticLaw
 from ..projects.fit import FitProject
 from ..solvers.base import DifferentiatingSolver, Solver
-from ..solvers.registry import solver_named
+from ..solvers.registry import SOLVERS, checked, solver_named, solver_names
 
 #: Leads the fit where the solver that counts gives no derivatives.
 SURROGATE = "membrane"
@@ -52,17 +52,24 @@ def project_solver(project: Settings, key: str = "fit.solver") -> Solver:
 def project_solvers(project: Settings, count: int, key: str = "fit.solver") -> list[Solver]:
     """`count` of them, so that each can keep what it prepares for its model; checked once."""
     name = project.solver
+    for table in sorted(project.solver_options.keys() - {name}):
+        if table not in SOLVERS and table not in (known := solver_names()):
+            problem = f"no solver of this name is installed; there are: {', '.join(known)}"
+            raise InputError(project.path, f"solver.{table}", problem)
     try:
         solvers = [solver_named(name, **project.solver_options.get(name, {})) for _ in range(count)]
     except InputError as error:
-        if error.field != "solver":
-            raise
-        raise InputError(project.path, f"{key} (or --solver)", error.problem) from None
+        if error.field == "solver":
+            raise InputError(project.path, f"{key} (or --solver)", error.problem) from None
+        # Ours may also have their options from the command line.
+        if name not in SOLVERS and error.path is None and error.field.startswith(f"solver.{name}"):
+            raise InputError(project.path, error.field, error.problem) from None
+        raise
     # Once here, in one line, rather than as the failure of every analysis.
     if solvers and solvers[0].external:
-        found = solvers[0].check()
+        found = checked(name, solvers[0])
         if not (found.available and found.carries_law):
-            raise SolverFailure(found.advice or "is not usable", solvers[0].name)
+            raise SolverFailure(found.advice or "is not usable", name)
     return solvers
 
 

@@ -308,7 +308,7 @@ def card(tmp_path: Path) -> Path:
 
 def test_simulate_bend_on_the_membrane(tmp_path: Path, card: Path) -> None:
     """Coarse and short: what is checked is that the command bends, not how well."""
-    short = ("--element-size", 40, "--deflection", 12, "--frames", 3, "--seam-width", 30)
+    short = ("--element-size", 30, "--deflection", 12, "--frames", 3, "--seam-width", 30)
     bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured",
          write_readings(tmp_path / "a.csv").rename(tmp_path / "b.csv"), cwd=tmp_path,
          command=("simulate", "bend"), code=2)  # fmt: skip

@@ -424,6 +424,18 @@ def test_whole_times_commit_only_at_the_end_of_a_step(function):
     assert np.array_equal(kept, state) and state[0] > 0
 
 
+def test_whole_times_may_end_with_a_step(function):
+    """Up to total time 3 as above, from there at every increment."""
+    stretch = np.diag([1.03, 1.02, 1.0])
+    until = Point(function, constants(LAWS["cubic"], whole_until=3))
+    _, _, kept, _ = until.call(stretch, time=0.4, begun=2.0)
+    assert not kept.any()
+    for time in (0.0, 1e-3, 0.4):
+        point = Point(function, constants(LAWS["cubic"], whole_until=3))
+        _, _, kept, _ = point.call(stretch, time=time, begun=3.0)
+        assert kept[0] > 0
+
+
 # A patch of 2 mm x 1 mm: nodes (x, y, z) and element of each type, in CalculiX's order.
 QUAD = [(0, 0), (2, 0), (2, 1), (0, 1)]
 EIGHT = [*QUAD, (1, 0), (2, 0.5), (1, 1), (0, 0.5)]

@@ -18,6 +18,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.calculix.strip_results import StripRun, strip_history
 from bubblefit.solvers.decks import OURS
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.pulls import corrected
 
 # Thesis Table 3.2, GPa.
 TABLE_3_2 = [
@@ -175,7 +176,7 @@ def test_without_the_membrane_a_second_run_corrects_the_first(ccx, monkeypatch):
 def test_a_gauge_that_is_not_reached_is_a_failure(ccx, monkeypatch, tmp_path):
     coarse = model("bias", 4, **COARSE)
     short = np.array(coarse.elongations)
-    monkeypatch.setattr(strip, "_as_the_membrane", lambda *_: short)
+    monkeypatch.setattr(strip, "as_the_membrane", lambda *_: short)
     with pytest.raises(SolverFailure, match=r"opened by \S+ mm only and not by 10\.967") as found:
         CalculixSolver(element="S4", scratch=tmp_path).run(coarse, LAW)
     assert (found.value.scratch / "job.inp").exists()
@@ -189,14 +190,13 @@ def test_a_gauge_that_turns_back_is_a_failure():
     with pytest.raises(SolverFailure, match="gets shorter"):
         strip_history(run, coarse, shells, 0)
     with pytest.raises(SolverFailure, match="gets shorter"):
-        strip.corrected(coarse, np.array([1.0, 2.0, 3.0]), run)
+        corrected(coarse, np.array([1.0, 2.0, 3.0]), run.gauge, "calculix")
 
 
 def test_a_correction_reaches_beyond_the_first_run():
     coarse = model("bias", 2, **COARSE)
-    nothing = np.zeros((2, 1, 3))
     half = np.array(coarse.elongations) / 2
-    pulls = strip.corrected(coarse, 3 * half, StripRun(half, nothing, nothing))
+    pulls = corrected(coarse, 3 * half, half, "calculix")
     np.testing.assert_allclose(pulls[:2], 3 * np.array(coarse.elongations))
     assert pulls[2] > pulls[1]
 

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.solvers.bars import BARS, bar_law
 from bubblefit.solvers.calculix import proof
 from bubblefit.solvers.calculix.executable import carries_external, every_ccx, find_ccx
 from bubblefit.solvers.calculix.library import MATERIAL, constants, material_library
-from bubblefit.solvers.calculix.proof import BARS, bar_deck, bar_law, prove
+from bubblefit.solvers.calculix.proof import bar_deck, prove
 from bubblefit.solvers.diagnosis import diagnose
 
 

@@ -13,6 +13,7 @@ from bubblefit.meshes.strain import log_strain_of
 from bubblefit.models.gas import ClosedGas
 from bubblefit.models.inflated import InflatedModel
 from bubblefit.solvers.membrane.cavity import closed_cavity
+from bubblefit.solvers.membrane.closed import Wall
 from bubblefit.solvers.membrane.element import GAUSS_POINTS, reference_elements
 from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.inflated import closed_membrane
@@ -182,7 +183,7 @@ def test_gas_keeps_pressure_times_volume_when_the_tube_is_dented() -> None:
         (model.mesh.points[:, 1] > RADIUS - 1e-6) & (model.mesh.points[:, 2] < 1e-6)
     )
     fixed = np.union1d(model.fixed(), 3 * dent + 1)
-    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed)
+    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed, Wall())
     m.strain_old[:], m.stress_old[:] = inflated.strain_old, inflated.stress_old
     u = history.displacement[-1].copy()
     m.gas = ClosedGas((0.05 + 0.101) * history.cavity_volume[-1] / model.copies, 0.101)

@@ -110,6 +110,7 @@ def test_a_second_term_makes_the_order_move_and_is_said() -> None:
         ([9.0, 1.0, 0.5, 0.5 + 1e-9], "accuracy of the solver"),
         ([1.0, 1.5, 1.25, 1.125], "one order only"),
         ([3.0, 2.0, 1.0, 1.0 - 1e-6], "no power"),
+        ([0.0, 1.0, 1.9], "no limit: refine further"),
     ],
 )
 def test_limits_of_the_extrapolation_are_said(values: list[float], words: str) -> None:

@@ -16,8 +16,8 @@ from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip import strip_mesh, yarn_direction
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from bubblefit.solvers.bars import BARS, bar_law
 from bubblefit.solvers.base import PARAMETERS
-from bubblefit.solvers.calculix.proof import BARS, bar_law
 from bubblefit.solvers.membrane import newton
 from bubblefit.solvers.membrane.driven import Pull
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -23,7 +23,7 @@ TOLERANCES = (1e-4, 1e-3)
 #: Newton's method gets as many iterations as in DESIGN.md, 4a.
 TIME_INCREMENTATION = "6, 10, 9, 30, 14, 6, , 8"
 #: First and least increment of CalculiX as parts of one of the law: at first the flat caps have
-#: no stiffness but bending.
+#: no stiffness but bending. Bending has its own.
 FIRST, LEAST = 0.1, 1e-5
 MOST_INCREMENTS = 1000
 
@@ -56,6 +56,7 @@ def cylinder_decks(
     # The plane of the caps is xy, where the warp runs along x or y.
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
     angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
+    until = len(model.inflation)
     context: dict[str, Any] = {
         "version": __version__,
         "title": f"Cylinder, {len(solids.elements)} solids {ELEMENT}",
@@ -67,12 +68,12 @@ def cylinder_decks(
         "sections": [
             {
                 "set": "TUBE",
-                "constants": constants(law, normal_axis=1, whole_times=True),
+                "constants": constants(law, normal_axis=1, whole_until=until),
                 "around": True,
             },
             {
                 "set": "CAPS",
-                "constants": constants(law, angle=angle, whole_times=True),
+                "constants": constants(law, angle=angle, whole_until=until),
                 "around": False,
             },
         ],
@@ -82,7 +83,6 @@ def cylinder_decks(
             for direction in directions
         ],
         "inflation": list(model.inflation),
-        "last_time": len(model.inflation) + (len(bending["path"]) - 1 if bending else 0),
         "bending": bending,
         "first": FIRST,
         "least": LEAST,

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...models.cylinder import CylinderModel
 from ..base import History
 from .cylinder import cylinder_decks
 from .cylinder_bending import bending_context
-from .cylinder_results import bending_history
+from .cylinder_gas import GasCurve, better_pressure, compliance, gas_pressure
+from .cylinder_results import BentCylinder, bending_history, bent_cylinder, volumes
 from .results import whole_times
 from .solids import solid_mesh
 
@@ -31,17 +31,17 @@ Read = Callable[[Path, int, Converged], Any]
 #: whether the reader is to have a run that stopped early as well.
 Run = Callable[[dict[str, str], Read, bool], Any]
 
-#: Most passes at the pressures that the last one's volumes give (the error falls to a quarter in
-#: each on the thesis' cylinders), and the difference at which it is left, over absolute pressure.
-PASSES, SETTLED = 5, 1e-4
+#: Most passes at the pressures that the last one's volumes give, and what may be left between the
+#: gas and the deck, over absolute pressure: p V is constant to that.
+PASSES, SETTLED = 4, 3e-4
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run: Run) -> History:
     """History of inflation and bending with a constant mass of gas.
 
-    CalculiX knows no gas: the deck has the pressure of each increment, and the volumes found give
-    the pressures for the next pass. The history's are those the deck had; a remark says by how
-    much the gas would differ at the end. A run that stops early is reported up to there.
+    CalculiX knows no gas: the deck has its pressure over the collar's way, and the volumes found
+    give that for the next pass. The history's is the one the deck had; a remark says how far it
+    is from the gas'. A run that stops early is reported up to there.
 
     Raises
     ------
@@ -49,52 +49,31 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run:
     """
     solids = solid_mesh(model)
 
-    def inflated(frd: Path, iterations: int, _: Converged) -> Array:
-        return whole_times(frd, len(model.inflation), len(solids.points))[0][-1]
+    def blown(frd: Path, iterations: int, _: Converged) -> tuple[Array, Array]:
+        start = whole_times(frd, len(model.inflation), len(solids.points))[0]
+        return start[-1], volumes(model, solids.middle(start))
 
-    start: Array = run(cylinder_decks(model, law, solids, folder=folder), inflated, False)
-    # Every increment is looked at: the gas has a pressure at each.
-    every = replace(model, deflections=model.increments)
-    pressures = np.full(len(model.increments), model.pressure)
+    def bent(frd: Path, iterations: int, stopped: Converged) -> BentCylinder:
+        return bent_cylinder(frd, model, solids, iterations, stopped)
+
+    start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown, False)
+    rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
+    slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
+    gas = GasCurve(np.zeros(1), np.full(1, model.pressure))
     for number in range(1, PASSES + 1):
-        bending = bending_context(model, solids, start, pressures.tolist())
-
-        def bent(frd: Path, iterations: int, stopped: Converged, gauge: Array = pressures) -> Any:
-            return bending_history(frd, every, solids, gauge, iterations, stopped)
-
-        history: History = run(cylinder_decks(model, law, solids, bending, folder), bent, True)
-        done = len(history.load) - 1
-        wanted = _of_the_gas(model, history)
-        gap = float(np.abs(wanted - pressures)[:done].max())
-        log.info("pass %d: the gas is %.2g kPa off the deck", number, 1e3 * gap)
-        if gap <= SETTLED * (model.pressure + model.gas.ambient):
+        context = bending_context(model, solids, start, gas)
+        found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, True)
+        given = gas.at(found.deflection)
+        closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
+        gap = gas_pressure(closed, found.volume) - given
+        left = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
+        log.info("pass %d to %.4g mm: p V within %.1e", number, found.deflection[-1], left)
+        if left <= SETTLED or number == PASSES:
             break
-        pressures = wanted
-    remark = f"{number} passes; the gas is within {1e3 * gap:.2g} kPa of the pressure in the deck"
-    return _reported(replace(history, remarks=(*history.remarks, remark)), model)
-
-
-def _of_the_gas(model: CylinderModel, history: History) -> Array:
-    """Gauge pressure (increments,) of the gas in the volumes found; the last one's beyond them."""
-    assert history.cavity_volume is not None
-    full, volume = float(history.cavity_volume[0]), history.cavity_volume[1:]
-    gas = model.gas.closed_in(model.pressure, full)
-    found = [gas.pressure(float(v)) for v in volume]
-    return np.array(found + [found[-1]] * (len(model.increments) - len(found)))
-
-
-def _reported(history: History, model: CylinderModel) -> History:
-    """The inflated state and the reported deflections out of every increment."""
-    keep = np.concatenate([[0], model.reported + 1])
-    keep = keep[keep < len(history.load)]
-    if len(keep) < 2:
-        raise SolverFailure("bending stopped before the first reported deflection", "calculix")
-    assert history.cavity_pressure is not None and history.cavity_volume is not None
-    return replace(
-        history,
-        load=history.load[keep],
-        displacement=history.displacement[keep],
-        reactions={name: values[keep] for name, values in history.reactions.items()},
-        cavity_pressure=history.cavity_pressure[keep],
-        cavity_volume=history.cavity_volume[keep],
-    )
+        better = better_pressure(closed, found.volume, given, slope)
+        gas = GasCurve(found.deflection, better)
+    history = bending_history(model, found, gas)
+    rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)
+    remark = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
+    remark += f"pressure {rise:+.3g} kPa at the end"
+    return replace(history, remarks=(*history.remarks, remark))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from ...errors import InputError, SolverFailure
 from ...meshes.volume import enclosed_volume
 from ...models.cylinder import CylinderModel
 from ..base import History
-from .cylinder_bending import WAITING, body_nodes
-from .frd import FrdFile, FrdFrame
+from .cylinder_bending import ABOVE, body_nodes
+from .cylinder_gas import GasCurve
+from .frd import FrdFile
 from .results import NEAR, extremes, log_strain, whole_times
 from .solids import SolidMesh
 
@@ -45,77 +49,124 @@ def inflation_history(
     )
 
 
-def bending_history(
+@dataclass(frozen=True, eq=False)
+class BentCylinder:
+    """The inflated state, then every increment of bending that converged.
+
+    deflection (n,) mm that the collar has gone down since it met the inflated cylinder;
+    displacement (n, nodes, 3) mm of the middle surface; forces of the cylinder's contacts on
+    the whole (n, 3) N, `supports` and `collar`; volume (n,) mm^3 of the whole; iterations: those
+    of the run; stopped: whether it ended early.
+    """
+
+    deflection: Array
+    displacement: Array
+    reactions: Mapping[str, Array]
+    volume: Array
+    iterations: int
+    stopped: bool
+
+
+def bent_cylinder(
     path: Path,
     model: CylinderModel,
     solids: SolidMesh,
-    pressures: Array,
     iterations: int,
     converged: Collection[tuple[int, int]] | None = None,
-) -> History:
-    """Bending: the inflated cylinder, then every reported deflection; `load` of the collar in N.
+) -> BentCylinder:
+    """What the result file of a deck with both steps holds of bending.
 
     Parameters
     ----------
-    pressures : (increments,) MPa, gauge, that the deck had at every increment of bending.
-    converged : steps and increments that converged, of a run that stopped early: the history then
-        ends with the last of them, and a remark says so. None: the run ended well.
+    converged : steps and increments that converged, of a run that stopped early. None: the run
+        ended well.
 
     Raises
     ------
-    SolverFailure : the file is not there or damaged, or holds no increment of bending; or the run
-        ended and one is missing.
+    SolverFailure : the file is not there or damaged, or holds nothing of bending; or the run
+        ended and the last deflection is missing.
     """
-    ended, converged = converged is None, converged or ()
-    count, start = len(solids.points), len(model.inflation)
+    ended, inflated = converged is None, float(len(model.inflation))
+    count = len(solids.points)
     support, collar = body_nodes(count)
-    wanted = {start: 0.0} | {
-        start + WAITING + 1 + int(i): d
-        for i, d in zip(model.reported, model.deflections, strict=True)
-    }
-    found: dict[int, tuple[Array, Array, Array]] = {}
+    deflections, shapes = list[float](), list[Array]()
+    forces: dict[str, list[Array]] = {"supports": [], "collar": []}
+    damage = ""
     try:
         for frame in FrdFile(path).frames(ended):
-            time = round(frame.time)
             # A run that fails adds a frame of its best guess and residuals: not a result.
-            if not ended and (frame.step, frame.increment) not in converged:
+            if converged is not None and (frame.step, frame.increment) not in converged:
                 continue
-            if time in wanted and abs(frame.time - time) < NEAR and _complete(frame):
-                force = frame.fields["FORC"]
-                found[time] = (
-                    solids.middle(frame.fields["DISP"][:count]),
-                    _of_the_whole(model, force[support]),
-                    _of_the_whole(model, force[collar]),
-                )
+            if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
+                continue
+            moved, force = frame.fields["DISP"], frame.fields["FORC"]
+            down = -float(moved[collar, 1].mean()) - ABOVE
+            if frame.step > 1 and down <= 0:
+                continue  # not on the cylinder yet
+            deflections.append(max(down, 0.0))
+            shapes.append(solids.middle(moved[:count]))
+            # What holds the bodies in place is what the cylinder does to them, turned round.
+            forces["supports"].append(_of_the_whole(model, force[support]))
+            forces["collar"].append(_of_the_whole(model, force[collar]))
     except InputError as error:
-        if ended or len(found) < 2:
-            raise SolverFailure(f"no usable results: {error}", "calculix") from None
-    times = [time for time in wanted if time in found]
-    if len(times) < 2 or (ended and len(times) < len(wanted)):
-        problem = f"{path}: holds {len(times)} of {len(wanted)} frames"
+        damage = str(error)
+    last = model.deflections[-1]
+    reached = deflections[-1] if len(deflections) > 1 else 0.0
+    if not reached or (ended and (damage or reached < last * (1 - NEAR))):
+        problem = damage or f"{path}: ends at {reached:g} of {last:g} mm of deflection"
         raise SolverFailure(f"no usable results: {problem}", "calculix")
-    middle = np.ascontiguousarray([found[time][0] for time in times])
-    # What holds the bodies in place is what the cylinder does to them, turned round.
-    reactions = {
-        "supports": np.array([found[time][1] for time in times]),
-        "collar": np.array([found[time][2] for time in times]),
-    }
+    middle = np.ascontiguousarray(shapes)
+    reactions = {name: np.array(values) for name, values in forces.items()}
+    for values in reactions.values():
+        values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
+    return BentCylinder(
+        np.array(deflections), middle, reactions, volumes(model, middle), iterations, not ended
+    )
+
+
+def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
+    """Inflated state and reported deflections, between the increments by cubics; `load` in N.
+
+    Parameters
+    ----------
+    gas : the pressure that the deck had.
+
+    Raises
+    ------
+    SolverFailure : it stopped before the first reported deflection.
+    """
+    reached = float(bent.deflection[-1])
+    wanted = np.array([0.0, *model.deflections])
+    wanted = np.minimum(wanted[wanted <= reached * (1 + NEAR)], reached)
+    if len(wanted) < 2:
+        problem = f"bending stopped at {reached:g} mm, before the first reported deflection"
+        raise SolverFailure(problem, "calculix")
+    at = partial(_between, bent.deflection, wanted=wanted)
+    reactions = {name: at(values) for name, values in bent.reactions.items()}
     remarks: tuple[str, ...] = ()
-    if len(times) < len(wanted):
-        last = wanted[times[-1]]
-        remarks = (f"the run stopped early; the last increment is at {last:g} mm of deflection",)
-    gauge = np.concatenate([[model.pressure], np.asarray(pressures)[model.reported]])
+    if bent.stopped:
+        remarks = (f"the run stopped early; the last increment is at {reached:.4g} mm",)
     return History(
         -reactions["collar"][:, 1],
-        middle,
-        *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
+        at(bent.displacement),
+        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)),
         reactions,
-        cavity_pressure=gauge[: len(times)],
-        cavity_volume=volumes(model, middle),
-        iterations=iterations,
-        path=middle,
+        cavity_pressure=gas.at(wanted),
+        cavity_volume=at(bent.volume),
+        iterations=bent.iterations,
+        path=bent.displacement,
         remarks=remarks,
     )
+
+
+def _between(x: Array, values: Array, wanted: Array) -> Array:
+    """Values (n, ...) at x (n,), n > 1, at the `wanted` places.
+
+    Cubics with slopes from neighbours only: linear in the values, so that forces in balance stay
+    so, and what happens at one increment (a wrinkle) spreads no further than the next.
+    """
+    slopes = np.gradient(values, x, axis=0)
+    return np.asarray(CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
 
 
 def volumes(model: CylinderModel, displacements: Array) -> Array:
@@ -128,7 +179,3 @@ def volumes(model: CylinderModel, displacements: Array) -> Array:
 def _of_the_whole(model: CylinderModel, force: Array) -> Array:
     """(3,) N: a quarter's forces along x and z cancel against those of the other quarters."""
     return np.array([0.0, model.copies * force[:, 1].sum(), 0.0])
-
-
-def _complete(frame: FrdFrame) -> bool:
-    return {"DISP", "FORC"} <= frame.fields.keys()

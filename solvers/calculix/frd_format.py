@@ -6,7 +6,6 @@ meshio has no reader of its own for this format. For the other increments: `frd.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import meshio
 
@@ -39,21 +38,12 @@ def read(filename: Path | str) -> meshio.Mesh:
     # Here, not above: this module is imported with bubblefit, and reading is rare.
     import numpy as np
 
-    from ...errors import InputError
+    from ..cells import cell_blocks
     from .frd import FrdFile
 
     file = FrdFile(filename)
-    cells: list[tuple[str, list[Any]]] = []
-    for kind, numbers in file.mesh.elements:
-        name, order = CELLS[kind]
-        place = np.searchsorted(file.mesh.numbers, numbers)
-        place = np.minimum(place, len(file.mesh.numbers) - 1)
-        if (file.mesh.numbers[place] != numbers).any():
-            raise InputError(file.path, "elements", "refer to a node that is not there")
-        if not cells or cells[-1][0] != name:
-            cells.append((name, []))
-        cells[-1][1].append(place if order is None else place[list(order)])
-    mesh = meshio.Mesh(file.mesh.points, [(name, np.array(rows)) for name, rows in cells])
+    cells = cell_blocks(file.path, file.mesh.numbers, file.mesh.elements, CELLS)
+    mesh = meshio.Mesh(file.mesh.points, cells)
     for frame in file.frames():
         mesh.point_data = dict(frame.fields)
         mesh.field_data = {

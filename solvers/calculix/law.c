@@ -23,7 +23,8 @@ enum { /* *USER MATERIAL, CONSTANTS=22, or 28 for a tri-linear law: the order of
     TRANSVERSE_SHEAR = 18,
     ANGLE = 19,         /* degrees from the first in-plane axis to warp, about the normal */
     NORMAL_AXIS = 20,   /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
-    WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number */
+    WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number;
+                           -n: so up to the total time n, then at every increment; 0: at every one */
     CONSTANTS = 22,
     BREAKS = 22,        /* 6, tri-linear: two strains each of eps1, eps2, gamma12, where the
                            modulus changes from coefficient 4 of its block to 3 and to 2 */
@@ -282,7 +283,9 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
     good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);
     /* With one *STEP of length 1 for every increment of the law, the strain path does not depend on
      * how many increments CalculiX needed in between (cut-back in the membrane solver likewise). */
-    int commit = good && !(k[WHOLE_TIMES] > 0 && fabs(*time + *ttime - round(*time + *ttime)) > 1e-9);
+    double now = *time + *ttime, whole = k[WHOLE_TIMES];
+    int only_whole = whole > 0 || now < -whole;
+    int commit = good && !(only_whole && fabs(now - round(now)) > 1e-9);
     for (int i = 0; i < STATES; i++) xstate[place + i] = commit ? state[i] : old[i];
     if (!good) { /* stre stays what it was; the stiffness only has to be harmless */
         if (!(*pnewdt > 0 && *pnewdt < SMALLER_INCREMENT)) *pnewdt = SMALLER_INCREMENT;

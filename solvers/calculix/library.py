@@ -40,6 +40,7 @@ def constants(
     angle: float = 0.0,
     normal_axis: int = 3,
     whole_times: bool = False,
+    whole_until: int = 0,
 ) -> tuple[float, ...]:
     """The constants of `*USER MATERIAL`, (22,) or (28,) for a tri-linear law, as `law.c` has them.
 
@@ -58,6 +59,7 @@ def constants(
         axial and fill hoop at angle 0.
     whole_times : commit strain and stress only where the total time is a whole number, so that
         the law's increments are the deck's steps of length 1, whatever increments they took.
+    whole_until : instead: so up to this total time, and from there on at every increment.
 
     Raises
     ------
@@ -79,7 +81,8 @@ def constants(
     coefficients = (float(b) for b in law.beta)
     through = (law.area_power, normal_modulus, transverse_shear, float(angle), float(normal_axis))
     breaks = (float(strain) for strain in law.limits[3:])
-    return (*coefficients, law.nu12, *ends, *through, float(whole_times), *breaks)
+    whole = -float(whole_until) if whole_until else float(whole_times)
+    return (*coefficients, law.nu12, *ends, *through, whole, *breaks)
 
 
 def compiler() -> list[str]:

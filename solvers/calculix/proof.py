@@ -6,54 +6,18 @@ import os
 import re
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
-import numpy as np
 
 from ...errors import OutputError, SolverFailure
-from ...materials.law import HypoelasticLaw
+from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law
 from .library import MATERIAL, STATE_VARIABLES, constants, material_library
 
 TEMPLATES = Path(__file__).parent.parent.parent / "templates" / "calculix"
-#: Relative. The integral of the published coefficients (5 digits) is within 6e-5 of every stress.
-TOLERANCE = 1e-4
-INCREMENTS = 100
 SECONDS = 120.0
 #: Corners of a bar, in the order of C3D8.
 NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
-
-
-@dataclass(frozen=True)
-class Bar:
-    """A uniaxial test of Valmex 7318 computed with MSC Marc.
-
-    modulus: E of log strain, constant term first, GPa; elongation: engineering strain at the
-    end; stress: Marc's end stress, MPa. Source: the published models of the uniaxial tests
-    (Composite Structures, 2017).
-    """
-
-    model: str
-    direction: str
-    modulus: tuple[float, float, float, float]
-    elongation: float
-    stress: float
-
-
-BARS = (
-    Bar("direct", "warp", (0.80335, -20.444, 217.66, -589.2), 0.16516831, 62.677),
-    Bar("direct", "fill", (0.07528, 1.07347, -0.82337, 0.0), 0.26079895, 42.855),
-    Bar("inverse", "warp", (0.80877, -20.725, 225.88, -575.28), 0.16516831, 71.912),
-    Bar("inverse", "fill", (0.07624, 1.14164, 0.75244, 0.0), 0.26079895, 51.448),
-)
-
-
-def bar_law(model: str) -> HypoelasticLaw:
-    """The law of a published model; the shear modulus (20 MPa) plays no part in a bar."""
-    of = {bar.direction: bar.modulus for bar in BARS if bar.model == model}
-    gigapascal = (0.0, 0.0, 0.0, 0.02, *of["fill"][::-1], *of["warp"][::-1])
-    return HypoelasticLaw(1e3 * np.array(gigapascal))
 
 
 def bar_deck() -> str:

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
-from ...meshes.mesh import Mesh
-from ...meshes.strain import log_strain_of
 from ...models.bubble import BubbleModel
 from ..base import History
-from ..membrane.element import reference_elements
+from ..strains import extremes, log_strain
 from .frd import FrdFile
 from .pressure import pressure_forces
 from .shells import ShellMesh
@@ -47,27 +45,6 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
         iterations=iterations,
         path=corners,
     )
-
-
-def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> Array:
-    """(frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
-
-    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; x unless given.
-    """
-    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
-    yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
-    slopes = reference_elements(points, quads, yarn).slopes
-    frames = []
-    for displacement in displacements:
-        gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])
-        frames.append(log_strain_of(gradient))
-    return np.array(frames)
-
-
-def extremes(strain: Array) -> tuple[Array, Array]:
-    """Least and largest of each of the last axis' components, the unstrained start included."""
-    flat = strain.reshape(-1, strain.shape[-1])
-    return np.minimum(flat.min(axis=0), 0.0), np.maximum(flat.max(axis=0), 0.0)
 
 
 def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:

@@ -14,8 +14,8 @@ from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
 from ..base import History, SolverCheck
-from ..process import log_tail, run_process
-from ..scratch import fresh_folder, put_aside, remove
+from ..process import Watch, run_process
+from ..scratch import run_folder
 from . import bubble, cylinder_analysis, strip
 from .executable import ADVICE, Executable, find_ccx
 from .library import material_library
@@ -141,24 +141,8 @@ class CalculixSolver:
     ) -> T:
         """One run in a fresh scratch folder; what `read` makes of it, or `rescue` of a bad end."""
         program, library = self.executable().path, material_library()
-        folder = fresh_folder("ccx", parent)
-        try:
-            found = self._in(folder, program, library, files, timeout, read, rescue)
-        except SolverFailure as failure:
-            kept = put_aside(folder)
-            log.info("failed run kept in %s", kept)
-            tail = log_tail(kept / f"{JOB}.log")
-            raise SolverFailure(
-                failure.reason, self.name, failure.exit_number, tail, kept
-            ) from None
-        except BaseException:
-            remove(folder)  # interrupted, or never begun: there is nothing to look into
-            raise
-        if self.keep:
-            log.info("run kept in %s", folder)
-        else:
-            remove(folder)
-        return found
+        with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
+            return self._in(folder, program, library, files, timeout, read, rescue)
 
     def _in(
         self,
@@ -190,7 +174,7 @@ class CalculixSolver:
             folder / f"{JOB}.log",
             timeout,
             environment,
-            _Watch(sta, self.progress) if self.progress is not None else None,
+            None if self.progress is None else Watch(lambda: increments(sta), self.progress),
         )
         problem = reason(folder, JOB, outcome, timeout)
         done = increments(sta)
@@ -211,16 +195,3 @@ class CalculixSolver:
         if self._shells is None or self._shells[0] is not model.mesh:
             self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
         return self._shells[1]
-
-
-class _Watch:
-    """Tells of every increment once, as it appears in the .sta file."""
-
-    def __init__(self, sta: Path, tell: Callable[[Increment], None]) -> None:
-        self.sta, self.tell, self.told = sta, tell, 0
-
-    def __call__(self) -> None:
-        fresh = increments(self.sta)[self.told :]
-        self.told += len(fresh)
-        for increment in fresh:
-            self.tell(increment)

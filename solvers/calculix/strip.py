@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -10,19 +9,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
-from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
 from ..base import History
-from ..membrane.solver import MembraneSolver
+from ..pulls import as_the_membrane, corrected, direct, evenly
 from .deck import deck_files
 from .library import constants
 from .shells import ShellMesh
-from .strip_results import StripRun, strip_history, strip_run
-
-log = logging.getLogger(__name__)
+from .strip_results import strip_history, strip_run
 
 Array = NDArray[np.float64]
 #: Runs a deck in a scratch folder and hands .frd file and iterations to a reader.
@@ -34,8 +29,6 @@ DECK = "strip.inp.j2"
 TOLERANCES = (1e-5, 1e-4)
 #: Least increment of CalculiX as a part of one of the law.
 LEAST = 1 / 256
-#: How much further than expected the grips go, so that the gauge reaches its length for sure.
-BEYOND = 1.02
 
 
 def analyse(
@@ -48,10 +41,7 @@ def analyse(
 ) -> History:
     """History of a strip, at the model's elongations of the gauge.
 
-    CalculiX drives the grips: an equation for the gauge would put the force at its nodes. Grips
-    that are the gauge are driven as the model has it. Others follow the path on which the membrane
-    opens the gauge under the same law (without one: an even stretch, run once to correct it).
-    CalculiX' own gauge then differs a little, and its results are interpolated to the model's.
+    CalculiX drives the grips, see `pulls`.
 
     Raises
     ------
@@ -61,13 +51,13 @@ def analyse(
     def decks(pulls: Array) -> dict[str, str]:
         return strip_decks(model, law, shells, element, pulls, folder)
 
-    pulls = _direct(model)
+    pulls = direct(model)
     if pulls is None:
-        pulls = _as_the_membrane(model, law)
+        pulls = as_the_membrane(model, law)
     if pulls is None:
-        even = _even(model)
+        even = evenly(model)
         first = run(decks(even), lambda frd, _: strip_run(frd, model, shells, len(even)))
-        pulls = corrected(model, even, first)
+        pulls = corrected(model, even, first.gauge, "calculix")
     count = len(pulls)
 
     def read(frd: Path, iterations: int) -> History:
@@ -106,48 +96,3 @@ def strip_decks(
         "most_increments": 4 * len(pulls) + 200,
     }
     return deck_files(DECK, "Strip", shells, element, TOLERANCES, context, folder)
-
-
-def corrected(model: UniaxialModel, pulls: Array, first: StripRun) -> Array:
-    """Pulls (increments + 1,) at which the gauge of a `first` run with `pulls` was as wanted.
-
-    Beyond the end of the first run as steeply as at its end.
-    """
-    gauge, pull = np.insert(first.gauge, 0, 0.0), np.insert(pulls, 0, 0.0)
-    if not (np.diff(gauge) > 0).all():
-        raise SolverFailure("the gauge gets shorter while the grips move apart", "calculix")
-    levels = np.array(model.elongations)
-    steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
-    inside = CubicSpline(gauge, pull)(np.minimum(levels, gauge[-1]))
-    found = inside + steep * np.maximum(levels - gauge[-1], 0.0)
-    return _onward(found)
-
-
-def _direct(model: UniaxialModel) -> Array | None:
-    """The pulls when the gauge lies between the grips themselves, along the pull."""
-    lower, upper = (3 * node + np.arange(3) for node in model.mesh.node_sets["gauge"])
-    held = np.isin(np.concatenate([lower[[0, 2]], upper]), model.fixed).all()
-    ends = model.mesh.points[model.mesh.node_sets["gauge"]]
-    along = ends[0, 0] == ends[1, 0] and ends[0, 1] < ends[1, 1]
-    if held and along and lower[1] in model.driven:
-        return np.array(model.elongations)
-    return None
-
-
-def _as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
-    try:
-        history = MembraneSolver().run(model, law)
-    except SolverFailure as failure:
-        log.info("grips are pulled evenly first: %s", failure)
-        return None
-    return _onward(-history.displacement[:, model.mesh.node_sets[model.pulled][0], 1])
-
-
-def _even(model: UniaxialModel) -> Array:
-    """As if the whole strip stretched as the gauge does."""
-    length = float(np.ptp(model.mesh.points[:, 1]))
-    return np.array(model.elongations) * length / model.gauge_length
-
-
-def _onward(pulls: Array) -> Array:
-    return np.append(pulls, BEYOND * pulls[-1])

@@ -16,7 +16,7 @@ from .settling import settled
 
 Array = NDArray[np.float64]
 
-MOST_CUTS, MOST_ITERATIONS = 3, 20
+MOST_CUTS = 3
 #: A node further from where the last increments led to than this many times the collar's way.
 SNAP = 4.0
 #: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
@@ -29,12 +29,12 @@ def analyse(
     inflated: Array,
     pressure: float,
     extremes: tuple[Array, Array],
-    wall: NDArray[np.bool_],
+    sides: NDArray[np.bool_],
 ) -> History:
     """Frames of the bending: first the inflated state, then one for every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
-    all bodies on it, `wrinkled` a share of `wall` (elements,). Where no equilibrium is found on
+    all bodies on it, `wrinkled` a share of `sides` (elements,). Where no equilibrium is found on
     the way, the history ends with the last good frame and says so.
 
     Raises
@@ -50,7 +50,7 @@ def analyse(
     volume, _ = membrane.cavity.measure(position)
     membrane.gas = plan.gas.closed_in(pressure, volume)
     membrane.penalty = plan.penalty
-    membrane.keep_tangent, membrane.most_iterations = True, MOST_ITERATIONS
+    membrane.keep_tangent = True
 
     def bodies(moved: float) -> tuple[RigidCylinder, ...]:
         centre = np.asarray(collar.centre) + moved * way
@@ -61,7 +61,7 @@ def analyse(
     wrinkle = membrane.wrinkle.copy()
     gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
     snaps: list[float] = []
-    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(wall)], 0.0, 0.0
+    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
     for wanted in plan.displacements:
         start = path[-1]
         if len(path) > 2:
@@ -81,7 +81,7 @@ def analyse(
         moves.append(wanted)
         gas.append((membrane.pressure, membrane.volume))
         pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
-        wrinkled.append(membrane.wrinkled_share(wall))
+        wrinkled.append(membrane.wrinkled_share(sides))
         of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
         now = membrane.reference + found
         deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
@@ -119,7 +119,7 @@ def analyse(
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations,
         path=np.array(path),
-        wrinkled=np.array(wrinkled)[frames] if membrane.wrinkle_stiffness is not None else None,
+        wrinkled=np.array(wrinkled)[frames],
         remarks=tuple(remarks),
     )
 

@@ -20,13 +20,14 @@ class Cavity:
     weight, origin (3,): see `volume_and_gradient`. A plane x_k = origin_k adds nothing to
     direction k, and nothing to any other because its normal is along k; where two planes share a
     direction (a slice of a long tube) that direction gets no weight. symmetric (3,): directions
-    with a plane.
+    with a plane; planes (n, 3): nodes of open edges in one, by its normal.
     """
 
     quads: NDArray[np.intp]
     weight: Array
     origin: Array
     symmetric: NDArray[np.bool_]
+    planes: NDArray[np.bool_]
 
     def measure(self, position: Array) -> tuple[float, Array]:
         """Volume (mm^3) of the meshed part at `position` (n, 3), and its derivative (3 n,) mm^2."""
@@ -67,4 +68,7 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
             weight[k] = float(np.ptp(at) < 1e-9 * size)
     if not weight.any():
         raise InputError(None, "mesh", "the cavity is closed by planes on all six sides")
-    return Cavity(quads, weight / weight.sum(), origin, in_plane.any(axis=0))
+    planes = np.zeros(points.shape, dtype=bool)
+    for k in range(3):
+        planes[border[in_plane[:, k]], k] = True
+    return Cavity(quads, weight / weight.sum(), origin, in_plane.any(axis=0), planes)

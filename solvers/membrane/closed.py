@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import InputError
+from ...materials.law import HypoelasticLaw
 from ...models.gas import ClosedGas
 from ...models.inflated import RigidCylinder
 from .cavity import Cavity
 from .contact import contact_forces
 from .factorisation import Tangent
+from .flexure import Flexure
 from .line_search import searched_equilibrium
 from .newton import Membrane, initial_moduli
 
@@ -51,6 +55,35 @@ class BorderedTangent:
         return np.asarray(x - share * np.multiply.outer(self.answer, across))
 
 
+@dataclass(frozen=True)
+class Wall:
+    """What a closed membrane's wall does where it is pressed together.
+
+    Parameters
+    ----------
+    wrinkle_stiffness : share of its stiffness that is left across a wrinkle (a tension field, see
+        materials/relaxation.py); None: it carries compression as it carries tension, and folds
+        where that makes it unstable.
+    bending_stiffness : share of the wall's own, E t^3/12, that counts where rigid bodies bend the
+        membrane; with none, folds are as fine as the mesh.
+
+    Raises
+    ------
+    InputError : a share that is not a number from 0 to 1 (bending: to any size).
+    """
+
+    wrinkle_stiffness: float | None = None
+    bending_stiffness: float = 1.0
+
+    def __post_init__(self) -> None:
+        share = self.wrinkle_stiffness
+        if share is not None and not 0 < share <= 1:
+            raise InputError(None, "wrinkle_stiffness", f"expected 0 < share <= 1, got {share!r}")
+        if not 0 <= self.bending_stiffness < np.inf:
+            problem = f"expected 0 or more, got {self.bending_stiffness!r}"
+            raise InputError(None, "bending_stiffness", problem)
+
+
 @dataclass(eq=False, kw_only=True)
 class ClosedMembrane(Membrane):
     """A membrane with a cavity. `tangent` is a `BorderedTangent`.
@@ -60,10 +93,15 @@ class ClosedMembrane(Membrane):
     slack : MPa of artificial isotropic stress in the next tangent; it fades with every tangent
         and is in no residual, so that no equilibrium depends on it.
     viscosity, anchor : MPa/mm times the distance (n, 3) from there resists; see `drag`.
+    flexure, line_slot : the lines of the mesh that resist bending, if any do, and the places
+        (lines, 144) of their stiffness in the tangent, each a quad of before, node, after, node.
     pressure, volume : at the last evaluation.
     """
 
     cavity: Cavity
+    wall: Wall = field(default_factory=Wall)
+    flexure: Flexure | None = None
+    line_slot: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 144), dtype=np.int64))
     gas: ClosedGas | None = None
     bodies: Sequence[RigidCylinder] = ()
     penalty: float = 5.0
@@ -76,6 +114,7 @@ class ClosedMembrane(Membrane):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._stiff: tuple[HypoelasticLaw, sp.csr_matrix, Array] | None = None
         e, dn = self.elements, self.elements.slopes
         weight: Array = e.area * self.section[:, None]
         #: (elements, 4, 4) N/mm for 1 MPa of isotropic stress
@@ -103,6 +142,20 @@ class ClosedMembrane(Membrane):
             self.tangent.border = push[self.free]
         return super().unbalance(u, self.pressure, with_tangent)
 
+    def bending_stiffness(self) -> tuple[sp.csr_matrix, Array]:
+        """Of all unknowns, and what it adds to the tangent's data; anew where the law is new."""
+        assert self.flexure is not None
+        if self._stiff is None or self._stiff[0] is not self.law:
+            added = np.zeros(len(self.tangent.data))
+            slot = self.line_slot.reshape(-1, 4, 3, 4, 3)[:, :3, :, :3]
+            values = self.flexure.stiffness(self.law)
+            for k in range(3):
+                places = slot[:, :, k, :, k]
+                inside = places >= 0
+                np.add.at(added, places[inside], values[:, k][inside])
+            self._stiff = (self.law, self.flexure.matrix(self.law, len(self.reference)), added)
+        return self._stiff[1], self._stiff[2]
+
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
         """As of any membrane; with a line search where rigid bodies may touch it."""
         if self.bodies:
@@ -110,6 +163,11 @@ class ClosedMembrane(Membrane):
         return super().equilibrium(u, pressure)
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
+        if self.flexure is not None:
+            matrix, added = self.bending_stiffness()
+            self.residual += matrix @ (self.reference + u).reshape(-1)
+            if with_tangent:
+                self.tangent.data += added
         if with_tangent and self.slack > 0:
             self._add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= FADE
@@ -132,10 +190,14 @@ class ClosedMembrane(Membrane):
         """Resist (MPa/mm) every motion away from the displacement `anchor` (n, 3), or no more."""
         self.viscosity, self.anchor = viscosity, anchor
 
-    def wrinkled_share(self, wall: NDArray[np.bool_]) -> float:
-        """Share of the reference surface of `wall` (elements,) without stress in one direction."""
-        area = self.elements.area[wall]
-        folded = (self.wrinkle[wall] != 0.0).any(axis=2)
+    def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
+        """Share of the reference surface of `sides` (elements,) without tension in a direction.
+
+        There a wall without bending stiffness wrinkles.
+        """
+        area, s = self.elements.area[sides], self.stress_new[sides]
+        least = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(0.5 * (s[..., 0] - s[..., 1]), s[..., 2])
+        folded = (self.wrinkle[sides] != 0.0).any(axis=2) | (least < 0.0)
         return float(area[folded].sum() / area.sum())
 
     def wrinkle_work(self, wrinkle: Array) -> float:

@@ -14,9 +14,10 @@ from ...models.inflated import InflatedModel
 from ..base import History
 from . import bending
 from .cavity import closed_cavity
-from .closed import BorderedTangent, ClosedMembrane
+from .closed import BorderedTangent, ClosedMembrane, Wall
 from .element import reference_elements
 from .factorisation import tangent_for
+from .flexure import flexure_of
 from .newton import initial_moduli
 from .snap import through_snap
 
@@ -28,10 +29,10 @@ MOST_GROWTH = 0.1
 
 
 def prepare(
-    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wrinkle_stiffness: float | None
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall
 ) -> ClosedMembrane:
     """What does not change from one law to the next."""
-    return closed_membrane(model, law, tolerance, model.fixed(), wrinkle_stiffness)
+    return closed_membrane(model, law, tolerance, model.fixed(), wall)
 
 
 def closed_membrane(
@@ -39,7 +40,7 @@ def closed_membrane(
     law: HypoelasticLaw,
     tolerance: float,
     fixed: NDArray[np.intp],
-    wrinkle_stiffness: float | None = None,
+    wall: Wall,
 ) -> ClosedMembrane:
     """The membrane of a model with these unknowns held."""
     points = np.array(model.mesh.points, dtype=float)
@@ -47,19 +48,34 @@ def closed_membrane(
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))
     elements = reference_elements(points, quads, warp)
     free = np.setdiff1d(np.arange(points.size), fixed)
+    cavity, thickness = (
+        closed_cavity(points, quads, fixed),
+        np.asarray(model.thickness, dtype=float),
+    )
+    flexure, coupled = None, quads
+    if model.bending is not None and wall.bending_stiffness > 0:
+        flexure = flexure_of(points, quads, warp, thickness, cavity.planes)
+        flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)
+        before, node, after = flexure.nodes.T
+        coupled = np.concatenate([quads, np.stack([before, node, after, node], axis=1)])
+    tangent = tangent_for(coupled, points.size, free, points)
+    tangent.slot, line_slot = tangent.slot[: len(quads)], tangent.slot[len(quads) :]
     return ClosedMembrane(
         points,
         quads,
         elements,
-        np.asarray(model.thickness, dtype=float),
+        thickness,
         law,
         free,
-        BorderedTangent(tangent_for(quads, points.size, free, points)),
+        BorderedTangent(tangent),
         tolerance,
         # A slack step much larger than a facet folds the mesh.
         step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
-        wrinkle_stiffness=wrinkle_stiffness,
-        cavity=closed_cavity(points, quads, fixed),
+        wrinkle_stiffness=wall.wrinkle_stiffness,
+        wall=wall,
+        cavity=cavity,
+        flexure=flexure,
+        line_slot=line_slot,
     )
 
 
@@ -88,7 +104,7 @@ def analyse(
     volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
     low, high = np.zeros(3), np.zeros(3)
     remarks: list[str] = []
-    wall = outside_caps(model)
+    sides = outside_caps(model)
     membrane.keep_tangent = False
     for i in range(len(levels)):
         path[i], snapped = _increment(membrane, path[:i], levels, i)
@@ -99,18 +115,18 @@ def analyse(
             )
         membrane.accept()
         forces[i], volume[i] = membrane.residual.reshape(shape), membrane.volume
-        wrinkled[i] = membrane.wrinkled_share(wall)
+        wrinkled[i] = membrane.wrinkled_share(sides)
         np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
         np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
     if model.bending is not None:
         bent = closed_membrane(
             model, membrane.law, membrane.tolerance, model.fixed(bent=True),
-            membrane.wrinkle_stiffness,
+            membrane.wall,
         )  # fmt: skip
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
         bent.iterations = membrane.iterations
-        history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high), wall)
+        history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high), sides)
         history = replace(history, remarks=(*remarks, *history.remarks))
     else:
         reactions = {
@@ -126,7 +142,7 @@ def analyse(
             cavity_volume=model.copies * volume,
             iterations=membrane.iterations,
             path=path,
-            wrinkled=wrinkled if membrane.wrinkle_stiffness is not None else None,
+            wrinkled=wrinkled,
             remarks=tuple(remarks),
         )
     return history, np.zeros((*history.displacement.shape, 0))
@@ -134,9 +150,9 @@ def analyse(
 
 def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
     """(elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
-    wall = np.ones(len(model.mesh.quads), dtype=bool)
-    wall[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
-    return wall
+    sides = np.ones(len(model.mesh.quads), dtype=bool)
+    sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
+    return sides
 
 
 def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> tuple[Array, bool]:

@@ -37,8 +37,7 @@ class Membrane:
     reference (n, 3) mm; thickness mm, one or (elements,), which section (elements,) repeats;
     strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal correction of one
     iteration; keep_tangent: end every increment with the tangent of its
-    equilibrium assembled (sensitivities want it; in a chord step it costs little more);
-    most_iterations: then there is no equilibrium from this start.
+    equilibrium assembled (sensitivities want it; in a chord step it costs little more).
     wrinkle_stiffness: share of the stiffness left to wrinkles; None: the membrane carries
     compression as it carries tension. wrinkle (elements, 4, 3): strain of the fabric less that of
     the surface at the last evaluation.
@@ -54,7 +53,6 @@ class Membrane:
     tolerance: float
     step_limit: float
     keep_tangent: bool = False
-    most_iterations: int = MOST_ITERATIONS
     iterations: int = 0
     wrinkle_stiffness: float | None = None
     wrinkle: Array = field(init=False)
@@ -120,7 +118,7 @@ class Membrane:
         last, scale, backtracks, chord = np.inf, 1.0, 0, False
         least, idle = np.inf, 0
         jumps, fruitless = self.law.breaks is not None, 0
-        for _ in range(self.most_iterations):
+        for _ in range(MOST_ITERATIONS):
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             if norm < self.tolerance:
                 return u

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ...models.gas import ClosedGas
 from .closed import ClosedMembrane
+from .settling import settled
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
             if found is None and step < 0.5 * STEP:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.
                 found = membrane.equilibrium_from_slack(u, level)
+                if found is None:
+                    found = settled(membrane, u + step * slope)
             if found is None:
                 step, slope = 0.5 * step, np.zeros_like(u)
                 continue

@@ -18,7 +18,7 @@ from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
 from ..base import PARAMETERS, History, SolverCheck
 from . import bubble, inflated, strip
-from .closed import ClosedMembrane
+from .closed import ClosedMembrane, Wall
 from .cylinder import closed_membrane_of
 from .newton import Membrane
 
@@ -40,13 +40,24 @@ class MembraneSolver:
     wrinkle_stiffness : share of its stiffness that a closed membrane keeps across its wrinkles
         (tension field, materials/relaxation.py); None: it carries compression as it carries
         tension, as bubbles and strips do.
+    bending_stiffness : share of the wall's own that counts where rigid bodies bend a closed
+        membrane (solvers/membrane/flexure.py).
+
+    Raises
+    ------
+    InputError : as `Wall`.
     """
 
     name = "membrane"
     external = False
 
-    def __init__(self, tolerance: float = 1e-8, wrinkle_stiffness: float | None = 0.001) -> None:
-        self.tolerance, self.wrinkle_stiffness = tolerance, wrinkle_stiffness
+    def __init__(
+        self,
+        tolerance: float = 1e-8,
+        wrinkle_stiffness: float | None = None,
+        bending_stiffness: float = 1.0,
+    ) -> None:
+        self.tolerance, self.wall = tolerance, Wall(wrinkle_stiffness, bending_stiffness)
         self._prepared: tuple[Model, Membrane] | None = None
 
     def check(self) -> SolverCheck:
@@ -120,7 +131,7 @@ class MembraneSolver:
                 membrane = strip.prepare(model, law, self.tolerance)
             elif isinstance(model, CylinderModel | InflatedModel):
                 closed = closed_membrane_of(model) if isinstance(model, CylinderModel) else model
-                membrane = inflated.prepare(closed, law, self.tolerance, self.wrinkle_stiffness)
+                membrane = inflated.prepare(closed, law, self.tolerance, self.wall)
             else:
                 membrane = bubble.prepare(model, law, self.tolerance)
             self._prepared = (model, membrane)

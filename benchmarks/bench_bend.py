@@ -1,0 +1,107 @@
+"""Bending on CalculiX beside the membrane: inflated state, load-deflection, cost.
+
+Usage: bench_bend.py [SIZE [CASE ...]]. SIZE: mm of an element (30 unless given); CASE:
+DIAMETER/KPA of the thesis' Table 6.1 (150/140 200/100 250/85 unless given). Both solvers have the
+same model, mesh and law (card of Table 4.2, moduli held beyond 0.13) in increments of 4 mm. Cost is
+CPU time on one core, one run after the other. A solver that stops early is compared up to there.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+
+import numpy as np
+from bubblefit.errors import SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.models.cylinder import CylinderModel
+from bubblefit.solvers.base import History, Solver
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+# Thesis Table 4.2, "solution", GPa.
+TABLE_4_2 = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
+    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
+THICKNESS, SIZE, CASES = 0.81, 30.0, ("150/140", "200/100", "250/85")
+SHOWN = np.arange(20.0, 241.0, 20.0)
+
+
+def main() -> None:
+    size = float(sys.argv[1]) if len(sys.argv) > 1 else SIZE
+    with threadpool_limits(1):
+        # Compiled before the clock runs.
+        MembraneSolver().run(inflated_cylinder(150, 0.14, THICKNESS, 60.0, deflections=[2.0]), LAW)
+        for case in sys.argv[2:] or CASES:
+            diameter, pressure = (float(part) for part in case.split("/"))
+            compare(inflated_cylinder(diameter, 1e-3 * pressure, THICKNESS, size), case)
+
+
+def compare(model: CylinderModel, case: str) -> None:
+    print(f"\n## {case} (mm/kPa), {len(model.mesh.quads):,} quads")
+    found = {s.name: run(s, model) for s in (MembraneSolver(), CalculixSolver())}
+    histories = [pair[0] for pair in found.values()]
+    if any(history is None for history in histories):
+        return
+    membrane, calculix = (history for history in histories if history is not None)
+    states = (inflated(model, membrane), inflated(model, calculix))
+    print("\n| inflated | membrane | CalculiX | difference, % |\n|---|---|---|---|")
+    for (name, ours), theirs in zip(states[0].items(), states[1].values(), strict=True):
+        print(f"| {name} | {ours:.6g} | {theirs:.6g} | {percent(ours, theirs):+.3f} |")
+    print("\n| deflection, mm | membrane, N | CalculiX, N | difference, % |\n|---|---|---|---|")
+    ours, theirs = load_at(model, membrane), load_at(model, calculix)
+    for row in zip(SHOWN, ours, theirs, percent(ours, theirs), strict=True):
+        print("| {:g} | {:.1f} | {:.1f} | {:+.2f} |".format(*row).replace("+nan", "-"))
+    rises = [1e3 * (np.ptp(h.cavity_pressure)) for h in (membrane, calculix)]
+    print(f"\npressure rises by {rises[0]:.3f} and {rises[1]:.3f} kPa at most")
+    spent = [pair[1] for pair in found.values()]
+    print(f"cost: CalculiX {spent[1]:.1f} s, {spent[1] / spent[0]:.1f} times {spent[0]:.1f} s")
+
+
+def run(solver: Solver, model: CylinderModel) -> tuple[History | None, float]:
+    """History, if any, and s of CPU time, that of a subprocess included."""
+    begun = processor_seconds()
+    try:
+        history = solver.run(model, LAW)
+    except SolverFailure as failure:
+        print(f"{solver.name}: {failure.reason}")
+        return None, processor_seconds() - begun
+    spent = processor_seconds() - begun
+    balance = np.abs(sum(history.reactions.values())).max()
+    print(f"{solver.name}: {'; '.join(history.remarks)}; collar and supports: {balance:.1g} N left")
+    return history, spent
+
+
+def processor_seconds() -> float:
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def inflated(model: CylinderModel, history: History) -> dict[str, float]:
+    """Radius and length of the tube along its side, and its volume, before bending."""
+    side = model.mesh.node_sets["side_line"]
+    at = model.mesh.points[side] + history.displacement[0, side]
+    assert history.cavity_volume is not None
+    volume = 1e-6 * float(history.cavity_volume[0])
+    return {"radius, mm": at[0, 0], "length, mm": 2 * at[:, 2].max(), "volume, l": volume}
+
+
+def load_at(model: CylinderModel, history: History) -> NDArray[np.float64]:
+    """N at the deflections shown; NaN where the run did not get."""
+    deflections = np.array([0.0, *model.deflections])[: len(history.load)]
+    return np.interp(SHOWN, deflections, history.load, right=np.nan)
+
+
+def percent(ours, theirs):  # type: ignore[no-untyped-def]
+    return 100 * (ours / theirs - 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,125 @@
+"""A solver adapter for bubblefit, small but complete: input, subprocess, results, failures.
+
+It runs warp and fill strips in a program of its own (homogeneous_program.py). An adapter for a
+real program differs in what it writes and reads, not in its shape.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.uniaxial import UniaxialModel
+from bubblefit.solvers.base import Array, History, SolverCheck
+from bubblefit.solvers.process import log_tail, run_process
+from bubblefit.solvers.scratch import fresh_folder, put_aside, remove
+
+NAME = "homogeneous"
+PROGRAM = Path(__file__).with_name("homogeneous_program.py")
+
+
+class HomogeneousSolver:
+    """What `--solver homogeneous` makes.
+
+    Options come from the project file's table [solver.homogeneous], as keyword arguments.
+    """
+
+    name = NAME
+    #: Not in this process: it is checked before a study, and gets one process a start.
+    external = True
+
+    def __init__(self, program: str | None = None, timeout: float = 60.0) -> None:
+        self.program = Path(program).expanduser() if program else PROGRAM
+        if not timeout > 0:
+            raise InputError(None, f"solver.{NAME}.timeout", f"expected > 0 s, got {timeout}")
+        self.timeout = timeout
+
+    def check(self) -> SolverCheck:
+        """Is it there, which version? `bubblefit doctor` then pulls its bars by `run`."""
+        if not self.program.is_file():
+            advice = f"{self.program} is not there; set program in [solver.{NAME}]"
+            return SolverCheck(NAME, False, "", False, advice)
+        folder = fresh_folder(NAME)
+        try:
+            outcome = run_process(self._command("--version"), folder, folder / "log", timeout=10.0)
+            version = log_tail(folder / "log").strip()
+        finally:
+            remove(folder)
+        well = outcome.exit_code == 0
+        return SolverCheck(NAME, well, version, well, "" if well else "it does not start")
+
+    def run(
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+    ) -> History:
+        """One analysis: mm, N, MPa in and out. SolverFailure unless all of it ended well."""
+        job, yarn = self._job(model, law)
+        folder = fresh_folder(NAME, scratch)  # nothing of an earlier run can be there
+        (folder / "job.json").write_text(json.dumps(job))
+        log = folder / "job.log"
+        outcome = run_process(self._command("job.json"), folder, log, timeout or self.timeout)
+        results = folder / "job.csv"
+        if outcome.timed_out or outcome.exit_code != 0:
+            reason = "takes too long" if outcome.timed_out else "does not end well"
+            if outcome.exit_code == 3:
+                reason = "a modulus is not positive"
+            raise SolverFailure(reason, NAME, outcome.exit_code, log_tail(log), put_aside(folder))
+        try:
+            rows = np.loadtxt(results, delimiter=",", ndmin=2)
+        except (OSError, ValueError) as error:
+            raise SolverFailure(f"job.csv: {error}", NAME, 0, "", put_aside(folder)) from None
+        # Half a result must not look like one.
+        if rows.shape != (len(model.elongations), 3) or not np.isfinite(rows).all():
+            raise SolverFailure("job.csv is not complete", NAME, 0, "", put_aside(folder))
+        remove(folder)
+        return _history(model, yarn, *rows.T)
+
+    def _command(self, argument: str) -> list[str | Path]:
+        return [sys.executable, self.program, argument]
+
+    def _job(self, model: Any, law: HypoelasticLaw) -> tuple[dict[str, Any], int]:
+        """What the program is told, and the yarn that is pulled (0 warp, 1 fill)."""
+        if not isinstance(model, UniaxialModel) or set(model.supports) != {"top", "symmetry_x"}:
+            raise SolverFailure("takes strips along warp or fill only", NAME)
+        if law.form != "polynomial":
+            raise SolverFailure("takes polynomial moduli only", NAME)
+        pulled = 0 if abs(model.warp[1]) > 0.999 else 1
+        yarns = [
+            {"cubic": law.beta[first : first + 4].tolist(), "end": float(end)}
+            for first, end in zip((8, 4), law.strain_range, strict=False)
+        ]
+        job = {
+            "along": yarns[pulled],
+            "across": yarns[1 - pulled],
+            "warp": pulled == 0,
+            "nu12": float(law.nu12),
+            "constant_thickness": law.thickness_change == "constant",
+            "thickness": model.thickness,
+            # The program pulls the whole strip, the model holds half of it.
+            "width": model.load_factor * float(np.ptp(model.mesh.points[:, 0])),
+            "stretches": (1 + np.array(model.elongations) / model.gauge_length).tolist(),
+        }
+        return job, pulled
+
+
+def _history(
+    model: UniaxialModel, pulled: int, along: Array, across: Array, force: Array
+) -> History:
+    """Frames of the model's nodes: here the strain is the same everywhere."""
+    points, sets = model.mesh.points, model.mesh.node_sets
+    x = points[:, 0] - points[sets["symmetry_x"], 0].mean()
+    y = points[:, 1] - points[sets["top"], 1].mean()
+    moved = np.zeros((len(along), len(points), 3))
+    moved[:, :, 0], moved[:, :, 1] = np.outer(across - 1, x), np.outer(along - 1, y)
+    strain = np.zeros((len(along) + 1, 3))
+    strain[1:, pulled], strain[1:, 1 - pulled] = np.log(along), np.log(across)
+    up = np.zeros((len(along), 3))
+    up[:, 1] = force / model.load_factor
+    reactions = {"top": up, model.pulled: -up}
+    return History(force, moved, strain.min(axis=0), strain.max(axis=0), reactions)

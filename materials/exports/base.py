@@ -1,0 +1,139 @@
+"""What every export takes and gives, and how its text is made."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from ... import __version__
+from ...errors import InputError
+from ..card import MaterialCard
+from ..moduli import MODULI, UNLIMITED
+from ..responses import Measure
+from ..tables import POINTS, REACH
+
+TEMPLATES = Path(__file__).resolve().parent.parent.parent / "templates"
+#: t/mm3, that of water: where a program must have a density and the user gave none.
+DENSITY = 1e-9
+#: Strains a modulus at which a card is looked at.
+CHECKED = 501
+WIDTH = 70
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a format may need beside the card.
+
+    points : of a curve or table from zero strain to its end. reach : log strain where a curve
+    ends if the card has no range. density : t/mm3. measure : of load curves; None is the format's
+    own.
+    """
+
+    points: int = POINTS
+    reach: float = REACH
+    density: float | None = None
+    measure: Measure | None = None
+
+
+@dataclass(frozen=True)
+class Says:
+    """What the target does with the law: carries, loses, and what is to be confirmed there."""
+
+    carries: tuple[str, ...]
+    loses: tuple[str, ...] = ()
+    confirm: tuple[str, ...] = ()
+
+    def lines(self) -> list[str]:
+        """The same as lines of at most WIDTH characters."""
+        found: list[str] = []
+        for head, texts in (
+            ("carries", self.carries),
+            ("loses", self.loses or ("nothing",)),
+            ("to confirm", self.confirm),
+        ):
+            found += [f"{head}:"] if texts else []
+            for text in texts:
+                found += textwrap.wrap(text, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+        return found
+
+
+@dataclass(frozen=True)
+class Export:
+    """Files of one export: text by suffix, the one that is asked for first; and what it says."""
+
+    files: Mapping[str, str]
+    says: Says
+
+
+#: From a card and options to an export. Raises InputError for a card that the format cannot take.
+Format = Callable[[MaterialCard, Options], Export]
+
+
+def check_positive(card: MaterialCard) -> None:
+    """No program can use a law without stiffness.
+
+    Raises
+    ------
+    InputError : a modulus is not positive somewhere in the card's range (at zero strain where it
+        has none), or 1 - nu12 nu21 is not at zero strain.
+    """
+    law = card.law
+    for name, (_, component) in MODULI.items():
+        end = law.strain_range[component]
+        strain = np.linspace(0.0, end if end < UNLIMITED else 0.0, CHECKED)
+        values = law.modulus(name, strain)
+        if not (values > 0).all():
+            worst = int(np.argmin(values))
+            problem = f"{name} is {values[worst]:.4g} MPa at log strain {strain[worst]:.4g}"
+            raise InputError(None, "beta", f"{problem}, where the card is to hold; expected > 0")
+    if not law.nu12**2 * float(law.E2(0.0) / law.E1(0.0)) < 1:
+        problem = f"nu12 nu21 is not below 1 at zero strain, for nu12 = {law.nu12:g}"
+        raise InputError(None, "nu12", f"{problem} and E2/E1 of the card")
+
+
+def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
+    """The comment that begins every file: which card, which format, what it carries and loses."""
+    lines = [f"{what}, written by bubblefit {__version__}."]
+    for label, text in (("card", card.name), ("source", card.source)):
+        # One line each, whatever the card's text holds.
+        words = " ".join(text.split())
+        lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
+    lines += [f"units: mm, N, MPa; thickness {card.thickness:g} mm", *says.lines()]
+    ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
+    return "\n".join(f"{comment} {line}" for line in ascii_lines)
+
+
+def render(template: str, /, **context: Any) -> str:
+    """Text of `template` (a path below templates/)."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    return environment.get_template(template).render(context)
+
+
+def density_remarks(options: Options) -> tuple[str, ...]:
+    """What a format that needs a density has to say of it."""
+    if options.density is not None:
+        return ()
+    return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
+
+
+def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
+    """What a tabulated format has to say of strain ranges."""
+    if (card.law.strain_range < UNLIMITED).all():
+        return ()
+    return (
+        "the card has no valid_strain in at least one direction: there the curve ends at log "
+        f"strain {reach:g}, and the modulus is held beyond",
+    )

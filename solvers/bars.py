@@ -1,0 +1,92 @@
+"""Four bars whose end stresses another program has published: does a solver carry the law?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SolverFailure
+from ..materials.law import HypoelasticLaw
+from ..models.uniaxial import UniaxialModel, straight_strip
+from .base import History, Solver
+
+#: Relative. The integral of the published coefficients (5 digits) is within 6e-5 of every stress.
+TOLERANCE = 1e-4
+INCREMENTS = 100
+#: mm, of the one element of half a bar.
+SIZE = 10.0
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A uniaxial test of Valmex 7318 computed with MSC Marc.
+
+    modulus: E of log strain, constant term first, GPa; elongation: engineering strain at the
+    end; stress: Marc's end stress, MPa. Source: the published models of the uniaxial tests
+    (Composite Structures, 2017).
+    """
+
+    model: str
+    direction: str
+    modulus: tuple[float, float, float, float]
+    elongation: float
+    stress: float
+
+
+BARS = (
+    Bar("direct", "warp", (0.80335, -20.444, 217.66, -589.2), 0.16516831, 62.677),
+    Bar("direct", "fill", (0.07528, 1.07347, -0.82337, 0.0), 0.26079895, 42.855),
+    Bar("inverse", "warp", (0.80877, -20.725, 225.88, -575.28), 0.16516831, 71.912),
+    Bar("inverse", "fill", (0.07624, 1.14164, 0.75244, 0.0), 0.26079895, 51.448),
+)
+
+
+def bar_law(model: str) -> HypoelasticLaw:
+    """The law of a published model; the shear modulus (20 MPa) plays no part in a bar."""
+    of = {bar.direction: bar.modulus for bar in BARS if bar.model == model}
+    gigapascal = (0.0, 0.0, 0.0, 0.02, *of["fill"][::-1], *of["warp"][::-1])
+    return HypoelasticLaw(1e3 * np.array(gigapascal))
+
+
+def difference(stresses: tuple[float, ...]) -> float:
+    """Largest relative difference of end stresses (MPa), in the order of BARS, from Marc's."""
+    return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
+
+
+def bar_model(bar: Bar) -> UniaxialModel:
+    """A bar as a strip of one element (half of its width), free to contract; thickness 1 mm."""
+    return straight_strip(
+        "warp" if bar.direction == "warp" else "fill",
+        gauge_length=SIZE,
+        final_length=SIZE * (1.0 + bar.elongation),
+        thickness=1.0,
+        width=2.0 * SIZE,
+        increments=INCREMENTS,
+        across=1,
+        along=1,
+    )
+
+
+def stress_of(model: UniaxialModel, history: History) -> float:
+    """Cauchy stress (MPa) at the end: load over the section there; the thickness is constant."""
+    width = np.ptp(model.mesh.points[:, 0] + history.displacement[-1, :, 0])
+    return float(history.load[-1] / (model.load_factor * width * model.thickness))
+
+
+def strip_stresses(solver: Solver) -> tuple[float, ...]:
+    """End stresses (MPa) of BARS by a solver's own uniaxial analysis.
+
+    Raises
+    ------
+    SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
+    """
+    found = []
+    for bar in BARS:
+        model = bar_model(bar)
+        history = solver.run(model, bar_law(bar.model))
+        if len(history.load) != INCREMENTS:
+            problem = f"{len(history.load)} frames of a strip of {INCREMENTS} elongations"
+            raise SolverFailure(problem, solver.name)
+        found.append(stress_of(model, history))
+    return tuple(found)

@@ -1,0 +1,1 @@
+"""A licensed MSC Marc: decks, runs, results."""

@@ -1,0 +1,118 @@
+"""One run of Marc: a fresh folder, a deck in it, the program, the judgement, the results."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from ...errors import SolverFailure
+from ..process import Watch, run_process
+from ..scratch import remove, run_folder
+from .command import find_marc, run_command
+from .deck import JOB
+from .reasons import Ending, ending
+from .settings import MarcSettings
+from .sts import Increment, increments
+
+log = logging.getLogger(__name__)
+
+NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
+T = TypeVar("T")
+#: Makes something of the .t19 file and the number of iterations.
+Reader = Callable[[Path, int], T]
+Tell = Callable[[Increment], None]
+
+
+class NoLicence(SolverFailure):
+    """Marc never began, for want of a licence: another try may do."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is run: the deck, total time at its end, source of a user subroutine or None."""
+
+    deck: str
+    time: int
+    subroutine: str | None
+
+
+def run_job(
+    job: Job,
+    settings: MarcSettings,
+    read: Reader[T],
+    rescue: Reader[T] | None = None,
+    parent: Path | None = None,
+    timeout: float | None = None,
+    tell: Tell | None = None,
+) -> tuple[T, Ending]:
+    """Run it in a fresh scratch folder; again while there is no licence and time to wait.
+
+    Parameters
+    ----------
+    read : makes something of the results; rescue : of those of a run that stopped early.
+    parent : folder of the scratch folder.
+    timeout : s, of one run; the settings' unless given.
+    tell : called with every increment that ended while it runs.
+
+    Raises
+    ------
+    SolverFailure : it did not end well; the scratch folder is kept and named.
+    InputError : a Marc that is not there or cannot be started.
+    """
+    find_marc(settings)
+    seconds = timeout or settings.timeout
+    last = time.monotonic() + settings.licence_wait
+    while True:
+        try:
+            with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
+                return _in(folder, job, settings, read, rescue, seconds, tell)
+        except NoLicence as failure:
+            if time.monotonic() + settings.licence_retry > last:
+                raise
+            log.info("%s; trying again in %g s", failure.reason, settings.licence_retry)
+            if failure.scratch is not None:
+                remove(failure.scratch)
+            time.sleep(settings.licence_retry)
+
+
+def _in(
+    folder: Path,
+    job: Job,
+    settings: MarcSettings,
+    read: Reader[T],
+    rescue: Reader[T] | None,
+    timeout: float,
+    tell: Tell | None,
+) -> tuple[T, Ending]:
+    """One run in a folder that is empty at its start."""
+    try:
+        (folder / f"{JOB}.dat").write_text(job.deck, encoding="ascii", errors="replace")
+        if job.subroutine is not None:
+            (folder / SUBROUTINE).write_text(job.subroutine, encoding="ascii", errors="replace")
+    except OSError as error:
+        raise SolverFailure(f"the deck cannot be written: {error.strerror}", NAME) from None
+    sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
+    outcome = run_process(
+        run_command(settings, JOB, None if job.subroutine is None else SUBROUTINE),
+        folder,
+        folder / SCREEN,
+        timeout,
+        settings.environment,
+        None if tell is None else Watch(lambda: increments(sts), tell),
+    )
+    end = ending(folder, JOB, SCREEN, outcome, timeout, float(job.time))
+    if end.problem is None:
+        return read(results, end.iterations), end
+    log.info("stopped early: %s", end.problem)
+    kind = NoLicence if end.licence else SolverFailure
+    try:
+        if rescue is not None and not end.licence:
+            return rescue(results, end.iterations), end
+    except SolverFailure as failure:
+        # Why it stopped says more than what its results then lack.
+        log.info("%s", failure.reason)
+    raise kind(end.problem, NAME, end.number, end.said)

@@ -1,0 +1,175 @@
+"""How a site runs its Marc: `[solver.marc]` of a project file, or a file of the site's own."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ...errors import InputError
+from ...projects.schema_errors import first_error
+
+VARIABLE = "BUBBLEFIT_MARC"
+#: Blocks of the deck that a site's file can stand in for: the templates of these names.
+BLOCKS = (
+    "cavity",
+    "cavity_parameter",
+    "contact",
+    "control",
+    "fixed_disp",
+    "geometry",
+    "hypoelastic",
+    "nlelast",
+    "orientation",
+    "post",
+    "pressure",
+    "stepping",
+)
+#: Keys whose values are paths, relative to the file that they are in.
+PATHS = ("scratch", "templates")
+
+Seconds = Annotated[float, Field(gt=0, le=1e9)]
+Count = Annotated[int, Field(ge=1, le=1024)]
+#: One word: it ends up in a command or an environment.
+Word = Annotated[str, Field(pattern=r"^[^\s\x00]+$")]
+
+
+class MarcSettings(BaseModel):
+    """Every setting, with its default.
+
+    executable : `run_marc`, by path or by name. version : of Marc, for the record.
+    options : names of run_marc's options, "current" (-j, -nte, -nts) or "older" (-jid, -nprocd).
+    processors, threads : of one run. arguments : more of them, to the end of the command.
+    environment : variables of the run. modules : what `module load` is given before it.
+    law : NLELAST with tables, or HYPOELASTIC with HYPELA2, whose source says what own_state and
+    symmetric mean.
+    element : 139 thin shell, 75 thick shell, 18 membrane.
+    increments : least number of Marc increments of an analysis; 0: as many as the model has.
+    pressure_type, pressure_sign : code of the pressure on shells, and the sign that inflates.
+    include : files that stand in for blocks of the deck, by the name of the block.
+    templates : folder of whole decks of the site's own.
+    timeout : s, of one run. licence_wait : s to go on trying while no licence is free, and
+    licence_retry : s between two tries.
+    scratch, keep : where runs are made, and whether the good ones stay.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    executable: str = "run_marc"
+    version: str = ""
+    options: Literal["current", "older"] = "current"
+    processors: Count = 1
+    threads: Count = 1
+    arguments: list[Word] = []
+    environment: dict[Word, str] = {}
+    modules: list[Word] = []
+    law: Literal["nlelast", "hypela2"] = "nlelast"
+    own_state: bool = True
+    symmetric: bool = True
+    element: Literal[139, 75, 18] = 139
+    increments: Annotated[int, Field(ge=0, le=1_000_000)] = 100
+    pressure_type: Annotated[int, Field(ge=0, le=1000)] = 2
+    pressure_sign: Literal[1, -1] = -1
+    include: dict[str, str] = {}
+    templates: str | None = None
+    timeout: Seconds = 3600.0
+    licence_wait: Annotated[float, Field(ge=0, le=1e9)] = 0.0
+    licence_retry: Seconds = 30.0
+    scratch: str | None = None
+    keep: bool = False
+
+    def given(self, folder: Path) -> dict[str, Any]:
+        """What was given, None for the rest; paths from `folder` (of the file it was in)."""
+        values: dict[str, Any] = dict.fromkeys(type(self).model_fields)
+        values |= self.model_dump(include=self.model_fields_set)
+        for name in PATHS:
+            if values[name] is not None:
+                values[name] = str(_beside(folder, values[name]))
+        # A bare name is a program on the PATH, or in a folder that `modules` put there.
+        if values["executable"] is not None and os.sep in values["executable"]:
+            values["executable"] = str(_beside(folder, values["executable"]))
+        if values["include"] is not None:
+            values["include"] = {k: str(_beside(folder, v)) for k, v in values["include"].items()}
+        return values
+
+
+def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
+    """Settings from those `given` (None: not given), over the site's file, over the defaults.
+
+    Parameters
+    ----------
+    named : the executable, or the site's file if it ends in .toml; BUBBLEFIT_MARC unless given.
+
+    Raises
+    ------
+    InputError : a file or a value that cannot be used.
+    """
+    site = named or os.environ.get(VARIABLE, "")
+    values: dict[str, Any] = {}
+    if site.endswith(".toml"):
+        values = site_settings(Path(os.path.expanduser(site)))
+    elif site:
+        values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
+    # The command line gives paths as such.
+    mine: dict[str, Any] = {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in given.items()
+        if value is not None
+    }
+    if named is not None:
+        mine.pop("executable", None)
+    both = {**values, **mine}
+    for name in ("include", "environment"):
+        both[name] = {**(values.get(name) or {}), **(mine.get(name) or {})}
+    if isinstance(both.get("element"), str) and both["element"].isdigit():
+        both["element"] = int(both["element"])  # --element 75
+    try:
+        settings = MarcSettings.model_validate(both)
+    except ValidationError as error:
+        found = first_error(Path(), error, MarcSettings)
+        raise InputError(None, f"solver.marc.{found.field}", found.problem) from None
+    _check_files(settings)
+    return settings
+
+
+def site_settings(path: Path) -> dict[str, Any]:
+    """The keys of a site's file, with its paths made absolute.
+
+    Raises
+    ------
+    InputError : no such file, not TOML, a key that there is not.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(path, VARIABLE, f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, VARIABLE, "is not a text file in UTF-8") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(path, "TOML syntax", str(error)) from None
+    try:
+        settings = MarcSettings.model_validate(content)
+    except ValidationError as error:
+        raise first_error(path, error, MarcSettings) from None
+    given = settings.given(path.absolute().parent)
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _check_files(settings: MarcSettings) -> None:
+    for name, file in settings.include.items():
+        if name not in BLOCKS:
+            problem = f"there is no block {name!r}; there are {', '.join(BLOCKS)}"
+            raise InputError(None, "solver.marc.include", problem)
+        if not Path(file).is_file():
+            raise InputError(Path(file), f"solver.marc.include.{name}", "there is no such file")
+    if settings.templates is not None and not Path(settings.templates).is_dir():
+        raise InputError(Path(settings.templates), "templates", "there is no such folder")
+
+
+def _beside(folder: Path, given: str) -> Path:
+    # Absolute: runs happen in a scratch folder.
+    return (folder / os.path.expanduser(given)).absolute()

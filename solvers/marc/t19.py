@@ -1,0 +1,157 @@
+"""Marc's formatted post file (.t19), read to its last mark.
+
+Blocks between `=beg=NNNNN (name)` and `=end=`; fields of 13 columns, six a line, each record on
+lines of its own; the model first, then an increment between `****` and `----`, again and again,
+and `++++` at the end. A file that does not hold what its blocks announce, or stops before its end
+mark, is refused: a job that was killed leaves such a file. Layout: docs/marc-deck.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from .t19_records import WIDTH, Records
+
+Array = NDArray[np.float64]
+#: Columns of a vector's name.
+NAME = 48
+
+
+@dataclass(frozen=True, eq=False)
+class T19Mesh:
+    """numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
+
+    numbers: NDArray[np.int64]
+    points: Array
+    elements: tuple[tuple[int, NDArray[np.int64]], ...]
+
+
+@dataclass(eq=False)
+class T19Frame:
+    """One increment: total time, its number, and vectors by name (nodes of the mesh, c)."""
+
+    time: float = 0.0
+    increment: int = 0
+    fields: dict[str, Array] = field(default_factory=dict)
+
+
+class T19File:
+    """A post file, checked as it is read: `mesh`, then `frames()` one by one.
+
+    Raises
+    ------
+    InputError : no such file, not a formatted post file, truncated or corrupt (which line).
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self._file = Records(self.path)
+        if len(self._file) < 2 or not self._file.peek().startswith("=beg=501"):
+            problem = "is not a formatted post file of Marc (no =beg=501 at its start)"
+            raise InputError(self.path, "", problem)
+        self.mesh = self._model()
+        self._first = self._file.at
+
+    def frames(self, ended: bool = True) -> Iterator[T19Frame]:
+        """Every increment, in the file's order.
+
+        ended : the job ended, and the file with its mark. If it did not, the file may stop
+            anywhere, and the last whole increment is the last.
+        """
+        self._file.at = self._first
+        while True:
+            try:
+                mark = self._file.line()
+                if mark == "++++":
+                    return
+                if mark != "****":
+                    raise self._file.wrong(f"expected **** or ++++, got {mark[:20]!r}")
+                frame = self._frame()
+            except InputError:
+                if ended:
+                    raise
+                return
+            yield frame
+
+    def _model(self) -> T19Mesh:
+        numbers, points = np.empty(0, np.int64), np.empty((0, 3))
+        elements: list[tuple[int, NDArray[np.int64]]] = []
+        header = [0] * 30
+        while self._file.peek() not in ("****", "++++"):
+            kind, _ = self._file.begin()
+            if kind == 502:
+                header = [*self._file.integers_to_end(), *header][:30]
+            elif kind == 507:
+                elements = [self._element(header[9]) for _ in range(header[2])]
+            elif kind == 508:
+                numbers, points = self._points(header[1], header[8])
+            else:
+                self._file.skip()
+            self._file.end()
+        if not len(numbers):
+            raise self._file.wrong("no nodes (block 508) before the first increment")
+        return T19Mesh(numbers, points, tuple(elements))
+
+    def _frame(self) -> T19Frame:
+        frame, timed = T19Frame(), False
+        while self._file.peek() != "----":
+            if self._file.peek() in ("****", "++++"):
+                raise self._file.wrong("an increment without its end (----): truncated")
+            kind, version = self._file.begin()
+            if kind == 517:
+                numbers = self._file.integers_to_end()
+                if len(numbers) < 12:
+                    raise self._file.wrong("a block 517 of fewer than 12 numbers")
+                remeshed, frame.increment = numbers[:2]
+                if remeshed:
+                    raise self._file.wrong("an increment with a new mesh; switch remeshing off")
+            elif kind == 518:
+                # In later versions a count goes before the numbers.
+                count = self._file.integers(1)[0] if version else 1
+                if count < 1:
+                    raise self._file.wrong("an increment without its time")
+                frame.time, timed = float(self._file.reals(count if version else 6)[0]), True
+            elif kind == 524:
+                self._vectors(frame)
+            else:
+                self._file.skip()
+            self._file.end()
+        self._file.line()
+        if not timed:
+            raise self._file.wrong("an increment without its time (block 518)")
+        return frame
+
+    def _vectors(self, frame: T19Frame) -> None:
+        for _ in range(self._file.integers(2)[0]):
+            name = self._file.line()[:NAME].strip()
+            numbers = self._file.integers(12)
+            if numbers[6] != -1:
+                continue
+            components = max(numbers[3], 1)
+            values = self._file.reals(len(self.mesh.numbers) * components)
+            frame.fields[name] = values.reshape(-1, components)
+
+    def _element(self, most: int) -> tuple[int, NDArray[np.int64]]:
+        record = self._file.integers(3 + most)
+        if not 1 <= record[2] <= most:
+            raise self._file.wrong(f"an element of {record[2]} nodes")
+        return record[1], np.array(record[3 : 3 + record[2]], dtype=np.int64)
+
+    def _points(self, count: int, coordinates: int) -> tuple[NDArray[np.int64], Array]:
+        if not (0 < count <= len(self._file) and 1 <= coordinates <= 5):
+            raise self._file.wrong(f"{count} nodes of {coordinates} coordinates")
+        rows = [self._file.raw() for _ in range(count)]
+        numbers = self._file.parse([row[:WIDTH] for row in rows], count, int)
+        width = min(coordinates, 3)
+        # Blanks after the coordinates are fields of ours no more.
+        places = [row[WIDTH : WIDTH * (1 + coordinates)] for row in rows]
+        values = self._file.parse(places, count * coordinates, float).reshape(count, coordinates)
+        if not (np.diff(numbers) > 0).all():
+            raise self._file.wrong("node numbers do not increase")
+        return numbers.astype(np.int64), np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
