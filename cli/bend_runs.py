@@ -73,10 +73,11 @@ def run_bend_study(name: str, project: BendProject, out: Path, options: dict[str
         problem = "no case has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
     pairs = pairs_of(project)
-    project_solver(project, KEY)  # what is wrong with it shows here, in one line
+    solver = project_solver(project, KEY)  # what is wrong with it shows here, in one line
     folder = BendFolder(out)
     folder.begin(options["resume"], options["overwrite"])
-    runs = _runs(project, pairs, folder, options)
+    marks = [pair.mark(project, solver) for pair in pairs]
+    runs = _runs(project, pairs, marks, folder, options)
     outcome = outcome_of(project, pairs, runs)
     if not outcome.measures:
         raise SolverFailure(f"no run ended well: {runs[0].failed}", project.solver)
@@ -93,10 +94,13 @@ def run_bend_study(name: str, project: BendProject, out: Path, options: dict[str
 
 
 def _runs(
-    project: BendProject, pairs: list[Pair], folder: BendFolder, options: dict[str, Any]
+    project: BendProject,
+    pairs: list[Pair],
+    marks: list[str],
+    folder: BendFolder,
+    options: dict[str, Any],
 ) -> list[BendRun]:
     """Every pair's run: those that the folder holds, and the others side by side."""
-    marks = [pair.mark(project) for pair in pairs]
     found = {i: run for i, mark in enumerate(marks) if (run := folder.kept(mark)) is not None}
     missing = [i for i in range(len(pairs)) if i not in found]
     jobs = options["jobs"] or project.jobs or cores()

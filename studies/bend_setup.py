@@ -15,6 +15,8 @@ from ..projects.bend import BendCase, BendProject
 from ..projects.bend_cards import BendCard
 from ..runs.bend_run import BendRun, fingerprint, run_bend
 from ..runs.processes import Task, run_tasks
+from ..solvers.base import Solver
+from .fingerprint import solver_words
 from .setup import project_solver
 
 KEY = "run.solver"
@@ -32,10 +34,11 @@ class Pair:
         """What is run."""
         return self.case.model(self.card.thickness)
 
-    def mark(self, project: BendProject) -> str:
+    def mark(self, project: BendProject, solver: Solver) -> str:
         """Fingerprint of the run on the project's solver."""
         options = project.solver_options.get(project.solver, {})
-        return fingerprint(self.model(), self.card, project.solver, options)
+        words = f"{project.solver};{solver_words(solver, options)}"
+        return fingerprint(self.model(), self.card, words)
 
 
 def chosen(project: BendProject, cases: Sequence[str], cards: Sequence[str]) -> BendProject:

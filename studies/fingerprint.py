@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..identification.problem import FitProblem
 from ..projects.fit import FitProject
+from ..solvers.base import Solver
 
 # Where the files lie, how many starts there are and what they are called changes no result.
 FREE = {"path", "title", "starts", "data", "solver_options"}
@@ -24,16 +26,20 @@ def fingerprint(project: FitProject, problem: FitProblem) -> str:
     for setting in _settings(project):
         digest.update(setting.encode())
     options = project.solver_options.get(project.solver, {})
-    ours = project.solver in ("calculix", "marc")
-    names = DECK if ours else sorted({*DECK, *options})
-    for name in names:
-        digest.update(f"{name}={options.get(name)};".encode())
-    # A solver whose settings are not all in the project says itself what it is.
-    digest.update(getattr(problem.solver, "identity", "").encode())
+    digest.update(solver_words(problem.solver, options).encode())
     for experiment in problem.experiments:
         for data in experiment.objective.data:
             digest.update(np.ascontiguousarray(data).tobytes())
     return digest.hexdigest()
+
+
+def solver_words(solver: Solver, options: Mapping[str, Any]) -> str:
+    """What of a solver and its options a result depends on."""
+    ours = solver.name in ("calculix", "marc")
+    names = DECK if ours else sorted({*DECK, *options})
+    words = "".join(f"{name}={options.get(name)};" for name in names)
+    # A solver whose settings are not all in the project says itself what it is.
+    return words + str(getattr(solver, "identity", ""))
 
 
 def _settings(project: FitProject) -> Iterator[str]:

@@ -19,6 +19,8 @@ from bubblefit.models.bending import inflated_cylinder
 from bubblefit.projects.bend import BendProject, read_bend
 from bubblefit.runs.bend_folder import BendFolder
 from bubblefit.runs.bend_run import BendRun, fingerprint, run_bend
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.registry import solver_named
 from bubblefit.studies.bend_beam import bodies_of, whole_beam
 from bubblefit.studies.bend_measures import (
     BendMeasures,
@@ -30,7 +32,9 @@ from bubblefit.studies.bend_measures import (
     straightness,
     wrinkle_onset,
 )
+from bubblefit.studies.bend_setup import pairs_of
 from bubblefit.studies.bend_statements import PRESSURES, statements
+from bubblefit.studies.fingerprint import solver_words
 
 from .bend_cases import FAILS, STOPS, Formula
 from .test_bend_project import EXAMPLE
@@ -209,8 +213,8 @@ def test_runs_that_fail_or_stop_early(tmp_path: Path) -> None:
 def test_the_fingerprint_is_of_everything_that_matters() -> None:
     m, card = model(), MaterialCard(law(), 0.81)
 
-    def mark(m=m, card=card, solver="membrane", options=None) -> str:
-        return fingerprint(m, card, solver, options)
+    def mark(m=m, card=card, solver="membrane") -> str:
+        return fingerprint(m, card, solver)
 
     others = {
         mark(model(), MaterialCard(law(501.0), 0.81)),
@@ -222,12 +226,24 @@ def test_the_fingerprint_is_of_everything_that_matters() -> None:
         mark(m=replace(m, gas=replace(m.gas, ambient=0.09))),
         mark(m=model("full")),
         mark(solver="calculix"),
-        mark(options={"element": "S4"}),
     }
-    assert mark() not in others and len(others) == 10
-    # Names, and where a program lies, change no result.
-    same = mark(card=MaterialCard(law(), 0.81, "name"), options={"ccx": "/x", "threads": 2})
-    assert same == mark(model())
+    assert mark() not in others and len(others) == 9
+    # A name changes no result.
+    assert mark(card=MaterialCard(law(), 0.81, "name")) == mark(model())
+
+
+def test_the_solver_s_options_are_part_of_it() -> None:
+    project = read_bend(EXAMPLE)
+    pair, solver = pairs_of(project)[0], solver_named("membrane")
+
+    def mark(name: str, **options: object) -> str:
+        return pair.mark(replace(project, solver=name, solver_options={name: options}), solver)
+
+    assert mark("membrane") == mark("membrane")
+    assert mark("membrane", wrinkle_stiffness=0.001) != mark("membrane")
+    calculix = CalculixSolver(ccx="ccx")
+    words = [solver_words(calculix, o) for o in ({}, {"threads": 2}, {"templates": "mine"})]
+    assert words[0] == words[1] != words[2]
 
 
 # The whole beam
