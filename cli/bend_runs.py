@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
 import time
@@ -25,7 +24,7 @@ from ..studies.setup import project_solver
 from ..writing import replacing
 from .bend_words import bend_lines
 from .fitting import WORSE
-from .options import cores, exits, solver_choice
+from .options import cores, solver_choice, with_checks
 from .progress import RunsProgress
 
 
@@ -45,19 +44,7 @@ def bend_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--quiet", is_flag=True, help="No progress."),
     ]  # fmt: skip
 
-    @functools.wraps(command)
-    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-        above = kwargs["fail_above"]
-        if resume and overwrite:
-            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-        if above is not None and not above >= 0:
-            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
-        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
-
-    wrapped = exits(checked)
-    for decorate in reversed(decorators):
-        wrapped = decorate(wrapped)
-    return wrapped
+    return with_checks(command, decorators)
 
 
 def run_bend_study(name: str, project: BendProject, out: Path, options: dict[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
 from collections.abc import Callable
@@ -12,14 +11,14 @@ from typing import Any, TypeVar
 
 import click
 
-from ..errors import InputError, NoFeasibleStart
+from ..errors import NoFeasibleStart
 from ..identification.methods import METHODS, FitOptions
 from ..identification.problem import FitProblem
 from ..projects.fit import FitProject
 from ..runs.folder import OutputFolder
 from ..runs.processes import run_starts
 from ..runs.start import StartRecord
-from .options import cores, default_folder, exits, solver_choice, with_solver
+from .options import cores, default_folder, solver_choice, with_checks, with_solver
 from .progress import StudyProgress
 
 WORSE = 1  # exit code of --fail-above
@@ -45,19 +44,7 @@ def study_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--quiet", is_flag=True, help="No progress."),
     ]
 
-    @functools.wraps(command)
-    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-        above = kwargs["fail_above"]
-        if resume and overwrite:
-            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-        if above is not None and not above >= 0:
-            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
-        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
-
-    wrapped = exits(checked)
-    for decorate in reversed(decorators):
-        wrapped = decorate(wrapped)
-    return wrapped
+    return with_checks(command, decorators)
 
 
 def with_options(project: Project, options: dict[str, Any]) -> Project:

@@ -40,6 +40,26 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
+def with_checks(
+    command: Callable[..., Any], decorators: Sequence[Callable[..., Any]]
+) -> Callable[..., Any]:
+    """A study's command with its options, --resume, --overwrite and --fail-above checked."""
+
+    @functools.wraps(command)
+    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
+        above = kwargs["fail_above"]
+        if resume and overwrite:
+            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
+        if above is not None and not above >= 0:
+            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
+        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
+
+    wrapped = exits(checked)
+    for decorate in reversed(decorators):
+        wrapped = decorate(wrapped)
+    return wrapped
+
+
 def cores() -> int:
     """Cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
