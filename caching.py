@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent
 KERNELS = (
     "materials/point_moduli.py",
     "materials/point_law.py",
+    "materials/wrinkles.py",
     "materials/relaxation.py",
     "materials/law.py",
     "meshes/volume.py",

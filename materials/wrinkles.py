@@ -1,0 +1,210 @@
+"""Wrinkled and slack states at one integration point, compiled: which strain the fabric has.
+
+The search for them is Newton's iteration on two unknowns, size and angle of the wrinkle strain;
+see relaxation.py for what they obey.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..caching import compiled
+from .point_law import stress_update
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 25
+#: Strain, or stress over the stiffness, that is taken as none.
+ROUNDING = 1e-13
+#: Wrinkle normals tried, over half a turn, where Newton's iteration finds none.
+NORMALS = 36
+
+
+@compiled()
+def least_principal(a: float, b: float, c: float) -> float:
+    """The smaller eigenvalue of [[a, c], [c, b]]."""
+    return 0.5 * (a + b) - math.hypot(0.5 * (a - b), c)
+
+
+@compiled()
+def _normal(angle: float, n: Array, m: Array) -> None:
+    """Strain n n' of a wrinkle (engineering shear), and m, half of its slope by the angle.
+
+    n . s is the stress across the wrinkle, m . s the shear along it.
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    n[0], n[1], n[2] = c * c, s * s, 2.0 * c * s
+    m[0], m[1], m[2] = -c * s, c * s, c * c - s * s
+
+
+@compiled()
+def _across(
+    beta: Array, nu: float, limits: Array, h: Array, h_old: Array, s_old: Array,
+    n: Array, size: float, he: Array, s: Array, tangent: Array, slopes: Array,
+) -> float:  # fmt: skip
+    """Size of a wrinkle strain along n that leaves no stress across it; NaN if not found."""
+    scale = abs(size) + 1e-3
+    for _ in range(ITERATIONS):
+        for i in range(3):
+            he[i] = h[i] + size * n[i]
+        if not stress_update(beta, nu, limits, he, h_old, s_old, s, tangent, slopes):
+            return math.nan
+        across, slope = 0.0, 0.0
+        for i in range(3):
+            across += n[i] * s[i]
+            for j in range(3):
+                slope += n[i] * tangent[i, j] * n[j]
+        if not slope > 0.0:
+            return math.nan
+        step = -across / slope
+        size += step
+        if abs(step) < 1e-13 * scale:
+            return size
+    return math.nan
+
+
+@compiled()
+def _along(s: Array, m: Array) -> float:
+    return m[0] * s[0] + m[1] * s[1] + m[2] * s[2]
+
+
+@compiled()
+def _start(
+    beta: Array, nu: float, limits: Array, h: Array, h_old: Array, s_old: Array,
+    n: Array, m: Array, he: Array, s: Array, tangent: Array, slopes: Array,
+) -> tuple[float, float]:  # fmt: skip
+    """Angle and size between the two tried normals where the shear along changes its sign."""
+    before, size_before, angle_before = math.nan, 0.0, 0.0
+    for k in range(NORMALS + 1):
+        angle = k * math.pi / NORMALS
+        _normal(angle, n, m)
+        size = _across(
+            beta, nu, limits, h, h_old, s_old, n, 0.0, he, s, tangent, slopes
+        )  # fmt: skip
+        if math.isnan(size) or size <= 0.0 or s[0] + s[1] < 0.0:
+            before = math.nan
+            continue
+        shear = _along(s, m)
+        # With tension along the wrinkle the shear rises with the angle through the root.
+        if before <= 0.0 <= shear:
+            part = 0.5 if before == shear else before / (before - shear)
+            return angle_before + part * (angle - angle_before), size_before
+        before, size_before, angle_before = shear, size, angle
+    return math.nan, math.nan
+
+
+@compiled()
+def _wrinkle(
+    beta: Array, nu: float, limits: Array, h: Array, h_old: Array, s_old: Array,
+    angle: float, size: float, n: Array, m: Array,
+    he: Array, s: Array, tangent: Array, slopes: Array, inverse: Array,
+) -> tuple[float, float]:  # fmt: skip
+    """Angle and size of the wrinkle strain by Newton's iteration; inverse (2, 2) of its slope."""
+    scale = abs(s[0]) + abs(s[1]) + abs(s[2])
+    for _ in range(ITERATIONS):
+        _normal(angle, n, m)
+        for i in range(3):
+            he[i] = h[i] + size * n[i]
+        if not stress_update(beta, nu, limits, he, h_old, s_old, s, tangent, slopes):
+            return math.nan, math.nan
+        across = n[0] * s[0] + n[1] * s[1] + n[2] * s[2]
+        shear = _along(s, m)
+        a, b = 0.0, 2.0 * shear
+        c, d = 0.0, s[0] + s[1] - 2.0 * across
+        for i in range(3):
+            for j in range(3):
+                a += n[i] * tangent[i, j] * n[j]
+                b += n[i] * tangent[i, j] * 2.0 * size * m[j]
+                c += m[i] * tangent[i, j] * n[j]
+                d += m[i] * tangent[i, j] * 2.0 * size * m[j]
+        det = a * d - b * c
+        if not (a > 0.0 and det > 0.0):
+            return math.nan, math.nan
+        inverse[0, 0], inverse[0, 1] = d / det, -b / det
+        inverse[1, 0], inverse[1, 1] = -c / det, a / det
+        if abs(across) + abs(shear) < 1e-12 * (scale + abs(s[0]) + abs(s[1]) + abs(a) * 1e-3):
+            if size < 0.0 or s[0] + s[1] < 0.0:
+                return math.nan, math.nan
+            return angle, size
+        size -= inverse[0, 0] * across + inverse[0, 1] * shear
+        turn = inverse[1, 0] * across + inverse[1, 1] * shear
+        angle -= min(max(turn, -0.3), 0.3)
+    return math.nan, math.nan
+
+
+@compiled()
+def slack(
+    beta: Array, nu: float, limits: Array, h_old: Array, s_old: Array,
+    he: Array, s: Array, tangent: Array, slopes: Array,
+) -> bool:  # fmt: skip
+    """Strain of the fabric without any stress, into he."""
+    for i in range(3):
+        he[i] = h_old[i]
+    for _ in range(ITERATIONS):
+        if not stress_update(beta, nu, limits, he, h_old, s_old, s, tangent, slopes):
+            return False
+        det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
+        if not (det > 0.0 and tangent[2, 2] > 0.0):
+            return False
+        step0 = (tangent[1, 1] * s[0] - tangent[0, 1] * s[1]) / det
+        step1 = (tangent[0, 0] * s[1] - tangent[1, 0] * s[0]) / det
+        step2 = s[2] / tangent[2, 2]
+        he[0] -= step0
+        he[1] -= step1
+        he[2] -= step2
+        if abs(step0) + abs(step1) + abs(step2) < 1e-14:
+            s[:] = 0.0
+            return True
+    return False
+
+
+@compiled()
+def wrinkled(
+    beta: Array, nu: float, limits: Array, h: Array, h_old: Array, s_old: Array,
+    away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
+    strain_slope: Array,
+) -> bool:  # fmt: skip
+    """A wrinkle in one direction: he, s_new, and strain_slope, the derivative of he by h.
+
+    away : angle and size of the larger principal strain from the total strain to the slack one.
+    """
+    n, m, inverse = np.empty(3), np.empty(3), np.empty((2, 2))
+    # First the normal of the smaller principal stress that the taut fabric would have.
+    angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))
+    _normal(angle, n, m)
+    size = _across(beta, nu, limits, h, h_old, s_old, n, 0.0, he, s_new, tangent, slopes)
+    if not math.isnan(size):
+        angle, size = _wrinkle(
+            beta, nu, limits, h, h_old, s_old, angle, size, n, m,
+            he, s_new, tangent, slopes, inverse,
+        )  # fmt: skip
+    if math.isnan(size):
+        # Hardly taut along the wrinkle: the normal is nearly that of the slack state.
+        s_new[:] = 0.0
+        angle, size = _wrinkle(
+            beta, nu, limits, h, h_old, s_old, away[0], away[1], n, m,
+            he, s_new, tangent, slopes, inverse,
+        )  # fmt: skip
+    if math.isnan(size):
+        angle, size = _start(beta, nu, limits, h, h_old, s_old, n, m, he, s_new, tangent, slopes)
+        if not math.isnan(size):
+            angle, size = _wrinkle(
+                beta, nu, limits, h, h_old, s_old, angle, size, n, m,
+                he, s_new, tangent, slopes, inverse,
+            )  # fmt: skip
+    if math.isnan(size):
+        return False
+    # d(size, angle) = -inverse [n; m] T dh, and he changes by n d(size) + 2 size m d(angle) + dh.
+    for j in range(3):
+        across, shear = 0.0, 0.0
+        for i in range(3):
+            across += n[i] * tangent[i, j]
+            shear += m[i] * tangent[i, j]
+        grow = inverse[0, 0] * across + inverse[0, 1] * shear
+        turn = inverse[1, 0] * across + inverse[1, 1] * shear
+        for i in range(3):
+            strain_slope[i, j] -= n[i] * grow + 2.0 * size * m[i] * turn
+    return True
