@@ -13,12 +13,12 @@ from bubblefit.meshes.strain import log_strain_of
 from bubblefit.models.gas import ClosedGas
 from bubblefit.models.inflated import InflatedModel
 from bubblefit.solvers.membrane.cavity import closed_cavity
-from bubblefit.solvers.membrane.closed import Wall
+from bubblefit.solvers.membrane.closed_model import closed_membrane
 from bubblefit.solvers.membrane.element import GAUSS_POINTS, reference_elements
 from bubblefit.solvers.membrane.factorisation import tangent_for
-from bubblefit.solvers.membrane.inflated import closed_membrane
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import Wall
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 

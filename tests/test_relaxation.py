@@ -9,8 +9,8 @@ from bubblefit.materials.point_law import SLOPES
 from bubblefit.materials.relaxation import relaxed_update
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.models.inflated import InflatedModel
-from bubblefit.solvers.membrane.closed import Wall
-from bubblefit.solvers.membrane.inflated import closed_membrane
+from bubblefit.solvers.membrane.closed_model import closed_membrane
+from bubblefit.solvers.membrane.wall import Wall
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, newton

@@ -9,16 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...models.gas import ClosedGas
 from ...models.inflated import RigidCylinder
+from .bordered import BorderedTangent
 from .cavity import Cavity
 from .contact import contact_forces
-from .factorisation import Tangent
 from .flexure import Flexure
 from .line_search import searched_equilibrium
 from .newton import Membrane, initial_moduli
+from .wall import Wall
 
 Array = NDArray[np.float64]
 
@@ -28,60 +28,6 @@ FADE = 0.6
 #: answer for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
 #: artificial stress alone it would by p R^2/(4 t stress).
 SLACK_SHARES = (4.0, 0.4, 40.0)
-
-
-class BorderedTangent:
-    """A sparse tangent plus c v v', solved by Sherman and Morrison's formula.
-
-    A gas couples all nodes: dp/du = -c v with v = dV/du, which would fill the matrix.
-    """
-
-    def __init__(self, inner: Tangent) -> None:
-        self.inner, self.data, self.slot = inner, inner.data, inner.slot
-        self.stiffness, self.border = 0.0, np.empty(0)
-
-    def factor(self, judge: bool = False) -> bool:
-        """Factorise the sparse part; `judge` looks at that part only (the rest is positive)."""
-        good = self.inner.factor(judge)
-        self.answer = self.inner.solve(self.border) if self.stiffness else self.border
-        return good
-
-    def solve(self, rhs: Array) -> Array:
-        x = self.inner.solve(rhs)
-        if not self.stiffness:
-            return x
-        share = self.stiffness / (1.0 + self.stiffness * float(self.border @ self.answer))
-        across = np.tensordot(self.border, x, axes=1)
-        return np.asarray(x - share * np.multiply.outer(self.answer, across))
-
-
-@dataclass(frozen=True)
-class Wall:
-    """What a closed membrane's wall does where it is pressed together.
-
-    Parameters
-    ----------
-    wrinkle_stiffness : share of its stiffness that is left across a wrinkle (a tension field, see
-        materials/relaxation.py); None: it carries compression as it carries tension, and folds
-        where that makes it unstable.
-    bending_stiffness : share of the wall's own, E t^3/12, that counts where rigid bodies bend the
-        membrane; with none, folds are as fine as the mesh.
-
-    Raises
-    ------
-    InputError : a share that is not a number from 0 to 1 (bending: to any size).
-    """
-
-    wrinkle_stiffness: float | None = None
-    bending_stiffness: float = 1.0
-
-    def __post_init__(self) -> None:
-        share = self.wrinkle_stiffness
-        if share is not None and not 0 < share <= 1:
-            raise InputError(None, "wrinkle_stiffness", f"expected 0 < share <= 1, got {share!r}")
-        if not 0 <= self.bending_stiffness < np.inf:
-            problem = f"expected 0 or more, got {self.bending_stiffness!r}"
-            raise InputError(None, "bending_stiffness", problem)
 
 
 @dataclass(eq=False, kw_only=True)

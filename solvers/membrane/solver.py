@@ -17,10 +17,11 @@ from ...models.cylinder import CylinderModel
 from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
 from ..base import PARAMETERS, History, SolverCheck
-from . import bubble, inflated, strip
-from .closed import ClosedMembrane, Wall
+from . import bubble, closed_model, inflated, strip
+from .closed import ClosedMembrane
 from .cylinder import closed_membrane_of
 from .newton import Membrane
+from .wall import Wall
 
 Array = NDArray[np.float64]
 Model = BubbleModel | UniaxialModel | InflatedModel | CylinderModel
@@ -131,7 +132,7 @@ class MembraneSolver:
                 membrane = strip.prepare(model, law, self.tolerance)
             elif isinstance(model, CylinderModel | InflatedModel):
                 closed = closed_membrane_of(model) if isinstance(model, CylinderModel) else model
-                membrane = inflated.prepare(closed, law, self.tolerance, self.wall)
+                membrane = closed_model.prepare(closed, law, self.tolerance, self.wall)
             else:
                 membrane = bubble.prepare(model, law, self.tolerance)
             self._prepared = (model, membrane)
