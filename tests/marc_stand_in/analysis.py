@@ -5,21 +5,26 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bubblefit.meshes.mesh import Mesh
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
+from bubblefit.models.inflated import InflatedModel
 from bubblefit.models.uniaxial import UniaxialModel
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 
 from .closed import closed_model
 from .content import Content, Table
 from .fields import DeckError
 from .schedule import Schedule, pressures
+from .supports import held, supported
 
 Array = NDArray[np.float64]
 
 
-def model_of(content: Content, schedule: Schedule) -> Any:
-    """The model whose increments are those of the deck.
+def model_of(
+    content: Content, schedule: Schedule, law: HypoelasticLaw
+) -> tuple[Any, NDArray[np.bool_]]:
+    """The model whose increments are those of the deck, but for those in which nothing moves.
 
     Raises
     ------
@@ -27,7 +32,15 @@ def model_of(content: Content, schedule: Schedule) -> Any:
     """
     assert content.coordinates is not None
     if content.gas is not None or np.ptp(content.coordinates[:, 2]) > 1e-9:
-        return closed_model(content, schedule)
+
+        def inflate(model: InflatedModel) -> Array:
+            return MembraneSolver().run(model, law).displacement[-1]
+
+        return closed_model(content, schedule, inflate)
+    return _flat_model(content, schedule), np.zeros(len(schedule.times), dtype=bool)
+
+
+def _flat_model(content: Content, schedule: Schedule) -> BubbleModel | UniaxialModel:
     thickness, more = content.thickness[0][0], content.thickness[1:]
     if more or len(content.frames) != 1:
         raise DeckError("stand-in: a flat sheet of one thickness and one frame only")
@@ -38,34 +51,6 @@ def model_of(content: Content, schedule: Schedule) -> Any:
         mesh, supports = supported(content, held(content, schedule.first))
         return BubbleModel(mesh, thickness, pressures(content, schedule), supports=supports)
     return _strip(content, schedule, thickness, warp)
-
-
-def held(content: Content, names: list[str]) -> dict[int, tuple[int, ...]]:
-    """By node (from 0): translations (0 to 2) that these conditions hold at zero."""
-    found: dict[int, set[int]] = {}
-    for name in names:
-        c = content.conditions[name]
-        if c.kind != "fixed":
-            continue
-        for dof, value in zip(c.dofs, c.values, strict=True):
-            if dof <= 3 and value == 0.0:
-                for node in (content.node_sets[c.on] - 1).tolist():
-                    found.setdefault(node, set()).add(dof - 1)
-    return {node: tuple(sorted(dofs)) for node, dofs in sorted(found.items())}
-
-
-def supported(
-    content: Content, nodes: dict[int, tuple[int, ...]], **sets: Any
-) -> tuple[Mesh, dict[str, tuple[int, ...]]]:
-    """The mesh, with a node set for each way of being held, and what each holds."""
-    assert content.connectivity is not None and content.coordinates is not None
-    ways: dict[tuple[int, ...], list[int]] = {}
-    for node, dofs in nodes.items():
-        ways.setdefault(dofs, []).append(node)
-    names = {f"held_{''.join(map(str, dofs))}": dofs for dofs in ways}
-    groups = {f"held_{''.join(map(str, dofs))}": np.array(on) for dofs, on in ways.items()}
-    quads = (content.connectivity - 1).astype(np.intp)
-    return Mesh(content.coordinates, quads, {**groups, **sets}), names
 
 
 def _strip(content: Content, schedule: Schedule, thickness: float, warp: Array) -> UniaxialModel:

@@ -52,9 +52,7 @@ def _hypoelastic(deck: Deck, content: Content, line: Line) -> None:
     content.material = Material("hypoelastic", name, _alone(deck.next()))
 
 
-def _material_head(
-    deck: Deck, content: Content, line: Line, expected: list[int | None]
-) -> str:
+def _material_head(deck: Deck, content: Content, line: Line, expected: list[int | None]) -> str:
     if content.material is not None:
         raise line.fail("a second material")
     deck.blank()
@@ -176,9 +174,7 @@ def _cavity_load(deck: Deck, content: Content, line: Line) -> None:
         )  # fmt: skip
 
 
-def _condition_head(
-    deck: Deck, content: Content, expected: list[int | None]
-) -> tuple[Line, str]:
+def _condition_head(deck: Deck, content: Content, expected: list[int | None]) -> tuple[Line, str]:
     head = deck.next()
     head.expect([head.integer(10 * (i + 1)) for i in range(6)], expected)
     name = head.name(60)

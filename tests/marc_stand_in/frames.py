@@ -47,9 +47,7 @@ def _held(content: Content, names: list[str]) -> NDArray[np.bool_]:
     return held
 
 
-def _pressure_forces(
-    content: Content, schedule: Schedule, increment: int, state: State
-) -> Array:
+def _pressure_forces(content: Content, schedule: Schedule, increment: int, state: State) -> Array:
     """Forces of a pressure that is given; a closed cavity's is in no list of loads."""
     assert content.coordinates is not None and content.connectivity is not None
     for name in _names(content, schedule, increment) if increment else []:

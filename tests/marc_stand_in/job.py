@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import BubblefitError
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.inflated import InflatedModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from numpy.typing import NDArray
 
 from .analysis import model_of
 from .command import Command
 from .content import Content
 from .faults import Fault
-from .fields import DATA_ERROR, DeckError
+from .fields import DeckError
 from .frames import vectors_of
 from .hypela2 import NOT_COMPILED, NotCompiled, compiled, law_of_subroutine
 from .journals import Journals
@@ -75,11 +74,11 @@ def _solve(command: Command, journals: Journals, fault: Fault) -> None:
     content = read_deck(command.folder / f"{command.job}.dat")
     law = _law(content, command, fault)
     schedule = schedule_of(content)
-    model = model_of(content, schedule)
+    model, rests = model_of(content, schedule, law)
     if fault.is_("inside out"):
         journals.out(" *** warning - element 1 inside out at integration point 1")
     post = PostFile(command.folder / f"{command.job}.t19", content, content.parameters.title)
-    running = Running(content, schedule, journals, post, fault)
+    running = Running(content, schedule, rests, journals, post, fault)
     running.begin()
     try:
         with recording(running.found):
@@ -118,12 +117,13 @@ class Running:
         self,
         content: Content,
         schedule: Schedule,
+        rests: NDArray[np.bool_],
         journals: Journals,
         post: PostFile,
         fault: Fault,
     ) -> None:
         self.content, self.schedule, self.journals = content, schedule, journals
-        self.post, self.fault, self.increment = post, fault, 0
+        self.post, self.fault, self.increment, self.rests = post, fault, 0, rests
         count = int(np.count_nonzero(schedule.case == schedule.case[-1]))
         self.halfway = len(schedule.times) - count + max(1, count // 2)
 
@@ -134,14 +134,10 @@ class Running:
         self.post.frame(0, 0.0, vectors_of(self.content, self.schedule, 0, state))
 
     def found(self, state: State) -> None:
-        """The solver's next increment; cases in which nothing moves go by with it."""
+        """The solver's next increment; those after it in which nothing moves go by with it."""
         self._write(state)
-        while self.increment < len(self.schedule.times) and self._rests(self.increment):
+        while self.increment < len(self.rests) and self.rests[self.increment]:
             self._write(state)
-
-    def _rests(self, i: int) -> bool:
-        """Whether increment i is of a load case in the middle: bodies come near, no more."""
-        return 0 < self.schedule.case[i] < self.schedule.case[-1]
 
     def _write(self, state: State) -> None:
         i, s = self.increment, self.schedule
@@ -166,6 +162,3 @@ class Running:
             self.journals.increment(
                 int(s.case[i]) + 1, i + 1, float(s.steps[i]), time, float(u.min()), float(u.max())
             )
-
-
-__all__ = ["DATA_ERROR", "InflatedModel", "run"]

@@ -34,9 +34,7 @@ def schedule_of(content: Content) -> Schedule:
         if table.variable == 1 and (table.x[0] != 0.0 or abs(table.x[-1] - times[-1]) > 1e-6):
             problem = f"table {table.number} goes from {table.x[0]:g} to {table.x[-1]:g}"
             raise DeckError(f"{problem}, the load cases from 0 to {times[-1]:g}")
-    return Schedule(
-        times, case, steps, content.cases[0].conditions, content.cases[-1].conditions
-    )
+    return Schedule(times, case, steps, content.cases[0].conditions, content.cases[-1].conditions)
 
 
 def pressures(content: Content, schedule: Schedule, cases: int = 1) -> list[float]:
