@@ -145,19 +145,23 @@ def _modulus(y: Array) -> Modulus:
     if tail == 0:
         return Modulus(np.array([0.0, 0.0, 0.0, y[-1]]))
     held = len(y) - tail > 1
-    whole = cubic_through(x[: tail - 1 if held else len(y)], y[: tail - 1 if held else len(y)])
-    if whole is not None:
-        return Modulus(whole, _end(whole, y, tail, step)) if held else Modulus(whole)
-    return _steps(y, step, size)
+    some = tail - 1 if held else len(y)
+    whole = cubic_through(x[:some], y[:some])
+    if whole is None:
+        return _steps(y, step, size)
+    if not held:
+        return Modulus(whole)
+    end = _end(whole, y[-1], step * tail, step)
+    # One constant up to the first break of a tri-linear modulus is a cubic as well.
+    return _steps(y, step, size) if end is None else Modulus(whole, end)
 
 
-def _end(cubic: Array, y: Array, tail: int, step: float) -> float:
-    """Where the cubic has the value that is held from there on: near the first of the tail."""
-    roots = np.roots(cubic - np.array([0.0, 0.0, 0.0, y[-1]]))
-    real = roots[np.abs(roots.imag) < 1e-6].real
-    guess = step * tail
-    near = real[np.abs(real - guess) < 2 * step]
-    return float(near[np.argmin(np.abs(near - guess))]) if len(near) else guess
+def _end(cubic: Array, value: float, guess: float, step: float) -> float | None:
+    """Strain near `guess` where the cubic has the value that is held from there on."""
+    roots = np.roots(cubic - np.array([0.0, 0.0, 0.0, value])).real
+    near = roots[np.abs(roots - guess) < 2 * step]
+    reached = near[np.abs(np.polyval(cubic, near) - value) < 1e-7 * abs(value)]
+    return float(reached[np.argmin(np.abs(reached - guess))]) if len(reached) else None
 
 
 def _steps(y: Array, step: float, size: float) -> Modulus:
