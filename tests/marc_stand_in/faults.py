@@ -11,7 +11,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -21,6 +20,7 @@ FAULTS = {
     "code0": "as 3015, and the return code is 0",
     "code1": "ends well, and the return code is 1",
     "licence": "no licence: nothing begins",
+    "stale": "no licence, and the files in the folder `stale` lie there as an earlier job left them",
     "killed": "half-way the process is gone",
     "truncated": "ends well, and half of the .t19 is there",
     "hanging": "half-way nothing happens any more, in a child process as well",
@@ -60,8 +60,10 @@ class Fault:
             os.kill(os.getpid(), signal.SIGKILL)
         if self.kind == "hanging":
             # As run_marc, which waits for a program that it has started.
-            with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(3600)"]):
-                time.sleep(3600)
+            child = subprocess.Popen(["sleep", "3600"])
+            if self.folder:
+                (Path(self.folder) / "pids").write_text(f"{child.pid}\n")
+            child.wait()
 
     def _number(self) -> int:
         path = Path(self.folder) / "runs"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import BubblefitError
@@ -40,6 +42,10 @@ def run(command: Command, environment: Mapping[str, str] | None = None) -> tuple
     fault = Fault(os.environ if environment is None else environment, command.job)
     if fault.is_("silent"):
         return 0, ""
+    if fault.is_("stale"):
+        for left in (Path(fault.folder) / "stale").iterdir():
+            shutil.copy2(left, command.folder / left.name)
+        return 1, "could not obtain license for MARC"
     journals = Journals(command.folder, command.job)
     if fault.is_("licence"):
         # From what users quote of Marc's output; there is no exit number in the .sts.
@@ -76,7 +82,7 @@ def _solve(command: Command, journals: Journals, fault: Fault) -> None:
     schedule = schedule_of(content)
     model, rests = model_of(content, schedule, law)
     if fault.is_("inside out"):
-        journals.out(" *** warning - element 1 inside out at integration point 1")
+        journals.out(" *** warning - element inside out at element 1, integration point 1")
     post = PostFile(command.folder / f"{command.job}.t19", content, content.parameters.title)
     running = Running(content, schedule, rests, journals, post, fault)
     running.begin()
