@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
@@ -56,7 +58,7 @@ def test_bubble(marc, law, settings):
 def test_marc_cuts_the_increments_of_a_bubble(marc):
     found = marc.solver(increments=12).run(bubble(), LAW)
     ends = np.array([0.0, *PRESSURES])
-    finer = np.concatenate([a + (b - a) * np.arange(1, 4) / 3 for a, b in zip(ends, ends[1:])])
+    finer = np.concatenate([a + (b - a) * np.arange(1, 4) / 3 for a, b in pairwise(ends)])
     expected = MembraneSolver().run(bubble(PRESSURES, finer), LAW)
     same(found, expected)
     coarse = MembraneSolver().run(bubble(), LAW)

@@ -20,7 +20,7 @@ FAULTS = {
     "code0": "as 3015, and the return code is 0",
     "code1": "ends well, and the return code is 1",
     "licence": "no licence: nothing begins",
-    "stale": "no licence, and the files in the folder `stale` lie there as an earlier job left them",
+    "stale": "no licence, and what an earlier job left (the files in the folder `stale`) is there",
     "killed": "half-way the process is gone",
     "truncated": "ends well, and half of the .t19 is there",
     "hanging": "half-way nothing happens any more, in a child process as well",
