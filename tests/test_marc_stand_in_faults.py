@@ -96,9 +96,9 @@ def test_a_job_that_hangs_is_ended_with_its_children(marc):
     told = []
     marc.told("hanging")
     # Long enough for a busy machine to get there.
-    solver = marc.solver(timeout=10.0)
+    solver = marc.solver(timeout=8.0)
     solver.progress = told.append
-    with pytest.raises(SolverFailure, match="did not end within 10 s: killed after increment 2"):
+    with pytest.raises(SolverFailure, match="did not end within 8 s: killed after increment 2"):
         solver.run(MODEL, LAW)
     assert [i.increment for i in told] == [1, 2]
     (pid,) = [int(line) for line in (marc.folder / "pids").read_text().split()]

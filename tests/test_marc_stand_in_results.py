@@ -65,16 +65,16 @@ def test_marc_cuts_the_increments_of_a_bubble(marc):
     assert np.abs(coarse.displacement - expected.displacement).max() > 0.01
 
 
-@pytest.mark.parametrize("settings", [{}, {"law": "hypela2"}], ids=["nlelast", "hypela2"])
 @pytest.mark.parametrize(
-    "model",
+    ("model", "settings"),
     [
-        straight_strip("warp", 50, 58, 0.81, increments=10),
-        straight_strip("fill", 50, 62, 0.81, increments=10),
+        (straight_strip("warp", 50, 58, 0.81, increments=10), {"law": "hypela2"}),
+        (straight_strip("fill", 50, 62, 0.81, increments=10), {}),
         # Grips beyond the gauge: pulled as far as the membrane says.
-        bias_strip(25, 30, 0.81, increments=8, across=4, along=12),
+        (bias_strip(25, 30, 0.81, increments=8, across=4, along=12), {}),
+        (bias_strip(25, 30, 0.81, increments=8, across=4, along=12), {"law": "hypela2"}),
     ],
-    ids=["warp", "fill", "bias"],
+    ids=["warp", "fill", "bias", "bias hypela2"],
 )
 def test_strip(marc, model, settings):
     found = marc.solver(**settings).run(model, LAW)

@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .content import Body, Condition, Content, Material
+from .content import Condition, Content, Material
 from .fields import Deck, Line
+from .rows import LABEL, alone, condition_head
+from .vessel import VESSEL_BLOCKS
 
 #: Degrees of freedom of a node by element type.
 DEGREES = {18: 3, 75: 6, 139: 6}
-LABEL = 24
 
 
 def loadcase(deck: Deck, line: Line) -> list[str]:
@@ -22,24 +23,17 @@ def loadcase(deck: Deck, line: Line) -> list[str]:
     names = []
     for _ in range(count):
         row = deck.next()
-        names.append(_alone(row))
+        names.append(alone(row))
         if names[-1] in names[:-1]:
             raise row.fail(f"condition {names[-1]!r} twice in a load case")
     return names
-
-
-def _alone(row: Line) -> str:
-    """A name that is alone on its line."""
-    name = row.name()
-    row.nothing_after(32)
-    return name
 
 
 def _nlelast(deck: Deck, content: Content, line: Line) -> None:
     name = _material_head(deck, content, line, [1, 2, 0, 0, 0])
     multipliers = deck.next().reals(4)
     tables = deck.next().integers(4)
-    content.material = Material("nlelast", name, _alone(deck.next()), multipliers, tables)
+    content.material = Material("nlelast", name, alone(deck.next()), multipliers, tables)
 
 
 def _hypoelastic(deck: Deck, content: Content, line: Line) -> None:
@@ -49,7 +43,7 @@ def _hypoelastic(deck: Deck, content: Content, line: Line) -> None:
         raise row.fail("expected 1 and six zeros")
     row = deck.next()
     row.expect(row.integers(7), [0] * 7)
-    content.material = Material("hypoelastic", name, _alone(deck.next()))
+    content.material = Material("hypoelastic", name, alone(deck.next()))
 
 
 def _material_head(deck: Deck, content: Content, line: Line, expected: list[int | None]) -> str:
@@ -81,7 +75,7 @@ def _orientation(deck: Deck, content: Content, line: Line) -> None:
                 raise row.fail("directions have to be unit vectors")
         if abs(warp @ fill) > 1e-6:
             raise row.fail("warp and fill are not at right angles")
-        content.frames.append((_alone(deck.next()), warp, fill))
+        content.frames.append((alone(deck.next()), warp, fill))
 
 
 def _geometry(deck: Deck, content: Content, line: Line) -> None:
@@ -92,12 +86,12 @@ def _geometry(deck: Deck, content: Content, line: Line) -> None:
         row = deck.next()
         values = row.integers(6)
         row.expect(values, [len(content.thickness) + 1, 8, 1, 230, 0, 0])
-        _alone(deck.next())
+        alone(deck.next())
         row = deck.next()
         thickness, *rest = row.reals(7)
         if not thickness > 0 or any(rest):
             raise row.fail("expected a thickness above 0 and six zeros")
-        content.thickness.append((thickness, _alone(deck.next())))
+        content.thickness.append((thickness, alone(deck.next())))
     if not content.thickness:
         raise line.fail("geometry without a thickness")
 
@@ -105,7 +99,7 @@ def _geometry(deck: Deck, content: Content, line: Line) -> None:
 def _fixed_disp(deck: Deck, content: Content, line: Line) -> None:
     deck.blank()
     while not deck.ended and deck.peek().text[:1] == " ":
-        head, name = _condition_head(deck, content, [1, 0, 0, 0, 1, 0])
+        head, name = condition_head(deck, content, [1, 0, 0, 0, 1, 0])
         row = deck.next()
         count = len(row.text.rstrip()) // 20
         if not 1 <= count <= 6:
@@ -122,14 +116,14 @@ def _fixed_disp(deck: Deck, content: Content, line: Line) -> None:
         row = deck.next()
         row.expect(row.integers(1), [2])
         content.conditions[name] = Condition(
-            name, "fixed", _alone(deck.next()), values, tables, dofs, line=head.number
+            name, "fixed", alone(deck.next()), values, tables, dofs, line=head.number
         )
 
 
 def _dist_loads(deck: Deck, content: Content, line: Line) -> None:
     deck.blank()
     while not deck.ended and deck.peek().text[:1] == " ":
-        head, name = _condition_head(deck, content, [1, 0, 0, 0, 0, 0])
+        head, name = condition_head(deck, content, [1, 0, 0, 0, 0, 0])
         row = deck.next()
         magnitude, *rest = row.reals(3)
         if any(rest):
@@ -140,78 +134,9 @@ def _dist_loads(deck: Deck, content: Content, line: Line) -> None:
         row = deck.next()
         row.expect(row.integers(1), [1])
         content.conditions[name] = Condition(
-            name, "pressure", _alone(deck.next()), [magnitude], [table], kind_number=kind,
+            name, "pressure", alone(deck.next()), [magnitude], [table], kind_number=kind,
             line=head.number,
         )  # fmt: skip
-
-
-def _cavity(deck: Deck, content: Content, line: Line) -> None:
-    row = deck.next()
-    row.expect(row.integers(1), [1])
-    row = deck.next()
-    row.expect(row.integers(3), [1, 1, 1])
-    row = deck.next()
-    pressure, temperature, density = row.reals(3)
-    if not min(pressure, temperature, density) > 0:
-        raise row.fail("a gas needs a pressure, a temperature and a density above 0")
-    content.gas, content.gas_on = (pressure, temperature, density), _alone(deck.next())
-
-
-def _cavity_load(deck: Deck, content: Content, line: Line) -> None:
-    if content.gas is None:
-        raise line.fail("cavity load without cavity")
-    deck.blank()
-    while not deck.ended and deck.peek().text[:1] == " ":
-        head, name = _condition_head(deck, content, [1, 0, 0, 0, 0, 0])
-        row = deck.next()
-        values = [row.integer(30 + 10 * i) for i in range(3)]
-        row.nothing_after(50)
-        if row.real(20) != 1.0 or values[1] not in (1, 2) or values[2] != 1:
-            raise row.fail("expected 1, a table, 1 (pressure) or 2 (mass), cavity 1")
-        content.conditions[name] = Condition(
-            name, "cavity", content.gas_on, [1.0], [values[0]], kind_number=values[1],
-            line=head.number,
-        )  # fmt: skip
-
-
-def _condition_head(deck: Deck, content: Content, expected: list[int | None]) -> tuple[Line, str]:
-    head = deck.next()
-    head.expect([head.integer(10 * (i + 1)) for i in range(6)], expected)
-    name = head.name(60)
-    head.nothing_after(92)
-    if name in content.conditions:
-        raise head.fail(f"condition {name!r} is defined twice")
-    return head, name
-
-
-def _contact(deck: Deck, content: Content, line: Line) -> None:
-    head = deck.next()
-    count, *rest = head.integers(12)
-    head.expect(rest, [0] * 11)
-    row = deck.next()
-    if any(row.reals(3)):
-        raise row.fail("expected three zeros: no friction, default distances")
-    for i in range(count):
-        row = deck.next()
-        number, kind, patches = (row.integer(10 * (k + 1)) for k in range(3))
-        name = row.name(30, LABEL)
-        row.nothing_after(30 + LABEL)
-        if number != i + 1 or kind not in (0, 1):
-            raise row.fail(f"body {number} of kind {kind}, expected {i + 1} of kind 0 or 1")
-        if kind == 0:
-            if patches:
-                raise row.fail("a deformable body with patches")
-            content.bodies.append(Body(name, False, _alone(deck.next())))
-            continue
-        row = deck.next()
-        table, direction = row.integer(10), [row.real(30 + 20 * k) for k in range(3)]
-        row.nothing_after(70)
-        if abs(np.linalg.norm(direction) - 1.0) > 1e-9:
-            raise row.fail("the path's direction is not a unit vector")
-        corners = [v for _ in range(2 * patches) for v in deck.next().reals(6)]
-        body = Body(name, True, "", np.reshape(corners, (patches, 4, 3)), table)
-        body.direction = np.array(direction)
-        content.bodies.append(body)
 
 
 def _no_print(deck: Deck, content: Content, line: Line) -> None:
@@ -234,9 +159,7 @@ BLOCKS: dict[str, Callable[[Deck, Content, Line], None]] = {
     "geometry": _geometry,
     "fixed disp": _fixed_disp,
     "dist loads": _dist_loads,
-    "cavity": _cavity,
-    "cavity load": _cavity_load,
-    "contact": _contact,
     "no print": _no_print,
     "post": _post,
+    **VESSEL_BLOCKS,
 }

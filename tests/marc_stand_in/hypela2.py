@@ -16,6 +16,7 @@ import numpy as np
 from bubblefit.materials.law import HypoelasticLaw, ThicknessChange
 from numpy.typing import NDArray
 
+from .endings import NotCompiled
 from .fields import DeckError
 from .law import EXACT, Modulus, cubic_through, law_of
 
@@ -23,8 +24,6 @@ Array = NDArray[np.float64]
 
 #: Strains that are asked for, and their steps.
 REACH, STEPS = 0.6, 1200
-#: Exit number of the run_marc script where a subroutine does not compile or link.
-NOT_COMPILED = 3
 #: What Marc has for a subroutine to end the job with.
 QUIT = """
       subroutine quit(number)
@@ -33,10 +32,6 @@ QUIT = """
       last = number
       end
 """
-
-
-class NotCompiled(Exception):
-    """The compiler's message."""
 
 
 def compiled(source: Path, folder: Path) -> ctypes.CDLL:
