@@ -122,6 +122,7 @@ def test_a_bubble_fit_goes_on_after_runs_that_failed(marc, finer, tmp_path):
     assert result_in(tmp_path / "out")["objective"] < 1e-5
 
 
+@pytest.mark.slow
 def test_a_fit_whose_last_run_fails_is_resumed(marc, finer, tmp_path):
     (tmp_path / "project.toml").write_text(BUBBLE)
     fit = ("bubble", "project.toml", "--solver", "marc", "--marc", finer, "--jobs", 1, "--quiet",

@@ -54,7 +54,7 @@ def _block(deck: Deck, line: Line, word: str, case: LoadCase) -> None:
     elif word == "auto load":
         row = deck.next()
         values = row.integers(5)
-        row.expect(values, [None, 0, None, 0, 0])
+        row.expect(values, [None, 0, 10, 0, 0])
         case.increments = values[0]
         if values[0] < 1:
             raise row.fail("auto load of no increments")
