@@ -19,6 +19,7 @@ from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.strip import strip_deck
 
 from .fortran_build import LAWS
+from .marc_stand_in.bodies import collar_of, first_touch, support_of
 from .marc_stand_in.fields import DeckError
 from .marc_stand_in.hypela2 import compiled, law_of_subroutine
 from .marc_stand_in.law import law_of_tables
@@ -79,6 +80,18 @@ def test_what_is_read_is_the_model(tmp_path):
         warp[content.element_sets[name] - 1] = along
     np.testing.assert_allclose(warp, CYLINDER.mesh.warp, atol=1e-11)
     assert content.gas == pytest.approx((0.101, 300.0, 1.2041e-12))
+
+
+@pytest.mark.parametrize(("diameter", "size"), [(150.0, 60.0), (200.0, 80.0), (250.0, 50.0)])
+def test_the_collar_touches_after_half_a_millimetre(tmp_path, diameter, size):
+    model = inflated_cylinder(diameter, 0.08, 0.81, size, deflections=[20.0])
+    grown = model.mesh.points * [0.04, 0.05, 0.0]
+    content = read(tmp_path, bending_deck(model, LINEAR, SETTINGS, grown))
+    support, collar = content.bodies[1:]
+    assert first_touch(collar, content.coordinates + grown) == pytest.approx(0.5, abs=1e-9)
+    assert content.tables[collar.table].y[-1] == pytest.approx(-20.5)
+    assert collar_of(collar).radius == pytest.approx(0.5 * model.collar.inner_diameter)
+    assert support_of(support).radius == pytest.approx(0.5 * model.supports.diameter)
 
 
 @pytest.mark.parametrize("name", sorted(LAWS))

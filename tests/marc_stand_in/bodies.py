@@ -47,6 +47,26 @@ def collar_of(body: Body) -> RigidCylinder:
     return RigidCylinder(body.name, (0.0, 0.0, 1.0), place, radius, True, length, fillet)
 
 
+def first_touch(body: Body, nodes: Array) -> float:
+    """mm that the patches of a ring go down until one of `nodes` (n, 3) lies on one of them.
+
+    Straight down from each patch: a node above its plane, and between its ends along z, is met.
+    """
+    assert body.patches is not None
+    found = np.inf
+    for patch in body.patches:
+        a, b, c = patch[0], patch[1] - patch[0], patch[2] - patch[0]
+        normal = np.cross(b, c)
+        if abs(normal[1]) < 1e-3 * np.linalg.norm(normal) or a[1] < body.patches[..., 1].mean():
+            continue
+        inside = (nodes[:, 2] > patch[:, 2].min() - 1e-9) & (nodes[:, 2] < patch[:, 2].max() + 1e-9)
+        # Height of the patch's plane over the node.
+        x, y, z = (nodes[inside] - a).T
+        height = -(normal[0] * x + normal[2] * z) / normal[1] - y
+        found = min(found, float(height.min(initial=np.inf)))
+    return found
+
+
 def _corners(body: Body) -> Array:
     if body.patches is None or not len(body.patches):
         raise DeckError(f"body {body.name} has no patches")

@@ -11,7 +11,7 @@ from bubblefit.solvers.membrane.bending import BITE
 from bubblefit.solvers.membrane.contact import brought_to_touch
 from numpy.typing import NDArray
 
-from .bodies import collar_of, support_of
+from .bodies import collar_of, first_touch, support_of
 from .content import Body, Content
 from .fields import DeckError
 from .schedule import Schedule, pressures
@@ -83,15 +83,17 @@ def _bodies(
     bending = later[np.count_nonzero(schedule.case == 1) - 1 :]
     if np.ptp([_path(content, support, t)[1] for t in bending]) > 1e-9:
         raise DeckError("stand-in: the support is at rest on bending")
-    up, down = np.array([0.0, 1.0, 0.0]), np.array([0.0, -1.0, 0.0])
+    up = np.array([0.0, 1.0, 0.0])
     touching = brought_to_touch(post, position, up, BITE)
     away = touching.centre[1] - post.centre[1] - _path(content, support, float(later[-1]))[1]
     if abs(away) > NEAR:
         raise DeckError(f"stand-in: the support is {away:.3g} mm below where it touches")
-    start = brought_to_touch(ring, position, down, 0.0).centre[1] - ring.centre[1]
-    if start > 0:
-        raise DeckError(f"the collar begins {start:.3g} mm inside the inflated membrane")
-    moves = np.array([start - _path(content, collar, float(t))[1] for t in later])
+    # Marc has flat patches, chords of the ring: its collar touches when one of them does. From
+    # there on the ring is round.
+    free = first_touch(collar, position)
+    if free < 0:
+        raise DeckError(f"the collar begins {-free:.3g} mm inside the inflated membrane")
+    moves = np.array([-_path(content, collar, float(t))[1] - free for t in later])
     return [post], ring, moves
 
 
