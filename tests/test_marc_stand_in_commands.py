@@ -214,6 +214,29 @@ def test_simulated_bending_is_the_membranes(marc, site, card, tmp_path):
             )
 
 
+@pytest.mark.slow
+def test_a_bending_project(marc, site, tmp_path):
+    text = (EXAMPLES / "bend-valmex7318/project.toml").read_text()
+    head, *cards = text[: text.index("[[cases]]")], *text.split("[[cards]]")[1:2]
+    for old, new in (
+        ("element_size = 20.0", "element_size = 60.0"),
+        ("deflection = 240.0", "deflection = 4.0"),
+        ("frames = 60", "frames = 2"),
+    ):
+        assert old in head
+        head = head.replace(old, new, 1)
+    cases = "".join(f"[[cases]]\ndiameter = 150.0\npressure = {p}\n" for p in (110.0, 140.0))
+    (tmp_path / "project.toml").write_text(f"{head}{cases}[[cards]]{cards[0]}")
+    marc.told("licence@1")
+    bubblefit("bend", "project.toml", "--solver", "marc", "--marc", site, "--jobs", 1, "--quiet",
+              "--out", "out", cwd=tmp_path)  # fmt: skip
+    table = pd.read_csv(tmp_path / "out" / "load_deflection.csv", comment="#")
+    # The first case had no licence, the second has its three frames.
+    assert len(marc.runs) == 3 and len(table) == 3
+    runs = pd.read_csv(tmp_path / "out" / "runs.csv", comment="#")
+    assert len(runs) == 2 and "no licence" in (tmp_path / "out" / "runs.csv").read_text()
+
+
 def test_doctor_proves_the_stand_in(marc, site, tmp_path):
     done = bubblefit("doctor", "--marc", site, "--json", cwd=tmp_path)
     (found,) = [s for s in json.loads(done.stdout)["solvers"] if s["name"] == "marc"]

@@ -242,3 +242,16 @@ def test_moduli_that_are_not_positive_or_on_no_curve_have_no_law(tmp_path):
         content = read(tmp_path, text)
         with pytest.raises(DeckError, match=match):
             law_of_tables(content)
+
+
+def test_the_parser_shares_no_code_with_what_writes_decks():
+    folder = Path(__file__).parent / "marc_stand_in"
+    parser = {
+        "fields", "parameters", "content", "model", "blocks", "rows", "vessel", "history", "checks",
+        "reading",
+    }  # fmt: skip
+    for path in folder.glob("*.py"):
+        imports = re.findall(r"^\s*(?:from|import) (\S+)", path.read_text(), re.MULTILINE)
+        assert not [name for name in imports if "solvers.marc" in name or "exports" in name]
+        if path.stem in parser:
+            assert not [name for name in imports if name.startswith("bubblefit")], path

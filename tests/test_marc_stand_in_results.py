@@ -100,3 +100,11 @@ def test_cylinder(marc):
     assert (np.abs(found.load - expected.load)[1:] < place * steep + 1e-5 * expected.load[1:]).all()
     np.testing.assert_allclose(found.cavity_pressure, expected.cavity_pressure, rtol=2 * ROUNDING)
     np.testing.assert_allclose(found.cavity_volume, expected.cavity_volume, rtol=2 * ROUNDING)
+
+
+def test_a_cylinder_that_stops_early_is_reported_so_far(marc):
+    model = inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(1.0, 2.0, 3.0, 4.0))
+    marc.told("3015@2")
+    found = marc.solver().run(model, LAW)
+    assert len(found.load) == 3  # inflated, 1 and 2 mm
+    assert any("time step could not get smaller" in remark for remark in found.remarks)
