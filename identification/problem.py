@@ -64,6 +64,7 @@ class FitProblem:
     surrogate: FitProblem | None = None
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
+    failure: str = ""  # why the last one that failed did
     warm_starts: bool = True
     lead_in: tuple[tuple[int, ...], ...] = ()
     blocks: Blocks = field(init=False, repr=False)
@@ -171,7 +172,8 @@ class FitProblem:
 
     def _failed(self, y: Array, experiment: Experiment, reason: str) -> None:
         several = f"{experiment.name}: " if len(self.experiments) > 1 else ""
-        self._report(y, None, several + reason)
+        self.failure = several + reason
+        self._report(y, None, self.failure)
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:

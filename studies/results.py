@@ -56,9 +56,12 @@ class BestFit:
 def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     """Run the best of the starts again.
 
+    It ran once. Another program that fails now has lost its licence or its machine, most likely,
+    and gets a second try.
+
     Raises
     ------
-    SolverFailure : the best fit does not run again (which would be a defect).
+    SolverFailure : the best fit does not run again (of the embedded solver a defect).
     """
     ranked = ranking(records)
     problem.reset()
@@ -66,8 +69,11 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord]) -> BestFit:
     # The derivatives behind what the data could not determine are the surrogate's, if there is one.
     leading = problem.surrogate or problem
     best = problem.evaluate(unknowns, leading is problem, warm=False)
+    if best is None and problem.solver.external:
+        best = problem.evaluate(unknowns, leading is problem, warm=False)
     if best is None:
-        raise SolverFailure("the best fit does not run again", problem.solver.name)
+        said = f"the best fit does not run again: {problem.failure}"
+        raise SolverFailure(f"{said}; its starts are kept, --resume goes on", problem.solver.name)
     reached = np.maximum(np.max([strains_of(h) for h in best.histories], axis=0), 1e-6)
     law = problem.law.with_beta(problem.parameters.beta(unknowns))
     slopes = best if leading is problem else leading.evaluate(unknowns, True, warm=False)

@@ -41,15 +41,35 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
     # A slice of the cylinder as long as half the collar may touch it.
     near = top[mesh.points[top, 2] <= 0.5 * model.collar.length]
     radius = float(np.abs(mesh.points[:, 1]).max())
-    bodies = (
-        ("support", SUPPORT_PATH,
-         support_body(model.supports, radius, float(at[under, 1].min()) + INTO)),
-        ("collar", COLLAR_PATH, collar_body(model.collar, float(at[near, 1].max()) + ABOVE)),
-    )  # fmt: skip
+    support = support_body(model.supports, radius, float(at[under, 1].min()) + INTO)
+    collar = _faces(collar_body(model.collar, float(at[near, 1].max()) + ABOVE))
+    # Flat patches are chords of the ring, and meet the cylinder earlier than that would.
+    collar[..., 1] += ABOVE - way_down(collar, at)
     return [
-        {"name": name, "path": path, "direction": UP, "patches": _patches(body)}
-        for name, path, body in bodies
+        {"name": name, "path": path, "direction": UP, "patches": faces.reshape(-1, 12).tolist()}
+        for name, path, faces in (
+            ("support", SUPPORT_PATH, _faces(support)),
+            ("collar", COLLAR_PATH, collar),
+        )
     ]
+
+
+def way_down(faces: Array, points: Array) -> float:
+    """How far (mm) a ring of flat faces around the z axis goes down until it meets a point.
+
+    Parameters
+    ----------
+    faces : (n, 4, 3) mm, corners counter-clockwise seen from inside. points : (m, 3) mm, inside.
+    """
+    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    least = np.inf
+    for face, n in zip(faces, normal, strict=True):
+        beside = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
+        # Across its axis the ring is convex: who passes no face's plane is inside.
+        if n[1] < 0.0 and beside.any():
+            least = min(least, float(((points[beside] - face.mean(axis=0)) @ n).min() / -n[1]))
+    return least
 
 
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
@@ -63,8 +83,6 @@ def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], li
     return support, collar
 
 
-def _patches(body: RigidBody) -> list[list[float]]:
+def _faces(body: RigidBody) -> Array:
     # The last four nodes of each of its solids are the face that meets the cylinder.
-    faces = body.points[body.elements[:, 4:]]
-    found: list[list[float]] = faces.reshape(len(faces), 12).tolist()
-    return found
+    return np.asarray(body.points[body.elements[:, 4:]], dtype=float)

@@ -21,6 +21,8 @@ from .sts import Increment, increments
 log = logging.getLogger(__name__)
 
 NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
+#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
+WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
 T = TypeVar("T")
 #: Makes something of the .t19 file and the number of iterations.
 Reader = Callable[[Path, int], T]
@@ -104,9 +106,14 @@ def _in(
         settings.environment,
         None if tell is None else Watch(lambda: increments(sts), tell),
     )
+    set_earlier_aside(folder)
     end = ending(folder, JOB, SCREEN, outcome, timeout, float(job.time))
     if end.problem is None:
-        return read(results, end.iterations), end
+        try:
+            return read(results, end.iterations), end
+        except SolverFailure as failure:
+            number = end.number if failure.exit_number is None else failure.exit_number
+            raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
     log.info("stopped early: %s", end.problem)
     kind = NoLicence if end.licence else SolverFailure
     try:
@@ -116,3 +123,18 @@ def _in(
         # Why it stopped says more than what its results then lack.
         log.info("%s", failure.reason)
     raise kind(end.problem, NAME, end.number, end.said)
+
+
+def set_earlier_aside(folder: Path) -> None:
+    """What is older than the deck was left by an earlier job: it is not this one's answer.
+
+    The folder is fresh, but a site's script may copy files into it, from a place of its own.
+    """
+    begun = (folder / f"{JOB}.dat").stat().st_mtime_ns
+    for name in WRITTEN:
+        path = folder / f"{JOB}.{name}"
+        if path.is_file() and path.stat().st_mtime_ns < begun:
+            log.warning(
+                "%s is older than the deck, and is left aside as %s", path, path.name + EARLIER
+            )
+            path.rename(path.with_name(path.name + EARLIER))

@@ -1,0 +1,61 @@
+"""The stand-in as tests use it: a folder of its own in which runs are counted and faults named."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from bubblefit.solvers.marc.solver import MarcSolver
+
+HERE = Path(__file__).resolve().parent
+
+
+@dataclass
+class StandIn:
+    """program: a run_marc; folder: where it counts its runs."""
+
+    folder: Path
+
+    @property
+    def program(self) -> Path:
+        return self.folder / "run_marc"
+
+    @property
+    def runs(self) -> list[str]:
+        """Job and fault of every run so far."""
+        path = self.folder / "runs"
+        return path.read_text().splitlines() if path.exists() else []
+
+    def told(self, fault: str) -> None:
+        """From now on it fails as `fault` says."""
+        (self.folder / "fault").write_text(fault)
+
+    def solver(self, **settings) -> MarcSolver:
+        """Marc's adapter on it; increments as the model has them unless said."""
+        scratch = self.folder / "scratch"
+        scratch.mkdir(exist_ok=True)
+        return MarcSolver(marc=self.program, **{
+            "increments": 0, "scratch": str(scratch), **settings
+        })  # fmt: skip
+
+
+def stand_in(folder: Path) -> StandIn:
+    """A program `run_marc` in `folder`, which is the stand-in run by this Python."""
+    folder.mkdir(parents=True, exist_ok=True)
+    found = StandIn(folder)
+    found.program.write_text(
+        f'#!/bin/sh\nexport MARC_STAND_IN_FOLDER="{folder}"\nBUBBLEFIT_PYTHON="{sys.executable}" '
+        f'exec "{HERE}/marc_stand_in/run_marc" "$@"\n'
+    )
+    found.program.chmod(0o755)
+    return found
+
+
+@pytest.fixture
+def marc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    """A stand-in, and a machine without any other Marc."""
+    monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
+    monkeypatch.delenv("MARC_STAND_IN_FAULT", raising=False)
+    return stand_in(tmp_path / "marc")
