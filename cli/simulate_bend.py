@@ -34,7 +34,7 @@ HERE = Path("simulate bend")
     help="Inner diameter and length [the thesis' by diameter].",
 )  # fmt: skip
 @click.option("--seam-width", type=float, metavar="MM", help="0 for none [40].")
-@click.option("--element-size", type=float, metavar="MM", help="[20]")
+@click.option("--element-size", type=float, metavar="MM", help="[25]")
 @click.option(
     "--symmetry", type=click.Choice(["quarter", "full"]), help="What is meshed [quarter]."
 )

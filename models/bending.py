@@ -60,6 +60,10 @@ def inflated_cylinder(
             raise InputError(None, name, f"expected > 0, got {value!r}")
     supports = supports or RigidSupports()
     collar = collar or thesis_collar(diameter)
+    # Before the mesh is made, which would complain of rows where the supports are.
+    if not supports.span + supports.diameter < length:
+        problem = f"{supports.span:g} mm does not fit under {length:g} mm of cylinder"
+        raise InputError(None, "supports.span", problem)
     fine = FINER * size
     zones = (
         Refinement("collar", 0.0, 0.5 * collar.length + BESIDE_COLLAR, fine),

@@ -16,7 +16,7 @@ from .bend_schema import BendFile, CaseSection, MeasuredSection, ShapeSection
 from .schema import LENGTH_UNITS, PRESSURE_UNITS
 
 #: mm of an element, unless the file says otherwise.
-SIZE = 20.0
+SIZE = 25.0
 
 
 def case_settings(

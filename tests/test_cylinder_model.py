@@ -185,7 +185,7 @@ def test_increments_may_be_finer_than_what_is_reported():
         ({"diameter": 260.0}, "collar"),
         ({"collar": Collar(140.0, 145.0)}, "collar.inner_diameter"),
         ({"collar": Collar(240.0, 1950.0)}, "collar.length"),
-        ({"supports": RigidSupports(3200.0)}, "refinements.support.position"),
+        ({"supports": RigidSupports(3200.0)}, "supports.span"),
         ({"supports": RigidSupports(2950.0)}, "supports.span"),
         ({"deflections": [20.0, 10.0]}, "deflections"),
         ({"deflections": []}, "deflections"),

@@ -219,7 +219,7 @@ def test_a_bending_project(marc, site, tmp_path):
     text = (EXAMPLES / "bend-valmex7318/project.toml").read_text()
     head, *cards = text[: text.index("[[cases]]")], *text.split("[[cards]]")[1:2]
     for old, new in (
-        ("element_size = 20.0", "element_size = 60.0"),
+        ("element_size = 25.0", "element_size = 60.0"),
         ("deflection = 240.0", "deflection = 4.0"),
         ("frames = 60", "frames = 2"),
     ):
