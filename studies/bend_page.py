@@ -95,21 +95,22 @@ def _runs(outcome: BendOutcome) -> list[Table]:
         head: list[object] = [pair.case.name, pair.name]
         seconds = round(outcome.runs[i].seconds, 1)
         if found is None:
-            rows.append([*head, *[None] * 9, outcome.ended(i), seconds])
+            rows.append([*head, *[None] * 8, outcome.ended(i), seconds])
             continue
         where = found.buckling
-        buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm" if where else None
+        knee = " (knee)" if found.buckling_is == "knee" else ""
+        buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
         wrinkles = f"{found.wrinkles[0]:.0f} mm" if found.wrinkles else None
         loads = [None if load is None else f"{load:.0f}" for load in found.loads]
         strain, rise = f"{max(found.body_strain):.3f}", f"{found.pressure_rise:+.2f}"
         stiffness = None if found.stiffness is None else f"{found.stiffness:.2f}"
         rows.append(
-            [*head, stiffness, buckles, found.buckling_is, wrinkles, *loads, strain, rise,
+            [*head, stiffness, buckles, wrinkles, *loads, strain, rise,
              outcome.ended(i), seconds]
         )  # fmt: skip
     at = [f"load at {p:g} mm, N" for p in PLACES]
     header = [
-        "case", "card", "stiffness, N/mm", "buckles", "there", "wrinkles from", *at,
+        "case", "card", "stiffness, N/mm", "buckles", "wrinkles from", *at,
         "inflation strain", "pressure, kPa", "ended", "s",
     ]  # fmt: skip
     note = (
@@ -118,7 +119,7 @@ def _runs(outcome: BendOutcome) -> list[Table]:
         "inflated. Inflation strain: the largest along warp or fill in the body, without the "
         "quads beside seam and caps. Pressure: its rise to the last frame."
     )
-    return [Table("Runs", header, [_unbroken(row) for row in rows], note, text=(1, 4, 11))]
+    return [Table("Runs", header, [_unbroken(row) for row in rows], note, text=(1, 10))]
 
 
 def _errors(outcome: BendOutcome) -> list[Table]:
