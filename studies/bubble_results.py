@@ -46,21 +46,33 @@ def assess(
     problem = setup.problem
     found = best_fit(problem, records)
     offset, pressure_offset = problem.parameters.offsets(found.best.unknowns)
-    history = found.best.histories[0]
-    mean = setup.objective.mean_absolute(history.displacement, offset)
     result = {
         **common_result("bubble", project, problem, found, wall_s),
         "objective_is": "e of Eq. 4.8" if project.objective == "e" else "sum of RMS errors, mm",
-        "mean_abs_mm": mean,
-        "nuisance": nuisance_result(project, offset, pressure_offset),
-        "data": data_result(project, setup),
+        **bubble_result(project, setup, found, offset, pressure_offset),
     }
     result["warnings"] += surface_warnings(project)
     if setup.surfaces:
         result["surface_r_squared"] = [s.r_squared.tolist() for s in setup.surfaces]
     if setup.known is not None:
         result["moduli_error"] = moduli_error(found.law, setup.known, found.reached)
-    return Assessment(found, offset, pressure_offset, mean, result)
+    return Assessment(found, offset, pressure_offset, result["mean_abs_mm"], result)
+
+
+def bubble_result(
+    project: BubbleProject,
+    setup: BubbleSetup,
+    found: BestFit,
+    offset: Array,
+    pressure_offset: float,
+) -> dict[str, Any]:
+    """What result.json says of the bubble, the first test of the fit, alone or beside strips."""
+    displacement = found.best.histories[0].displacement
+    return {
+        "mean_abs_mm": setup.objective.mean_absolute(displacement, offset),
+        "nuisance": nuisance_result(project, offset, pressure_offset),
+        "data": data_result(project, setup),
+    }
 
 
 def nuisance_result(

@@ -15,7 +15,7 @@ from ..projects.joint import JointProject
 from ..reports import percent
 from ..runs.folder import OutputFolder
 from ..runs.start import StartRecord
-from .bubble_results import data_result, nuisance_result, surface_warnings
+from .bubble_results import bubble_result, surface_warnings
 from .joint_setup import JointSetup
 from .results import BestFit, best_fit, common_result, save_card, summary_lines
 from .uniaxial_results import rms_lines, strip_results, strip_warnings, write_loads
@@ -52,8 +52,6 @@ def assess_joint(
     problem = setup.problem
     found = best_fit(problem, records)
     offset, pressure_offset = problem.parameters.offsets(found.best.unknowns)
-    histories = found.best.histories
-    mean = setup.bubble.objective.mean_absolute(histories[0].displacement, offset)
     norms = problem.blocks.norms(found.best.residual)
     count = len(setup.bubble.objective.sizes)
     result = {
@@ -64,10 +62,8 @@ def assess_joint(
             "uniaxial": float(norms[count:].sum() / project.uniaxial_weight),
         },
         "weights": {"bubble": project.bubble_weight, "uniaxial": project.uniaxial_weight},
-        "mean_abs_mm": mean,
-        "nuisance": nuisance_result(project.bubble, offset, pressure_offset),
-        "data": data_result(project.bubble, setup.bubble),
-        **strip_results(project.uniaxial, setup.uniaxial, histories[1:]),
+        **bubble_result(project.bubble, setup.bubble, found, offset, pressure_offset),
+        **strip_results(project.uniaxial, setup.uniaxial, found.best.histories[1:]),
     }
     pinned = _pinned(setup, found)
     result["pinned"] = {

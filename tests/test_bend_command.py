@@ -15,14 +15,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import bend_runs, progress
-from bubblefit.cli.main import main
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.projects.bend import read_bend
 from bubblefit.solvers import registry
-from click.testing import CliRunner
 
 from .bend_cases import FAILS, STOPS, Formula, write_project, write_readings
+from .commands import in_process, one_line, result_in
 
 TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
 
@@ -57,24 +56,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def bend(*arguments, cwd: Path, code: int = 0, command=("bend",)):
     """Run the command in this process and assert its exit code."""
-    here = Path.cwd()
-    os.chdir(cwd)
-    try:
-        done = CliRunner().invoke(main, [*command, *map(str, arguments)])
-    finally:
-        os.chdir(here)
-    assert done.exit_code == code, (done.output, done.exception)
-    return done
-
-
-def result_in(folder: Path) -> dict:
-    return json.loads((folder / "result.json").read_text())
-
-
-def one_line(done, *words: str) -> None:
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    for word in words:
-        assert word in done.stderr, done.stderr
+    return in_process(*command, *arguments, cwd=cwd, code=code)
 
 
 def measured(folder: Path, slope: float = 3.5) -> Path:

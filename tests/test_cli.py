@@ -14,24 +14,10 @@ import pandas as pd
 import pytest
 from bubblefit.materials.card import read_card
 
+from .commands import bubblefit
+
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "bubble-known-solution" / "project.toml"
-ENVIRONMENT = {**os.environ, "PYTHONWARNINGS": "error::RuntimeWarning"}
-
-
-def bubblefit(*arguments, cwd, code=0, **options):
-    """Run the command; assert its exit code; return the finished process."""
-    done = subprocess.run(
-        [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=ENVIRONMENT,
-        **options,
-    )
-    assert done.returncode == code, done.stderr + done.stdout
-    return done
 
 
 def small(folder: Path, *changes: tuple[str, str]) -> Path:

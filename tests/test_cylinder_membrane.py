@@ -18,15 +18,10 @@ from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.factorisation import BandedTangent, tangent_for
 from bubblefit.solvers.membrane.ordering import swept
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from scipy.integrate import solve_ivp
 
-# Thesis Table 4.2, "solution", GPa.
-TABLE_4_2 = [
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-]  # fmt: skip
-LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
+from .closed_forms import capped_strain
+from .test_inflated import LAW
+
 PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]
 
 
@@ -172,20 +167,6 @@ def test_a_surface_in_two_pieces_is_ordered_too() -> None:
     quads = np.concatenate([mesh.quads, mesh.quads + len(mesh.points)])
     for order in swept(quads, both):
         np.testing.assert_array_equal(np.sort(order), np.arange(len(both)))
-
-
-def capped_strain(law: HypoelasticLaw, pressure: float, radius: float, thickness: float):
-    """Axial and hoop log strain of a long capped tube: D(eps) deps = d(p r/(2 t), p r/t)."""
-    parts = np.array([0.5, 1.0])
-
-    def rate(p: float, strain: np.ndarray) -> np.ndarray:
-        e1, e2 = float(law.E1(strain[0])), float(law.E2(strain[1]))
-        den = 1 - law.nu12**2 * e2 / e1
-        d = np.array([[e1, law.nu12 * e2], [law.nu12 * e2, e2]]) / den
-        line = radius * np.exp(strain[1]) / thickness * parts
-        return np.linalg.solve(d - p * np.outer(line, [0.0, 1.0]), line)
-
-    return solve_ivp(rate, (0, pressure), [0.0, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
 
 
 @pytest.mark.parametrize("law", [HypoelasticLaw.linear(400.0, 300.0, 20.0), LAW])

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.main import main
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from click.testing import CliRunner
 
+from .commands import in_process as bubblefit
+from .commands import result_in
 from .fortran_build import BETA
 from .marc_stand_in_runs import marc
 
@@ -43,22 +42,6 @@ starts = 1
 tolerance = 1e-5
 """
 SITE = 'executable = "./run_marc"\nincrements = 0\n'
-
-
-def bubblefit(*arguments, cwd, code=0):
-    """The command in this process."""
-    here = Path.cwd()
-    os.chdir(cwd)
-    try:
-        done = CliRunner().invoke(main, [str(a) for a in arguments])
-    finally:
-        os.chdir(here)
-    assert done.exit_code == code, (done.output, done.exception)
-    return done
-
-
-def result_in(folder):
-    return json.loads((folder / "result.json").read_text())
 
 
 def marc_rows(folder):

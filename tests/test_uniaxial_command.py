@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.main import main
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from click.testing import CliRunner
+
+from .commands import bubblefit, one_line, result_in
+from .commands import in_process as quick
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
 EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
-ENVIRONMENT = {**os.environ, "PYTHONWARNINGS": "error::RuntimeWarning"}
 COARSE = ("increments = 100", "increments = 10")
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
 # Thesis Table 3.2, GPa.
@@ -32,33 +32,6 @@ TABLE_3_2 = [
     -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
     -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
 ]  # fmt: skip
-
-
-def bubblefit(*arguments, cwd, code=0, **options):
-    """Run the command; assert its exit code; return the finished process."""
-    done = subprocess.run(
-        [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)],
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=ENVIRONMENT,
-        **options,
-    )
-    assert done.returncode == code, done.stderr + done.stdout
-    return done
-
-
-def quick(*arguments, cwd, code=0):
-    """The same in this process: for what ends before a study begins, and forward analyses."""
-    here = Path.cwd()
-    os.chdir(cwd)
-    try:
-        done = CliRunner().invoke(main, [str(a) for a in arguments])
-    finally:
-        os.chdir(here)
-    assert done.exit_code == code, (done.output, done.exception)
-    return done
 
 
 def changed(text: str, *changes: tuple[str, str]) -> str:
@@ -74,16 +47,6 @@ def small(folder: Path, *changes: tuple[str, str]) -> Path:
     path = folder / "project.toml"
     path.write_text(changed((EXAMPLE / "project.toml").read_text(), COARSE, *changes))
     return path
-
-
-def result_in(folder: Path) -> dict:
-    return json.loads((folder / "result.json").read_text())
-
-
-def one_line(done, *words: str) -> None:
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    for word in words:
-        assert word in done.stderr, done.stderr
 
 
 @pytest.fixture(scope="module")

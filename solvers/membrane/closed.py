@@ -17,7 +17,7 @@ from .cavity import Cavity
 from .contact import contact_forces
 from .flexure import Flexure
 from .line_search import searched_equilibrium
-from .newton import Membrane, initial_moduli
+from .newton import Membrane, initial_stiffness
 from .wall import Wall
 
 Array = NDArray[np.float64]
@@ -60,6 +60,7 @@ class ClosedMembrane(Membrane):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.wrinkle_stiffness = self.wall.wrinkle_stiffness
         self._stiff: tuple[HypoelasticLaw, sp.csr_matrix, Array] | None = None
         e, dn = self.elements, self.elements.slopes
         weight: Array = e.area * self.section[:, None]
@@ -154,16 +155,7 @@ class ClosedMembrane(Membrane):
         """
         if not self.wrinkle_stiffness:
             return 0.0
-        e1, e2, g12 = initial_moduli(self.law)
-        nu = self.law.nu12
-        whole = 1.0 / (1.0 - nu**2 * e2 / e1)
-        stiffness = self.wrinkle_stiffness * np.array(
-            [
-                [e1 * whole, nu * e2 * whole, 0.0],
-                [nu * e2 * whole, e2 * whole, 0.0],
-                [0.0, 0.0, g12],
-            ]
-        )
+        stiffness = self.wrinkle_stiffness * initial_stiffness(self.law)
         stress = -0.5 * np.einsum("ij,mpj->mpi", stiffness, self.wrinkle + wrinkle)
         change = self.strain_new - self.wrinkle - (self.strain_old - wrinkle)
         weight = self.elements.area * self.section[:, None]

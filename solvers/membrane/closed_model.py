@@ -38,10 +38,8 @@ def closed_membrane(
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))
     elements = reference_elements(points, quads, warp)
     free = np.setdiff1d(np.arange(points.size), fixed)
-    cavity, thickness = (
-        closed_cavity(points, quads, fixed),
-        np.asarray(model.thickness, dtype=float),
-    )
+    cavity = closed_cavity(points, quads, fixed)
+    thickness = np.asarray(model.thickness, dtype=float)
     flexure, coupled = None, quads
     if model.bending is not None and wall.bending_stiffness > 0:
         flexure = flexure_of(points, quads, warp, thickness, cavity.planes)
@@ -61,7 +59,6 @@ def closed_membrane(
         tolerance,
         # A slack step much larger than a facet folds the mesh.
         step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
-        wrinkle_stiffness=wall.wrinkle_stiffness,
         wall=wall,
         cavity=cavity,
         flexure=flexure,

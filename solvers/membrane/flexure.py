@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
-from .newton import initial_moduli
+from .newton import initial_stiffness
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -44,8 +44,7 @@ class Flexure:
 
     def stiffness(self, law: HypoelasticLaw) -> Array:
         """(h, 3, 3, 3) N/mm: by line, component, node and node; with moduli at zero strain."""
-        e1, e2, _ = initial_moduli(law)
-        plane = np.array([e1, e2]) / (1.0 - law.nu12**2 * e2 / e1)
+        plane = np.diagonal(initial_stiffness(law))[:2]
         c = self.differences
         return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
 

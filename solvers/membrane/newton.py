@@ -168,3 +168,16 @@ def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
             f"{e1:.3g}, {e2:.3g}, {g12:.3g} MPa and must be positive"
         )
     return e1, e2, g12
+
+
+def initial_stiffness(law: HypoelasticLaw) -> Array:
+    """Plane stress stiffness (3, 3) at zero strain, MPa.
+
+    Raises
+    ------
+    SolverFailure : as `initial_moduli`.
+    """
+    initial_moduli(law)
+    none = np.zeros(3)
+    _, tangent = law.increment(none, none, none)
+    return tangent[0]
