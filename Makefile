@@ -1,4 +1,4 @@
-# make demo, make test, make lint, make bench: each does all the set-up it needs.
+# make demo, make test, make lint, make bench, make docs: each does all the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test lint bench calculix clean
+.PHONY: demo test lint bench docs calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -27,6 +27,10 @@ lint: $(READY)
 
 bench: $(READY)
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+# Pages of the Python interface, from the docstrings.
+docs: $(READY)
+	$(BIN)/python docs/make_api.py
 
 calculix:
 	@sh .ci/calculix

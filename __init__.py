@@ -1,8 +1,58 @@
-"""bubblefit: test data in, validated material card of a coated fabric out."""
+"""bubblefit: test data in, validated material card of a coated fabric out.
+
+What a notebook writes, and all that the command line calls:
+
+    import bubblefit as bf
+
+    project = bf.read_project("fabric.toml")
+    fit = bf.fit(project, tests="bubble", starts=8)
+    fit.card.write("material.toml")
+    fit.moduli(), fit.residuals()
+    fit.report("out")
+    bf.simulate(project.tests["bubble"], fit.card)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
 # this file a second time, as a module without a package.
 import bubblefit.solvers.calculix.frd_format
 import bubblefit.solvers.marc.t19_format  # noqa: F401
 
-__version__ = "0.1.0"
+if TYPE_CHECKING:
+    from .fits.fit import fit
+    from .fits.predictions import predict
+    from .fits.project import Project, read_project
+    from .fits.result import Fit
+    from .fits.simulation import simulate
+    from .materials.card import MaterialCard, read_card
+
+__version__ = "0.2.0"
+__all__ = ["Fit", "MaterialCard", "Project", "fit", "predict", "read_card", "read_project",
+           "simulate"]  # fmt: skip
+
+#: Where the public names are: imported when they are asked for, so that `import bubblefit` is
+#: quick.
+_PLACES = {
+    "Fit": "fits.result",
+    "MaterialCard": "materials.card",
+    "Project": "fits.project",
+    "fit": "fits.fit",
+    "predict": "fits.predictions",
+    "read_card": "materials.card",
+    "read_project": "fits.project",
+    "simulate": "fits.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PLACES:
+        return getattr(import_module(f"bubblefit.{_PLACES[name]}"), name)
+    raise AttributeError(f"module 'bubblefit' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACES})

@@ -39,6 +39,12 @@ class OutputError(BubblefitError):
     exit_code = 2
 
 
+class PlugInFailure(BubblefitError):
+    """What another distribution adds does not work; the message names the distribution."""
+
+    exit_code = 2
+
+
 class NoFeasibleStart(BubblefitError):
     """No random start inside the bounds satisfied the constraints."""
 

@@ -10,22 +10,16 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
-from bubblefit.projects.bubble import read_project
-from bubblefit.solvers.base import PARAMETERS
+from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.bubble_setup import bubble_setup
+from known_solution import known_model_and_law
 from threadpoolctl import threadpool_info, threadpool_limits
-
-EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bubble-known-solution"
 
 
 def main() -> None:
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    setup = bubble_setup(read_project(EXAMPLE / "project.toml"))
-    model, law = setup.model, setup.known
-    assert law is not None
+    model, law = known_model_and_law()
     solver = MembraneSolver()
     # Warm starts come from a neighbour, as in a fit that is settling: 0.1 % away, with its slope.
     near = law.with_beta(1.001 * law.beta)
@@ -41,7 +35,7 @@ def main() -> None:
         "analysis, warm": lambda: solver.run(model, law, guess=guess),
         "with 12 derivatives, cold": lambda: solver.run_with_sensitivity(model, law),
         "with 12 derivatives, warm": lambda: solver.run_with_sensitivity(model, law, guess=guess),
-        "with all 14, cold": lambda: solver.run_with_sensitivity(model, law, PARAMETERS),
+        "with all 14, cold": lambda: solver.run_with_sensitivity(model, law, parameters_of(law)),
     }
     times: dict[str, list[float]] = {name: [] for name in variants}
     with threadpool_limits(1):

@@ -1,7 +1,7 @@
 """Bending on CalculiX beside the membrane: inflated state, load-deflection, cost.
 
 Usage: bench_bend.py [SIZE [CASE ...]]. SIZE: mm of an element (30 unless given); CASE:
-DIAMETER/KPA of the thesis' Table 6.1 (150/140 200/100 250/85 unless given). Both solvers have the
+DIAMETER/KPA (150/140 200/100 250/85 unless given). Both solvers have the
 same model, mesh and law (card of Table 4.2, moduli held beyond 0.13) in increments of 4 mm. Cost is
 CPU time on one core, one run after the other. A solver that stops early is compared up to there.
 """

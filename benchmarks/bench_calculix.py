@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
-from bench_analysis import EXAMPLE, seconds
+from bench_analysis import seconds
 from bubblefit.errors import SolverFailure
+from bubblefit.fits.start import EvaluationRecord, run_start
 from bubblefit.identification.assessment import moduli_error
 from bubblefit.identification.methods import FitOptions
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
-from bubblefit.projects.bubble import read_project
-from bubblefit.projects.bubble_data import KnownSolution
-from bubblefit.runs.start import EvaluationRecord, run_start
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.bubble_setup import bubble_setup
+from known_solution import known_model_and_law, known_project, known_setup
 from threadpoolctl import threadpool_limits
 
 METHODS = (("lm", "led by the membrane"), ("slsqp", "differences"), ("cobyla", "no derivatives"))
@@ -34,16 +31,12 @@ LEVELS = (1e-2, 1e-3, 1e-4)
 
 def main() -> None:
     most = int(sys.argv[1]) if len(sys.argv) > 1 else 60
-    project = read_project(EXAMPLE / "project.toml")
-    setup = bubble_setup(project)
-    model, law = setup.model, setup.known
-    assert law is not None
+    model, law = known_model_and_law()
     compare(model, {"cubic (Table 4.2)": law, "linear": HypoelasticLaw.linear(800.0, 400.0, 20.0)})
-    assert isinstance(project.data, KnownSolution)
-    data = replace(project.data, elements=COARSE)
-    coarse = replace(project, elements=COARSE, data=data, solver="calculix")
-    fit = bubble_setup(coarse)
-    quads = len(fit.model.mesh.quads)
+    setup = known_setup(known_project(COARSE, solver="calculix"))
+    problem, known = setup.problem(), setup.tests[0].known
+    assert known is not None
+    quads = len(problem.comparisons[0].model.mesh.quads)
     print(f"fits to CalculiX' own data, {quads} quads, start 0: runs until e is below")
     levels = "".join(f"{level:9g}" for level in LEVELS)
     ends = f"{'runs':>7s}{'wall, s':>9s}{'e':>10s}{'E1, %':>8s}{'E2, %':>8s}{'G12, %':>8s}"
@@ -58,13 +51,12 @@ def main() -> None:
 
         begun = time.perf_counter()
         with threadpool_limits(1):
-            record = run_start(fit.problem, options, 1, 0, hear)
+            record = run_start(problem, options, 1, 0, hear)
         wall = time.perf_counter() - begun
         firsts = [next((i + 1 for i, e in enumerate(heard) if e < level), None) for level in LEVELS]
         row = "".join(f"{'-' if first is None else first:>9}" for first in firsts)
-        beta = fit.problem.parameters.beta(np.array(record.unknowns))
-        assert fit.known is not None
-        error = moduli_error(fit.known.with_beta(beta), fit.known, np.full(3, 0.1))
+        beta = problem.unknowns.beta(np.array(record.unknowns))
+        error = moduli_error(known.with_beta(beta), known, np.full(3, 0.1))
         moduli = "".join(f"{100 * error[name]:8.2g}" for name in ("E1", "E2", "G12"))
         print(f"{f'{method}, {words}':28s}{row}{record.external_runs:7d}{wall:9.0f}"
               f"{record.objective:10.1e}{moduli}", flush=True)  # fmt: skip
@@ -84,7 +76,7 @@ def compare(model: BubbleModel, laws: dict[str, HypoelasticLaw]) -> None:
                         seconds(lambda law=law, solver=calculix: solver.run(model, law))
                         for _ in range(2)
                     )
-                except SolverFailure as failure:  # S4 with the cubic card: see docs/calculix.md
+                except SolverFailure as failure:  # S4, cubic card: docs/how-to/calculix.md
                     print(f"{name:18s} {element:4s} {failure.reason}")
                     continue
                 ratio = f"{outside / inside:4.0f} times {1e3 * inside:.1f} ms"

@@ -12,10 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bench_analysis import EXAMPLE
-from bubblefit.projects.bubble import read_project
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.bubble_setup import bubble_setup
+from known_solution import known_model_and_law
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data" / "benchmarks" / "marc_bubble_profiles.csv"
@@ -27,9 +25,7 @@ def main() -> None:
         print(f"skipped: no published profiles in {path}")
         return
     published = pd.read_csv(path, comment="#")
-    setup = bubble_setup(read_project(EXAMPLE / "project.toml"))
-    model, law = setup.model, setup.known
-    assert law is not None
+    model, law = known_model_and_law()
     history = MembraneSolver().run(model, law)
     place = model.mesh.points
     print("apex heights in mm; cuts: RMS difference of z over the apex height")

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import sys
 import time
-from functools import partial
 
 import numpy as np
-from bench_analysis import EXAMPLE
-from bubblefit.cli.options import cores
+from bubblefit.fits.processes import run_starts
+from bubblefit.fits.project import cores
+from bubblefit.fits.start import StartRecord
 from bubblefit.identification.methods import FitOptions
-from bubblefit.projects.bubble import read_project
-from bubblefit.runs.processes import run_starts
-from bubblefit.runs.start import StartRecord
-from bubblefit.studies.bubble_setup import bubble_problem
+from known_solution import known_project, known_setup
 
 #: Name, how, and what is remarkable about it.
 METHODS = {
@@ -38,15 +35,15 @@ HOW = {
 def main() -> None:
     starts = int(sys.argv[1]) if len(sys.argv) > 1 else 6
     names = sys.argv[2:] or list(METHODS)
-    project = read_project(EXAMPLE / "project.toml")
-    build = partial(bubble_problem, project)
+    setup = known_setup(known_project())
+    build, seed = setup.problem, setup.project.fit.seed
     print(f"{'method':13s}{'':26s}{'starts':>7s}{'best':>9s}{'median':>9s}{'worst':>9s}"
           f"{'<1e-6':>7s}{'<1e-3':>7s}{'<0.5':>6s}{'analyses':>10s}{'wall, s':>9s}")  # fmt: skip
     for name in names:
         begun = time.perf_counter()
         records = [
             record
-            for record in run_starts(build, METHODS[name], project.seed, range(starts), cores())
+            for record in run_starts(build, METHODS[name], seed, range(starts), cores())
             if isinstance(record, StartRecord)
         ]
         wall = time.perf_counter() - begun

@@ -8,23 +8,17 @@ or a displacement offset. Published (linear orthotropic, Abaqus): 1.55, 1.66, 1.
 from __future__ import annotations
 
 import sys
-import time
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from typing import Any
 
+import bubblefit as bf
 import numpy as np
-from bubblefit.cli.options import cores
-from bubblefit.identification.methods import FitOptions
-from bubblefit.projects.bubble import read_project
-from bubblefit.runs.processes import run_starts
-from bubblefit.runs.start import StartRecord
-from bubblefit.studies.bubble_results import assess
-from bubblefit.studies.bubble_setup import bubble_problem, bubble_setup
+from bubblefit.fits.project import Project
 
 ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = {1: 1.55, 2: 1.66, 3: 1.70}
-VARIANTS = (
+VARIANTS: tuple[tuple[str, dict[str, bool]], ...] = (
     ("linear", {}),
     ("linear", {"pressure_offset": True}),
     ("linear", {"displacement_offset": True}),
@@ -44,27 +38,23 @@ def main() -> None:
     for test in tests:
         for kind, nuisance in VARIANTS:
             path = ROOT / "examples" / "bubble-valmex7318" / f"test{test}-{kind}.toml"
-            project = replace(read_project(path, folder), starts=starts, **nuisance)
-            begun = time.perf_counter()
-            options = FitOptions(max_analyses=project.max_analyses)
-            build = partial(bubble_problem, project)
-            records = [
-                r
-                for r in run_starts(build, options, project.seed, range(starts), cores())
-                if isinstance(r, StartRecord)
-            ]
-            ranked = sorted(
-                (r for r in records if r.objective is not None), key=lambda r: r.objective
-            )
-            wall = time.perf_counter() - begun
-            found = assess(project, bubble_setup(project), records, ranked, wall)
-            took = {k: v for k, v in found.result["nuisance"].items() if v is not None}
+            fit = bf.fit(_with(bf.read_project(path, folder), nuisance), starts=starts)
+            took = {k: v for k, v in fit.result["nuisance"].items() if v is not None}
             words = ", ".join(f"{k} {np.round(v, 2)}" for k, v in took.items()) or "none"
             print(
-                f"{test:4d}  {kind:6s}  {words:45s} {found.mean_absolute:8.3f}  "
-                f"{PUBLISHED[test]:9.2f}  {len(ranked):6d}  {wall:7.0f}",
+                f"{test:4d}  {kind:6s}  {words:45s} {fit.result['mean_abs_mm']:8.3f}  "
+                f"{PUBLISHED[test]:9.2f}  {len(fit.best.ranked):6d}  {fit.wall_s:7.0f}",
                 flush=True,
             )
+
+
+def _with(project: Project, nuisance: dict[str, bool]) -> Project:
+    """The project with offsets of its bubble as unknowns."""
+    tests: dict[str, Any] = {
+        name: replace(test, **nuisance)  # type: ignore[type-var]
+        for name, test in project.tests.items()
+    }
+    return replace(project, tests=tests)
 
 
 if __name__ == "__main__":

@@ -7,33 +7,48 @@ from typing import Any
 
 import click
 
-from ..projects.bend import read_bend
-from ..studies.bend_setup import chosen
-from .bend_runs import bend_options, run_bend_study
-from .options import default_folder, with_solver
+from .options import data_folders
+from .predicting import prediction_options, run_predictions
+
+KIND = "cylinder"
 
 
 @click.command("bend")
 @click.argument("project", type=click.Path(path_type=Path))
-@click.option("--data", type=click.Path(path_type=Path), help="Folder of the measured data.")
-@click.option("--case", "cases", multiple=True, help="A case by its name; several [all].")
 @click.option(
-    "--card", "cards", multiple=True, help="A card by its name, or a card's file; several [all]."
+    "--data", multiple=True, metavar="[TEST=]DIR",
+    help="Folder of the measured data, of all tests or of one; several.",
+)  # fmt: skip
+@click.option(
+    "--test", "--case", "tests", multiple=True, help="A cylinder by its name; several [all]."
 )
-@bend_options
+@click.option(
+    "--card", "cards", multiple=True,
+    help="A card by its name, or a card's file; several [all, else the one just fitted].",
+)  # fmt: skip
+@prediction_options
 def command(
     project: Path,
-    data: Path | None,
-    cases: tuple[str, ...],
+    data: tuple[str, ...],
+    tests: tuple[str, ...],
     cards: tuple[str, ...],
     **options: Any,
 ) -> None:
     """Inflate and bend every cylinder of PROJECT.toml with every material card.
 
-    Writes result.json, load_deflection.csv, runs.csv, figures, the bent beams for ParaView and
+    Without a card in the project, or named, with the one that `bubblefit fit` wrote. Writes
+    result.json, load_deflection.csv, runs.csv, figures, the bent beams for ParaView and
     report.html into the output folder. A run that fails is named and left out; when none ends
     well the exit code is 4.
     """
-    settings = with_solver(read_bend(project, data), options["solver_given"])
-    picked = chosen(settings, cases, cards)
-    run_bend_study("bend", picked, options["out"] or default_folder(project), options)
+    from ..fits.project import read_project
+    from ..fits.store import usual_folder
+
+    settings = read_project(project, data_folders(data))
+    folder = options["out"]
+    if folder is None:
+        own = usual_folder(project)
+        # Beside the folder of the project's fits, where it has any.
+        alone = all(test.kind == KIND for test in settings.tests.values())
+        folder = own if alone else own.with_name(f"{own.name}-bend")
+    run_predictions(settings, folder, options, tests or [KIND], cards)

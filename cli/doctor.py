@@ -4,26 +4,37 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..errors import InputError
-from ..solvers.diagnosis import Diagnosis, diagnose
+from ..solvers.base import Diagnosis
+from ..solvers.diagnosis import diagnose
+from ..solvers.overrides import command_line
 from ..solvers.registry import solver_names
 from .options import exits
 
 UNUSABLE = 4
 
 
+def _programs(command: Callable[..., Any]) -> Callable[..., Any]:
+    """An option a solver that has a program, to look at that one."""
+    for one in reversed(command_line()):
+        if one.look:
+            command = click.option(f"--{one.name}", metavar=one.metavar, help=one.look)(command)
+    return command
+
+
 @click.command("doctor")
-@click.option("--ccx", metavar="PATH", help="A CalculiX to look at beside the ones found.")
-@click.option("--marc", metavar="PATH", help="The Marc (run_marc, or a site's .toml) to look at.")
+@_programs
 @click.option("--solver", metavar="NAME", help="A solver, such as a plug-in, that has to work.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings on stdout as JSON.")
 @exits
-def command(ccx: str | None, marc: str | None, solver: str | None, as_json: bool) -> None:
+def command(solver: str | None, as_json: bool, **programs: str | None) -> None:
     """List every solver found and prove each with bars whose end stresses are published.
 
     Exit code 0 when the embedded solver works and so does every other one that was named (--ccx,
@@ -33,7 +44,7 @@ def command(ccx: str | None, marc: str | None, solver: str | None, as_json: bool
     """
     if solver is not None and solver not in (names := solver_names()):
         raise InputError(None, "--solver", f"{solver!r} is not one of: {', '.join(names)}")
-    found = diagnose(ccx, marc)
+    found = diagnose(**programs)
     good = all(one.usable for one in found if one.expected)
     if solver is not None:
         good = good and any(one.usable for one in found if one.name == solver)
@@ -55,9 +66,7 @@ def _line(one: Diagnosis) -> str:
     state = "ok" if one.usable else "NOT USABLE"
     where = f"{one.path} ({one.origin})" if one.path else one.origin
     words = [f"{one.name:10}  {state}", f"version {one.version}" if one.version else "", where]
-    if one.path and one.name == "calculix":
-        carries = {True: "yes", False: "no", None: "cannot be seen"}[one.external_materials]
-        words.append(f"external materials: {carries}")
+    words.append(one.remark)
     if one.difference is not None:
         words.append(f"bars within {100 * one.difference:.4f} % of Marc")
     return "  ".join(word for word in words if word)

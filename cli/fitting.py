@@ -1,130 +1,131 @@
-"""What the commands that fit share: their options, the starts, the exit code."""
+"""What the commands that fit share: options, progress, words for the terminal, the exit code."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NoFeasibleStart
-from ..identification.methods import METHODS, FitOptions
-from ..identification.problem import FitProblem
-from ..projects.fit import FitProject
-from ..runs.folder import OutputFolder
-from ..runs.processes import run_starts
-from ..runs.start import StartRecord
-from .options import cores, default_folder, solver_choice, with_checks, with_solver
+from ..errors import InputError
+from .options import data_folders, read_with_solver, solver_choice, with_checks
 from .progress import StudyProgress
 
+if TYPE_CHECKING:
+    from ..fits.result import Fit
+
 WORSE = 1  # exit code of --fail-above
-Project = TypeVar("Project", bound=FitProject)
 
 
-def study_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """PROJECT and the options of every fit; the command gets them by name, errors are handled."""
     path = click.Path(path_type=Path)
     decorators: list[Callable[..., Any]] = [
         click.argument("project", type=path),
+        click.option("--test", "tests", multiple=True, help="A test by its name; several [all]."),
         click.option("--out", type=path, help="Output folder [out/NAME]."),
-        click.option("--data", type=path, help="Folder of the measured data."),
+        click.option(
+            "--data", multiple=True, metavar="[TEST=]DIR",
+            help="Folder of the measured data, of all tests or of one; several.",
+        ),
         click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
         click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
         click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores]."),
-        click.option("--method", type=click.Choice(METHODS), help="Optimiser."),
+        click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
         solver_choice,
         click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E."),
-        click.option("--resume", is_flag=True, help="Go on with an interrupted study."),
+        click.option("--resume", is_flag=True, help="Go on with an interrupted fit."),
         click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
         click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
         click.option("--quiet", is_flag=True, help="No progress."),
-    ]
-
+    ]  # fmt: skip
     return with_checks(command, decorators)
 
 
-def with_options(project: Project, options: dict[str, Any]) -> Project:
-    """The project with the options of the command line in the place of its own settings."""
-    given = {k: options[k] for k in ("starts", "seed", "method") if options[k] is not None}
-    return replace(with_solver(project, options["solver_given"]), **given)
-
-
-def run_study(
-    project: FitProject,
-    problem: FitProblem,
-    build: Callable[[], FitProblem],
-    fingerprint: str,
-    options: dict[str, Any],
-) -> tuple[OutputFolder, list[StartRecord]]:
-    """Run (or go on with) every start; the output folder then holds all of them.
+def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
+    """Read the project, fit the chosen tests (of a kind), write the folder, tell; exits as asked.
 
     Raises
     ------
-    NoFeasibleStart : of all starts. KeyboardInterrupt : after saying how to go on.
+    InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    KeyboardInterrupt : after saying how to go on.
     """
-    folder = OutputFolder(
-        options["out"] or default_folder(options["project"]),
-        project.modulus_unit,
-        project.modulus_scale,
-    )
-    columns = [f"beta_{i}" for i in project.free] + list(problem.parameters.nuisance)
-    done = folder.begin(fingerprint, columns, options["resume"], options["overwrite"])
+    from ..fits.fit import fit
+    from ..fits.store import usual_folder
+
+    path: Path = options["project"]
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    folder: Path = options["out"] or usual_folder(path)
     quiet = options["quiet"] or options["as_json"]
+    starts = options["starts"] or project.fit.starts
     try:
-        records = _starts(project, build, folder, done, options["jobs"] or cores(), quiet)
+        with StudyProgress(starts, quiet) as progress:
+            result = fit(
+                project,
+                _tests(options["tests"], kind, project.tests, path),
+                starts=options["starts"],
+                seed=options["seed"],
+                method=options["method"],
+                jobs=options["jobs"],
+                out=folder,
+                resume=options["resume"],
+                overwrite=options["overwrite"],
+                progress=progress.saw,
+            )
     except KeyboardInterrupt:
-        folder.close()
-        click.echo(f"interrupted; go on with --resume (kept in {folder.path})", err=True)
+        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
         raise
-    finally:
-        folder.close()
-    folder.finish()
-    if all(r.objective is None for r in records):
-        raise NoFeasibleStart(f"{options['project']}: no feasible start: {records[0].status}")
-    return folder, records
+    result.report(folder)
+    tell(result, folder, options["fail_above"], options["as_json"])
 
 
-def tell(result: dict[str, Any], summary: str, fail_above: float | None, as_json: bool) -> None:
+def _tests(
+    names: Sequence[str], kind: str | None, tests: Any, path: Path
+) -> Sequence[str] | str | None:
+    """The tests that a command fits: those named, else those of its kind, else all."""
+    for name in names:
+        if kind is not None and name in tests and tests[name].kind != kind:
+            problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
+            raise InputError(path, "--test", problem)
+    return names or kind
+
+
+def tell(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 1 when the best fit is worse than asked for."""
-    click.echo(json.dumps(result, indent=1) if as_json else summary)
-    best = result["objective"]
-    if fail_above is not None and best > fail_above:
-        click.echo(f"bubblefit: e = {best:.4g} is above --fail-above {fail_above:g}", err=True)
+    words = json.dumps(fit.result, indent=1) if as_json else "\n".join(lines_of(fit, folder))
+    click.echo(words)
+    if fail_above is not None and fit.objective > fail_above:
+        said = f"e = {fit.objective:.4g} is above --fail-above {fail_above:g}"
+        click.echo(f"bubblefit: {said}", err=True)
         sys.exit(WORSE)
 
 
-def _starts(
-    project: FitProject,
-    build: Callable[[], FitProblem],
-    folder: OutputFolder,
-    done: dict[int, StartRecord],
-    jobs: int,
-    quiet: bool,
-) -> list[StartRecord]:
-    finished = {n: r for n, r in done.items() if n < project.starts}
-    missing = [n for n in range(project.starts) if n not in finished]
-    known = [r.objective for r in finished.values() if r.objective is not None]
-    best = min(known, default=None)
-    with StudyProgress(project.starts, len(finished), quiet, best) as progress:
-        for record in run_starts(build, fit_options(project), project.seed, missing, jobs):
-            if record is not None:
-                folder.add(record)
-            if isinstance(record, StartRecord):
-                finished[record.number] = record
-            progress.saw(record)
-    return [finished[n] for n in sorted(finished)]
+def lines_of(fit: Fit, folder: Path) -> list[str]:
+    """How good the fit is, what its tests say, what to know, where it is."""
+    import numpy as np
 
+    from ..fits.page import sigma_words
 
-def fit_options(project: FitProject) -> FitOptions:
-    """How each start of a project is fitted."""
-    return FitOptions(
-        project.method,
-        project.gradient,
-        project.constraints,
-        project.tolerance,
-        project.max_analyses,
-    )
+    result, best = fit.result, fit.best
+    runs = result["external_runs"]
+    external = f" ({runs} of {result['solver']})" if runs else ""
+    middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
+    lines = [
+        f"best {result['objective_is']}: {fit.objective:.3g} (median {middle:.3g} of "
+        f"{len(best.ranked)} starts, {len(best.records)} asked), {result['analyses']} "
+        f"analyses{external}, {result['wall_s']:.0f} s"
+    ]
+    several = len(fit.findings) > 1
+    for name, findings in fit.findings.items():
+        lines += [f"{name}: {line}" if several else line for line in findings.lines]
+    for source, sigmas in result.get("pinned", {}).items():
+        parts = ", ".join(
+            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
+            for name, s in sigmas.items()
+        )
+        lines.append(f"1 sigma from {source}: {parts}")
+    lines += [f"note: {words}" for words in result["warnings"]]
+    return [*lines, f"written to {folder} (open report.html)"]

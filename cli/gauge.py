@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import OutputError
-from ..experiments.gauge import virtual_strain_gauge
-from ..experiments.gauge_frames import read_gauge_frames
-from ..projects.schema import LENGTH_UNITS
-from .frame_files import frame_files
-from .gauge_options import check_options, column_names
-from .gauge_results import gauge_lines, gauge_result, gauge_table, loads_at_frames
+from ..data.frame_files import frame_files
+from ..data.frames import QUANTITIES, FrameOptions, read_frames
+from ..data.gauge import virtual_strain_gauge
+from ..data.gauge_loads import PairedLoads, loads_at_frames
+from ..data.gauge_table import GaugeTable
+from ..errors import InputError, OutputError
+from ..sections import LENGTH_UNITS
 from .options import exits
 
 FILE = click.Path(path_type=Path)
+#: Options that say something of the loads, by the name of the argument.
+OF_LOADS = tuple(
+    "direction specimen load_column load_unit load_format decimal frame_times frame_time_column"
+    " frame_interval time_column time_offset".split()
+)
+#: Arguments that are options of the same name.
+ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit"])
 
 
 @click.command("gauge")
@@ -29,6 +40,7 @@ FILE = click.Path(path_type=Path)
     "--upper", type=float, nargs=2, required=True, metavar="X Y", help="The other end, mm."
 )
 @click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
+@click.option("--format", metavar="NAME", help="Of the frames; found by their content.")
 @click.option("--columns", metavar="x=..,..", help="Names in the files of x, y, z, dx, dy, dz.")
 @click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost.")
 @click.option(
@@ -45,6 +57,7 @@ FILE = click.Path(path_type=Path)
 @click.option("--specimen", metavar="NAME", help="Of the loads [name of --out].")
 @click.option("--load-column", metavar="NAME", help="Where it is not found by itself.")
 @click.option("--load-unit", type=click.Choice(["N", "kN"]), help="Where the file names none.")
+@click.option("--load-format", metavar="NAME", help="Of the loads; found by their content.")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the loads and times.")
 @click.option("--frame-times", type=FILE, help="Table of the frames' times: pairs loads by time.")
 @click.option("--frame-time-column", metavar="NAME", help="Where it is not found by itself.")
@@ -65,25 +78,115 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
     """Follow a virtual strain gauge through DIC FRAMES (CSV, in order; or a quoted pattern).
 
     Writes length, elongation, strain and logarithmic strain of each frame. With the machine's
-    loads, one a frame or paired by time, a load curve that `uniaxial.data.files` of a project
+    loads, one a frame or paired by time, a load curve that `strips.data.files` of a project
     reads as it is; frames where correlation was lost, or without a load, are left out of it.
     """
-    check_options(options)
-    files, note = frame_files(frames)
-    inputs = [*files, options["loads"], options["frame_times"]]
+    with _naming_options():
+        loads = _loads(options, out.stem)
+        files, note = frame_files(frames, "FRAMES")
+        _check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
+        asked = FrameOptions(
+            QUANTITIES,
+            _columns(options["columns"]),
+            options["flag_column"],
+            length_scale=LENGTH_UNITS[options["length_unit"]],
+        )
+        read = read_frames(files, asked, options["format"])
+        lower, upper = options["lower"], options["upper"]
+        record = virtual_strain_gauge(read, lower, upper, options["max_gap"])
+        names = [frame.path.name if frame.path else "" for frame in read]
+        table = GaugeTable(names, lower, upper, record, note=note)
+        # At once: should the loads be refused, this may be why.
+        for words in table.warnings:
+            click.echo(f"warning: {words}", err=True)
+        if loads is not None:
+            table = replace(table, curve=loads_at_frames(record, loads))
+    table.write(out)
+    result = {"command": "gauge", "out": str(out), **table.numbers()}
+    click.echo(json.dumps(result, indent=1) if options["as_json"] else _lines(result))
+
+
+def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
+    """What the options say of the loads; None without loads. `name` : of the specimen."""
+    given = {key: options[key] for key in OF_LOADS if options[key] is not None}
+    if options["loads"] is None:
+        for key in sorted(given):
+            raise InputError(None, key, "means nothing without --loads")
+        return None
+    if "direction" not in given:
+        problem = "this option is missing; a load curve needs it: warp, fill or bias"
+        raise InputError(None, "direction", problem)
+    given["format"] = given.pop("load_format", None)
+    return PairedLoads(options["loads"], **{"specimen": name, **given})
+
+
+def _check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
     if out.resolve() in [file.resolve() for file in inputs if file is not None]:
         raise OutputError(f"{out}: is one of the files to be read; choose another --out")
-    if out.exists() and not options["overwrite"]:
+    if out.exists() and not overwrite:
         raise OutputError(f"{out}: is already there; use --overwrite or another --out")
-    scale = LENGTH_UNITS[options["length_unit"]]
-    read = read_gauge_frames(
-        files, column_names(options["columns"]), options["flag_column"], length_scale=scale
-    )
-    record = virtual_strain_gauge(read, options["lower"], options["upper"], options["max_gap"])
-    # At once: should the loads be refused, this may be why.
-    for words in (*record.warnings, *([note] if note else [])):
-        click.echo(f"warning: {words}", err=True)
-    curve = loads_at_frames(record, options, out.stem) if options["loads"] else None
-    result = gauge_result(files, record, curve, out, note)
-    gauge_table(files, record, curve, options, out)
-    click.echo(json.dumps(result, indent=1) if options["as_json"] else gauge_lines(result))
+
+
+def _columns(given: str | None) -> dict[str, str] | None:
+    """Names in the files of x, y, z, dx, dy, dz, where "x=X,dz=W" changes some of them."""
+    if given is None:
+        return None
+    names = {quantity: quantity for quantity in QUANTITIES}
+    for part in given.split(","):
+        quantity, equals, name = (piece.strip() for piece in part.partition("="))
+        if not (equals and name):
+            problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
+            raise InputError(None, "columns", problem)
+        if quantity not in names:
+            problem = f"unknown quantity {quantity!r}; expected {', '.join(names)}"
+            raise InputError(None, "columns", problem)
+        names[quantity] = name
+    for quantity, name in names.items():
+        first = next(other for other in names if names[other] == name)
+        if first != quantity:
+            problem = f"column {name!r} is named for {first} and for {quantity}"
+            raise InputError(None, "columns", problem)
+    return names
+
+
+@contextmanager
+def _naming_options() -> Iterator[None]:
+    """Arguments that are wrong are told by the names of the options."""
+    try:
+        yield
+    except InputError as error:
+        field, problem = error.field, error.problem
+        if error.path is None and re.fullmatch(rf"({ARGUMENTS})(, ({ARGUMENTS}))*", field):
+            field = re.sub(ARGUMENTS, _option, field)
+        problem = re.sub(r"\b(frame_times|frame_interval|\w+_column)\b", _option, problem)
+        raise InputError(error.path, field, problem) from None
+
+
+def _option(found: re.Match[str]) -> str:
+    return f"--{found[0].replace('_', '-')}"
+
+
+def _lines(result: Mapping[str, Any]) -> str:
+    """The outcome in words."""
+    end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
+    lines = [
+        f"gauge length {length} mm; {result['frames']} frames, lost in {len(result['lost'])}",
+        f"elongation up to {end['elongation_mm']:.5g} mm: strain {end['strain']:.4g},"
+        f" log strain {end['log_strain']:.4g}",
+    ]
+    if result["lost"]:
+        lines.append(f"correlation lost: {_few(result['lost'])}")
+    if "points" in result:
+        if result["without_load"]:
+            lines.append(f"left out, no load: {_few(result['without_load'])}")
+        lines.append(f"{result['points']} points, loads up to {result['largest_load_N']:.5g} N")
+        lines.append(
+            f"in a project: [strips.{result['direction']}] gauge_length = {length}, and"
+            f" [strips.data] files = [{Path(result['out']).name!r}]"
+        )
+    return "\n".join([*lines, f"written to {result['out']}"])
+
+
+def _few(names: Sequence[str], most: int = 8) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,14 +1,16 @@
-"""`bubblefit init DIR`: a commented example project to start from."""
+"""`bubblefit init DIR`: a commented project to start from, an example or one for own tests."""
 
 from __future__ import annotations
 
+import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..errors import InputError, OutputError
-from .options import exits
+from .options import exits, numbers
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 #: By name: the folder of the example, and what to type next (in the folder that was written).
@@ -17,8 +19,13 @@ KINDS = {
     "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
     "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
     "bend": ("bend-valmex7318", "bubblefit bend {}", "project.toml"),
-    "joint": ("joint-valmex7318", "bubblefit joint {} --data DIR", "test1.toml"),
+    "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
 }
+PROJECT = "project.toml"
+SCHEMA = EXAMPLES.parent / "templates" / "project" / "project.schema.json"
+#: First line of an example, where it lies and where it is copied to: editors find the schema by it.
+FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
+COUNT = click.IntRange(0, 99)
 
 
 @click.command("init")
@@ -26,26 +33,106 @@ KINDS = {
 @click.option(
     "--example",
     type=click.Choice(list(KINDS)),
-    default="known",
-    show_default=True,
     help="A bubble from a known solution; from measured DIC files; strip tests; bending;"
-    " bubble and strips together.",
+    " bubble and strips together. [known]",
 )
+@click.option(
+    "--own",
+    is_flag=True,
+    help="A project for your own tests, by the options below or, on a terminal, by questions.",
+)
+@click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
+@click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
+@click.option("--cylinder", type=COUNT, metavar="N", help="Inflated cylinders to predict.")
+@click.option("--name", help="Of the fabric.")
+@click.option("--thickness", type=float, metavar="MM", help="Of the fabric [0.8].")
+@click.option("--form", metavar="NAME", help="Of the moduli: cubic, spline, ... [cubic].")
+@click.option("--radius", type=float, metavar="MM", help="Of the bubbles [100].")
+@click.option("--pressures", metavar="KPA,...", help="Of the bubbles [20,60,...,300].")
+@click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
+@click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
 @exits
-def command(folder: Path, example: str) -> None:
-    """Write a commented example project into FOLDER (nothing there is written over)."""
+def command(folder: Path, example: str | None, own: bool, **given: Any) -> None:
+    """Write a commented project into FOLDER: an example, or (--own) one for your own tests.
+
+    Nothing there is written over.
+    """
+    said = {key: value for key, value in given.items() if value is not None}
+    if own and example is not None:
+        raise InputError(None, "--example, --own", "give one of them, not both")
+    if said and not own:
+        option = next(iter(said))
+        raise InputError(None, f"--{option}", "means nothing without --own")
+    if own:
+        _write_own(folder, said)
+    else:
+        _copy(folder, example or "known")
+
+
+def _write_own(folder: Path, said: dict[str, Any]) -> None:
+    from ..fits.new_project import writable_kinds, write_project
+    from ..writing import write_text
+
+    path = folder / PROJECT
+    _free(path)
+    kinds = writable_kinds()
+    if not said and on_a_terminal():
+        said = _asked()
+    tests = {kind: said.pop(kind, 0) for kind in kinds}
+    if "pressures" in said:
+        said["pressures"] = numbers(said["pressures"], "--pressures")
+    write_project(path, tests, **said)
+    write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
+    click.echo(f"wrote {path}: read it, put the measured files where it says, then")
+    fitted = tests["bubble"] or tests["strips"]
+    click.echo(
+        f"next: bubblefit fit {path}" if fitted else f"next: bubblefit bend {path} --card CARD"
+    )
+
+
+def on_a_terminal() -> bool:
+    """Whether somebody is there to be asked."""
+    return sys.stdin.isatty()
+
+
+def _asked() -> dict[str, Any]:
+    """Everything by questions."""
+    said: dict[str, Any] = {
+        "name": click.prompt("Name of the fabric", default="My fabric"),
+        "thickness": click.prompt("Thickness before the test, mm", type=float),
+        "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
+    }
+    if said["bubble"]:
+        said["radius"] = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
+        said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
+    said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
+    said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
+    if said["cylinder"]:
+        said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
+        said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
+    if said["bubble"] or said["strips"]:
+        said["form"] = click.prompt("Form of the moduli", default="cubic")
+    return said
+
+
+def _free(path: Path) -> None:
+    if path.exists():
+        raise InputError(path, "", "is already there; name another folder")
+
+
+def _copy(folder: Path, example: str) -> None:
     name, advice, project = KINDS[example]
-    source = EXAMPLES / name
-    files = sorted(f for f in source.iterdir() if f.is_file())
-    for file in files:
-        if (folder / file.name).exists():
-            raise InputError(folder / file.name, "", "is already there; name another folder")
+    files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
+    for file in (*files, SCHEMA):
+        _free(folder / file.name)
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for file in files:
             written.append(folder / file.name)
-            written[-1].write_bytes(file.read_bytes())
+            written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
+        written.append(folder / SCHEMA.name)
+        written[-1].write_bytes(SCHEMA.read_bytes())
     except OSError as error:
         for path in written:  # half an example would be in the way of the next attempt
             with suppress(OSError):

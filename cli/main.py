@@ -10,16 +10,17 @@ import click
 from .. import __version__
 
 COMMANDS = {
-    "bubble": ("bubble", "Fit a material to a bubble inflation test."),
-    "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests."),
-    "joint": ("joint", "Fit a material to a bubble and strips together."),
+    "fit": ("fit", "Fit a material to all tests of a fabric together."),
+    "bubble": ("bubble", "Fit a material to bubble inflation tests only."),
+    "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests only."),
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
-    "study": ("study_command", "What refinement, or nu12, changes in an analysis."),
+    "study": ("study", "What refinement, or nu12, changes in an analysis."),
     "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
-    "init": ("init", "Write a commented example project."),
+    "init": ("init", "Write a commented project: an example, or for your own tests."),
+    "schema": ("schema", "The JSON Schema of the project file, for editors."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }
 

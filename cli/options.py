@@ -1,25 +1,21 @@
-"""What the commands share: errors to exit codes, the output folder's default, cores."""
+"""What the commands share: errors to exit codes, options, projects with a solver, cards."""
 
 from __future__ import annotations
 
 import functools
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import BubblefitError, InputError, OutputError
 
 if TYPE_CHECKING:
+    from ..fits.project import Project
     from ..materials.card import MaterialCard
-    from ..projects.bend import BendProject
-    from ..projects.fit import FitProject
 
-Project = TypeVar("Project", bound="FitProject | BendProject")
 INTERRUPTED = 130
 
 
@@ -60,17 +56,22 @@ def with_checks(
     return wrapped
 
 
-def cores() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
+    """Folders of measured data: one for all tests, or one by the name of a test ("NAME=DIR").
 
-
-def default_folder(project: Path) -> Path:
-    """out/NAME below the current folder, after the project's folder and file."""
-    name = project.resolve().parent.name
-    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+    Raises
+    ------
+    InputError : some of both, or a test named twice.
+    """
+    named = [name.partition("=") for name in given if "=" in name and not Path(name).exists()]
+    if named and len(named) < len(given):
+        raise InputError(None, "--data", "give one DIR for all tests, or TEST=DIR for each")
+    if len(given) > 1 and not named:
+        raise InputError(None, "--data", "is given twice; TEST=DIR tells tests apart")
+    folders = {name: Path(folder) for name, _, folder in named}
+    if len(folders) < len(named):
+        raise InputError(None, "--data", "names a test twice")
+    return folders or (Path(given[0]) if given else None)
 
 
 def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool) -> Path:
@@ -80,7 +81,9 @@ def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool)
     ------
     OutputError : it holds a result already and may not be written over.
     """
-    own = default_folder(project)
+    from ..fits.store import usual_folder
+
+    own = usual_folder(project)
     folder = out or own.with_name(f"{own.name}-{suffix}")
     if (folder / "result.json").exists() and not overwrite:
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
@@ -89,34 +92,40 @@ def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool)
 
 def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options that pick a solver; the command is given them as one dict, `solver_given`."""
+    from ..solvers.overrides import ANY, command_line
 
-    @click.option("--solver", metavar="NAME", help="Solver that runs the model.")
-    @click.option("--ccx", metavar="PATH", help="The CalculiX to run.")
-    @click.option("--marc", metavar="PATH", help="The Marc to run: run_marc, or a site's .toml.")
-    @click.option(
-        "--templates", type=click.Path(path_type=Path), help="Folder of your own input decks."
-    )
-    @click.option(
-        "--element",
-        metavar="NAME",
-        help="Shell element: S8R or S4 (CalculiX), 139, 75 or 18 (Marc).",
-    )
+    known = command_line()
+
     @functools.wraps(command)
-    def wrapped(
-        *args: Any,
-        solver: str | None,
-        ccx: str | None,
-        marc: str | None,
-        templates: Path | None,
-        element: str | None,
-        **kwargs: Any,
-    ) -> Any:
-        given = {
-            "solver": solver, "ccx": ccx, "marc": marc, "templates": templates, "element": element
-        }  # fmt: skip
+    def wrapped(*args: Any, solver: str | None, solver_option: Sequence[str], **kwargs: Any) -> Any:
+        given = {"solver": solver, "settings": solver_option}
+        given |= {one.name: kwargs.pop(one.name) for one in known}
         return command(*args, solver_given=given, **kwargs)
 
-    return wrapped
+    words = "A setting of the solver as in [solver.NAME]; may be given more than once."
+    decorated = click.option(f"--{ANY}", metavar="KEY=VALUE", multiple=True, help=words)(wrapped)
+    for one in reversed(known):
+        kind = click.Path(path_type=Path) if one.path else str
+        option = click.option(f"--{one.name}", metavar=one.metavar, type=kind, help=one.what)
+        decorated = option(decorated)
+    return click.option("--solver", metavar="NAME", help="Solver that runs the model.")(decorated)
+
+
+def read_with_solver(
+    path: Path,
+    given: Mapping[str, Any],
+    data: Path | Mapping[str, Path] | None = None,
+    need_data: bool = True,
+) -> Project:
+    """The project of a file, with the solver and the solver's options of the command line.
+
+    Raises
+    ------
+    InputError : in the project, or an option of a solver that does not run.
+    """
+    from ..fits.project import read_project
+
+    return with_solver(read_project(path, data, need_data), given)
 
 
 def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
@@ -126,14 +135,8 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
     ------
     InputError : an option of a solver that does not run.
     """
-    name = given["solver"] or project.solver
-    mine = {k: v for k, v in given.items() if k != "solver" and v is not None}
-    known = project.solver_options.get(name, {})
-    for option in mine:
-        if option not in known:
-            raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
-    options = {**project.solver_options, name: {**known, **mine}}
-    return replace(project, solver=name, solver_options=options)
+    mine = {k: v for k, v in given.items() if k not in ("solver", "settings")}
+    return project.with_solver(given["solver"], mine, given.get("settings", ()))
 
 
 def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
@@ -155,3 +158,17 @@ def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
             raise InputError(path, "--card", "is given twice")
         named[name] = card
     return named
+
+
+def numbers(text: str, option: str) -> list[float]:
+    """Numbers with commas between them.
+
+    Raises
+    ------
+    InputError : naming the option.
+    """
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        problem = f"expected numbers with commas between them, got {text!r}"
+        raise InputError(None, option, problem) from None

@@ -4,33 +4,56 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from ..runs.start import EvaluationRecord, StartRecord
+from ..fits.analyses import Step
+from ..fits.start import EvaluationRecord, StartRecord
+
+if TYPE_CHECKING:
+    from ..fits.predictions import RunEvent
 
 PLAIN_EVERY_S = 60.0
 
 
-@contextmanager
-def run_progress(solver: Any, steps: int, quiet: bool) -> Iterator[None]:
-    """Steps done of one run, on a terminal, where the solver tells while it runs."""
-    if quiet or not sys.stderr.isatty() or not hasattr(solver, "progress"):
-        yield
-        return
-    columns = (TextColumn("step"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("step", total=steps)
-        solver.progress = lambda increment: bar.update(task, completed=increment.time)
-        try:
-            yield
-        finally:
-            solver.progress = None
+class SeriesProgress:
+    """A few analyses one after the other, with the increments of the one that runs."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.bar: Progress | None = None
+        if not quiet and sys.stderr.isatty():
+            self.bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self.task = self.bar.add_task("", total=None)
+
+    def __enter__(self) -> Self:
+        if self.bar is not None:
+            self.bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def saw(self, step: Step) -> None:
+        """Show how far the analysis is that runs."""
+        if self.bar is not None:
+            words = f"analysis {step.analysis} of {step.analyses}, {step.part}"
+            self.bar.update(
+                self.task,
+                description=words,
+                completed=step.done,
+                total=step.increments or None,
+            )
 
 
 class CountProgress:
@@ -70,7 +93,7 @@ class CountProgress:
     def show(self) -> None:
         """On a terminal at once, elsewhere a plain line a minute."""
         if self.bar is not None:
-            self.bar.update(self.task, completed=self.done, note=self.note())
+            self.bar.update(self.task, completed=self.done, total=self.total, note=self.note())
         elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
             self.said = time.monotonic()
             words = f"{self.done} of {self.total} {self.what}, {self.note()}"
@@ -92,9 +115,10 @@ class CountProgress:
 class StudyProgress(CountProgress):
     """Starts done, best objective, time left."""
 
-    def __init__(self, total: int, done: int, quiet: bool, best: float | None = None) -> None:
-        super().__init__("starts", total, done, quiet)
-        self.best, self.analyses = best, 0
+    def __init__(self, total: int, quiet: bool) -> None:
+        super().__init__("starts", total, 0, quiet)
+        self.best: float | None = None
+        self.analyses = 0
 
     def saw(self, record: EvaluationRecord | StartRecord | None) -> None:
         """Take note of a record, or of time passing."""
@@ -115,14 +139,20 @@ class StudyProgress(CountProgress):
 class RunsProgress(CountProgress):
     """Runs done, how the last one ended, time left."""
 
-    def __init__(self, total: int, done: int, quiet: bool) -> None:
-        super().__init__("runs", total, done, quiet)
+    def __init__(self, quiet: bool) -> None:
+        super().__init__("runs", 0, 0, quiet)
         self.last = ""
 
-    def saw(self, words: str | None) -> None:
-        """Take note of a run that ended, in words, or of time passing."""
-        if words is not None:
-            self.done += 1
+    def saw(self, event: RunEvent | None) -> None:
+        """Take note of a run that ended, or of time passing."""
+        if event is not None:
+            self.done, self.total = event.done, event.total
+            self.already += event.again
+        if event is not None and event.run is not None:
+            run, record = event.run, event.run.record
+            how = "ended early" if record.early else "finished"
+            how = f"failed ({record.failure})" if record.failure else how
+            words = f"{run.test.name} with {run.card}: {how} in {record.seconds:.0f} s"
             self.last = f"last: {words}; "
         self.show()
 

@@ -1,19 +1,108 @@
-"""`bubblefit simulate`: forward analyses with material cards."""
+"""`bubblefit simulate`: forward analyses of tests with material cards."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import click
 
+from .options import (
+    data_folders,
+    exits,
+    read_with_solver,
+    result_folder,
+    solver_choice,
+)
+from .progress import SeriesProgress
 from .simulate_bend import simulate_bend
-from .simulate_bubble import simulate_bubble
-from .simulate_uniaxial import simulate_uniaxial
+
+
+def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """PROJECT, cards and the options of every simulation; errors are handled."""
+    path = click.Path(path_type=Path)
+    decorators: list[Callable[..., Any]] = [
+        click.argument("project", type=path),
+        click.option(
+            "--card", "cards", multiple=True, required=True,
+            help="A material card's file, or a card of the project; several side by side.",
+        ),
+        click.option("--test", "tests", multiple=True, help="A test by its name; several [all]."),
+        click.option("--out", type=path, help="Output folder [out/NAME-simulated]."),
+        click.option(
+            "--data", multiple=True, metavar="[TEST=]DIR", help="Folder of the measured data."
+        ),
+        solver_choice,
+        click.option(
+            "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
+        ),
+        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
+        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+    ]  # fmt: skip
+    wrapped = exits(command)
+    for decorate in reversed(decorators):
+        wrapped = decorate(wrapped)
+    return wrapped
+
+
+def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
+    """Read the project, run its tests (of a kind, or those named) with the cards, tell."""
+    from ..fits.cards import chosen_cards
+    from ..fits.simulation import simulate_cards
+
+    path: Path = options["project"]
+    data = data_folders(options["data"])
+    project = read_with_solver(path, options["solver_given"], data, need_data=False)
+    tests = project.chosen(options["tests"] or kind)
+    cards = chosen_cards(project, options["cards"])
+    folder = result_folder(path, "simulated", options["out"], options["overwrite"])
+    with SeriesProgress(options["as_json"]) as progress:
+        done = simulate_cards(
+            project, tests, cards, folder, options["within_range"], progress.saw, command
+        )
+    if options["as_json"]:
+        click.echo(json.dumps(done.numbers, indent=1))
+        return
+    for words in done.lines:
+        click.echo(words)
+    click.echo(f"written to {folder}")
 
 
 @click.group("simulate")
 def command() -> None:
-    """One forward analysis with a material card; of strips and beams, with one or several."""
+    """Forward analyses with material cards, one or several side by side."""
 
 
-command.add_command(simulate_bubble)
-command.add_command(simulate_uniaxial)
+@command.command("test")
+@card_options
+def simulate_test(**options: Any) -> None:
+    """Run the tests of PROJECT.toml with the materials of one or several cards.
+
+    What was measured is drawn beside them where it is there. A card whose analysis fails in a test
+    is left out there, and named; when nothing ends well the exit code is 4.
+    """
+    run_simulation("simulate test", options)
+
+
+@command.command("bubble")
+@card_options
+def simulate_bubble(**options: Any) -> None:
+    """Inflate the bubbles of PROJECT.toml with the materials of one or several cards."""
+    run_simulation("simulate bubble", options, "bubble")
+
+
+@command.command("uniaxial")
+@card_options
+def simulate_uniaxial(**options: Any) -> None:
+    """Pull the strips of PROJECT.toml with the materials of one or several cards.
+
+    Measured curves are drawn beside them where they are there. A card whose analysis fails on a
+    strip is left out there, and named; when nothing ends well the exit code is 4.
+    """
+    run_simulation("simulate uniaxial", options, "strips")
+
+
+command.add_command(simulate_uniaxial, "strips")
 command.add_command(simulate_bend)

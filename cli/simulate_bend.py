@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..projects.bend import BendProject, bend_project
-from ..projects.bend_schema import BendFile
-from ..projects.schema_errors import first_error
-from .bend_runs import bend_options, run_bend_study
-from .options import named_cards, with_solver
+from .predicting import prediction_options, run_predictions
+
+if TYPE_CHECKING:
+    from ..fits.project import Project
+    from ..materials.card import MaterialCard
 
 #: Stands for the project's file: a project in the folder where the command runs.
 HERE = Path("simulate bend")
+SHAPE = (
+    "length", "span", "support_diameter", "seam_width", "element_size", "symmetry", "deflection",
+    "frames",
+)  # fmt: skip
 
 
 @click.command("bend")
@@ -31,7 +36,7 @@ HERE = Path("simulate bend")
 @click.option("--support-diameter", type=float, metavar="MM", help="[100]")
 @click.option(
     "--collar", type=(float, float), metavar="MM MM",
-    help="Inner diameter and length [the thesis' by diameter].",
+    help="Inner diameter and length [240 145; above 200 mm of diameter 295 147].",
 )  # fmt: skip
 @click.option("--seam-width", type=float, metavar="MM", help="0 for none [40].")
 @click.option("--element-size", type=float, metavar="MM", help="[25]")
@@ -41,10 +46,13 @@ HERE = Path("simulate bend")
 @click.option("--deflection", type=float, metavar="MM", help="Of the collar [240].")
 @click.option("--frames", type=int, metavar="N", help="Equal steps of it [60].")
 @click.option(
+    "--places", metavar="MM,MM,...", help="Where loads are listed [1/4, 1/2 and 1 diameter]."
+)
+@click.option(
     "--measured", type=click.Path(path_type=Path), multiple=True,
     help="Measured loads, columns deflection and load with their units; several.",
 )  # fmt: skip
-@bend_options
+@prediction_options
 def simulate_bend(
     diameter: float,
     pressure: float,
@@ -57,48 +65,58 @@ def simulate_bend(
     Writes what `bubblefit bend` writes; a project file (`bubblefit init --example bend`) takes
     several cylinders and sensors in volts.
     """
-    shape = {
-        name: options.pop(name)
-        for name in (
-            "length", "span", "support_diameter", "seam_width", "element_size", "symmetry",
-            "deflection", "frames",
-        )
-    }  # fmt: skip
-    collar = options.pop("collar")
-    case: dict[str, Any] = {k: v for k, v in shape.items() if v is not None}
-    case |= {"diameter": diameter, "pressure": pressure}
+    from .options import named_cards, numbers
+
+    collar, places = options.pop("collar"), options.pop("places")
+    given = {name: options.pop(name) for name in SHAPE}
+    section: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    section |= {"diameter": diameter, "pressure": pressure}
+    section["name"] = f"{diameter:g} mm, {pressure:g} kPa"
     if collar is not None:
-        case["collar"] = {"inner_diameter": collar[0], "length": collar[1]}
+        section["collar"] = {"inner_diameter": collar[0], "length": collar[1]}
+    if places is not None:
+        section["places"] = numbers(places, "--places")
     for path in measured:
         if not path.is_file():
             raise InputError(path, "--measured", "no such file")
     if measured:
-        case["measured"] = [str(path) for path in measured]
-    project = with_solver(_project(case, cards), options["solver_given"])
-    name = f"bend-{diameter:g}mm-{pressure:g}kPa"
-    run_bend_study("simulate bend", project, options["out"] or Path("out") / name, options)
+        section["measured"] = {"files": [str(path) for path in measured]}
+    named = named_cards(cards)
+    project = _project(section, named)
+    folder = options["out"] or Path("out") / f"bend-{diameter:g}mm-{pressure:g}kPa"
+    run_predictions(project, folder, options, None, named)
 
 
-def _project(case: dict[str, Any], cards: tuple[Path, ...]) -> BendProject:
-    """A project of one case; complaints name the option instead of a key."""
-    content = {
-        "project": {"kind": "bend", "title": "Inflated cylinder in bending"},
-        "cases": [case],
-        "cards": [
-            {"file": str(path), "name": name}
-            for path, name in zip(cards, named_cards(cards), strict=True)
-        ],
-    }
+def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
+    """A project of one cylinder; complaints name the option instead of a key."""
+    from ..experiments.base import Fabric, Place, Scales
+    from ..experiments.registry import kind_named
+    from ..fits.project import Project
+    from ..fits.schema import FitSection, LawSection
+    from ..section_errors import first_error
+    from ..solvers.registry import solver_settings
+
+    kind = kind_named("cylinder")
+    fabric = Fabric("Inflated cylinder in bending", next(iter(cards.values())).thickness)
+    place = Place(HERE, "", fabric, Scales(pressure_unit="kPa"))
     try:
-        file = BendFile.model_validate(content)
-        return bend_project(HERE, file)
-    except ValidationError as found:
-        error = first_error(HERE, found, BendFile)
+        test = kind.read(kind.section.model_validate(section), place, section["name"])
+    except ValidationError as errors:
+        error = first_error(HERE, errors, kind.section)
     except InputError as found:
         error = found
+    else:
+        return Project(
+            path=HERE,
+            fabric=fabric,
+            scales=place.scales,
+            tests={test.name: test},
+            law=LawSection(),
+            fit=FitSection(),
+            cards={},
+            solver_options=solver_settings(HERE, {}),
+        )
     if error.path != HERE:
         raise error
-    field = error.field.removeprefix("cases[0]").lstrip("., ")
-    if not field.startswith(("cards", "measured")):
-        field = "--" + field.replace("supports.", "").replace("_", "-")
-    raise InputError(None, field.split("[")[0], error.problem)
+    field = error.field.lstrip(".")
+    raise InputError(None, f"--{field.split('[')[0].replace('_', '-')}", error.problem)

@@ -1,1 +1,1 @@
-"""What was measured: displacement fields with surfaces, load curves with polynomials."""
+"""Kinds of test, one folder each: section of a project, data, model, objective, figures."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..materials.law import MODULI, HypoelasticLaw
-from ..materials.positivity import GRID
+from ..materials.forms.base import COMPONENTS, modulus_rows
+from ..materials.law import HypoelasticLaw
 from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
@@ -19,13 +19,15 @@ POINTS = 61
 UNCERTAIN = 0.25
 #: Relative uncertainty of a modulus of which nothing is known.
 PRIOR = 10.0
+#: Of the largest curvature of the misfit: below, the data say nothing of a direction.
+FLAT = 1e-13
 ON_BOUND = 1e-6
 
 
 def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
-    """Largest relative error of E1, E2, G12 over the strain range reached (3,)."""
+    """Largest relative error of each modulus up to the strains reached (3,)."""
     errors = {}
-    for name, (_, component) in MODULI.items():
+    for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, reached[component], POINTS)
         errors[name] = float(
             np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
@@ -35,9 +37,10 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """1-sigma relative uncertainty of each modulus along (0 ... reached), and plain words.
+    """1-sigma relative uncertainty of each modulus up to the strains reached, and plain words.
 
-    noise : of each test, in the unit of its data (mm, N).
+    noise : by comparison, in the unit of its data (mm, N). strain, sigma : (n,) by modulus.
+    undetermined : what the data do not determine, and what lies on its bound.
     """
 
     noise: dict[str, float]
@@ -49,7 +52,7 @@ class Certainty:
 def certainty(
     problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array
 ) -> Certainty:
-    """Linear propagation of the noise of every test to the moduli.
+    """Linear propagation of the noise of every comparison to the moduli.
 
     The noise is the RMS misfit, but not less than the objective's least noise: a misfit of zero
     (computed data) does not mean that a measurement would determine everything. Assumes white
@@ -57,17 +60,13 @@ def certainty(
     """
     assert best.jacobian is not None
     noise, sigma = _noise(problem, best)
-    # The objective weighs the blocks; the covariance is that of the weighted estimate.
-    j = best.jacobian
-    inverse = np.linalg.pinv(j.T @ j, rcond=1e-13)
-    estimator = inverse @ j.T * sigma
-    strains, sigmas = _along(problem, law, reached, estimator @ estimator.T)
-    first = problem.experiments[0]
-    said = f"at {noise[first.name]:.2g} {first.objective.unit} noise"
-    if len(problem.experiments) > 1:
-        said = "with the tests' noise"
+    strains, sigmas = _along(problem, law, reached, _covariance(problem, best, sigma))
+    first = problem.comparisons[0]
+    which = f"at {noise[first.name]:.2g} {first.objective.unit} noise"
+    if len(problem.comparisons) > 1:
+        which = "with the tests' noise"
     words = [
-        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {said}), "
+        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
         f"worst at strain {strains[name][relative.argmax()]:.3f}"
         for name, relative in sigmas.items()
         if relative.max() > UNCERTAIN
@@ -80,31 +79,56 @@ def pinned_by(
     best: Evaluation,
     law: HypoelasticLaw,
     reached: Array,
-    tests: Sequence[int],
+    numbers: Sequence[int],
 ) -> dict[str, Array]:
-    """1-sigma relative uncertainty of each modulus from some `tests` alone, by their numbers.
+    """1-sigma relative uncertainty of each modulus from some comparisons alone, by their numbers.
 
-    The best estimate that those tests would allow (weights do not count), beside hardly any
-    knowledge before: each modulus at the Chebyshev points to 1000 % of its own size.
+    The best estimate that those would allow (weights do not count), beside hardly any knowledge
+    before: each modulus at its control strains to 1000 % of its own size, and each nuisance to
+    ten times the width of its bounds.
     """
     assert best.jacobian is not None
     _, sigma = _noise(problem, best)
-    rows = np.concatenate([np.r_[problem.rows(k)] for k in tests])
+    rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
     j = best.jacobian[rows] / sigma[rows, None]
-    before = PRIOR * np.maximum(np.abs(best.unknowns), 1e-3)
+    before = PRIOR * _sizes(problem, best)
     covariance = np.linalg.inv(j.T @ j + np.diag(before**-2.0))
     return _along(problem, law, reached, covariance)[1]
 
 
+def _sizes(problem: FitProblem, best: Evaluation) -> Array:
+    """(unknowns,) what each is large or small beside: itself, or the width of its bounds."""
+    lower, upper = problem.unknowns.nuisance.bounds
+    law = np.abs(best.unknowns[: problem.unknowns.size])
+    return np.concatenate([np.maximum(law, 1e-3), np.maximum(upper - lower, 1e-3)])
+
+
+def _covariance(problem: FitProblem, best: Evaluation, sigma: Array) -> Array:
+    """Of the unknowns, (n, n): the objective weighs the blocks, so that of the weighted estimate.
+
+    A direction of which the data say nothing is as uncertain as a modulus of which nothing is
+    known.
+    """
+    assert best.jacobian is not None
+    sizes = _sizes(problem, best)
+    j = best.jacobian * sizes
+    curvature, directions = np.linalg.eigh(j.T @ j)
+    good = curvature > FLAT * curvature[-1]
+    sharp, flat = directions[:, good], directions[:, ~good]
+    estimator = (sharp / curvature[good]) @ sharp.T @ j.T * sigma
+    scaled = estimator @ estimator.T + PRIOR**2 * flat @ flat.T
+    return np.asarray(scaled * sizes[:, None] * sizes)
+
+
 def _noise(problem: FitProblem, best: Evaluation) -> tuple[dict[str, float], Array]:
-    """Noise of each test in its unit, and of each residual (m,)."""
+    """Noise of each comparison in its unit, and of each residual (m,)."""
     misfit, scale = best.residual * problem.scale, problem.scale
     noise, sigma = {}, np.empty_like(scale)
-    for k, experiment in enumerate(problem.experiments):
+    for k, comparison in enumerate(problem.comparisons):
         rows = problem.rows(k)
         rms = float(np.sqrt(np.mean(misfit[rows] ** 2)))
-        noise[experiment.name] = max(experiment.objective.least_noise, rms)
-        sigma[rows] = noise[experiment.name] / scale[rows]
+        noise[comparison.name] = max(comparison.objective.least_noise, rms)
+        sigma[rows] = noise[comparison.name] / scale[rows]
     return noise, sigma
 
 
@@ -112,33 +136,38 @@ def _along(
     problem: FitProblem, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Strains and 1-sigma relative uncertainty of each modulus, from that of the unknowns."""
-    p = problem.parameters
+    p = problem.unknowns
     moved = p.to_coefficients @ covariance[: p.size, : p.size] @ p.to_coefficients.T
     strains, sigmas = {}, {}
-    for name, (first, component) in MODULI.items():
+    for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, reached[component], POINTS)
-        rows = np.zeros((POINTS, 12))
-        rows[:, first : first + 4] = law.modulus_rows(name, strain)
-        rows = rows[:, p.places]
+        rows = modulus_rows(p.form, name, strain, p.strain_range)[:, list(p.free)]
         sigma = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", rows, moved, rows), 0.0))
         strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)
     return strains, sigmas
 
 
 def _limited(problem: FitProblem, best: Evaluation) -> list[str]:
-    """Moduli on their positivity margin and coefficients on their bounds."""
-    p = problem.parameters
-    grid, margin = p.positivity
-    room = grid @ best.coefficients - margin
-    words = []
-    for block, name in enumerate(("G12", "E2", "E1")):
-        part = slice(GRID * block, GRID * block + GRID)
-        if (room[part] <= ON_BOUND * np.maximum(margin[part], 1.0)).any():
+    """Moduli on their margins or bounds, coefficients and nuisance on theirs."""
+    p, words = problem.unknowns, []
+    for name, rows in p.moduli.items():
+        moduli, least = rows @ best.coefficients, p.bounds.least[name]
+        if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
             words.append(f"{name} touches its positivity margin: the data ask for less stiffness")
-    width = p.upper - p.lower
-    low = best.coefficients - p.lower <= ON_BOUND * width
-    high = p.upper - best.coefficients <= ON_BOUND * width
-    for i in np.flatnonzero(low | high):
-        end = "lower" if low[i] else "upper"
-        words.append(f"beta_{p.places[i]} lies on its {end} bound")
-    return words
+        if p.bounds.largest is not None:
+            most = p.bounds.largest[name]
+            if (most - moduli <= ON_BOUND * most).any():
+                words.append(f"{name} touches its upper bound: the data ask for more stiffness")
+    if p.bounds.largest is None:
+        words += _on_bounds(p.labels, best.coefficients, *p.box)
+    return words + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
+
+
+def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[str]:
+    width = upper - lower
+    low = values - lower <= ON_BOUND * width
+    high = upper - values <= ON_BOUND * width
+    return [
+        f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound"
+        for i in np.flatnonzero(low | high).tolist()
+    ]

@@ -1,4 +1,4 @@
-"""What an optimiser returns for one start."""
+"""What a fit from one start gives."""
 
 from __future__ import annotations
 
@@ -9,11 +9,20 @@ from numpy.typing import NDArray
 
 from .problem import Evaluation
 
+# How a fit ends, as a user reads it.
+CONVERGED = "converged"
+LEVEL = "settled"
+ANALYSES_USED_UP = "analyses used up"
+RUNS_USED_UP = "runs used up"
+
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Best feasible point of one start, how it ended, all its analyses, and those of them that
-    the solver that counts ran while a surrogate led (0 where there is none)."""
+    """The best feasible point of one start.
+
+    status : how the fit ended. analyses : all of them; runs : those of them that the solver that
+    counts ran while a surrogate led (0 where there is none).
+    """
 
     best: Evaluation
     status: str
@@ -22,10 +31,10 @@ class Optimum:
 
     @property
     def value(self) -> float:
-        """e of Eq. 4.8 at the best feasible point."""
+        """The objective e at the best feasible point."""
         return self.best.value
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """Free coefficients (MPa) at the best feasible point."""
+        """The law's free coefficients (MPa) at the best feasible point."""
         return self.best.coefficients

@@ -1,38 +1,27 @@
-"""Cross-validation: how well a fit foretells points that it was not given."""
+"""Folds of a cross-validation: which points a fit is not given."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .methods import FitOptions, fit_from
-from .problem import FitProblem
-
-Array = NDArray[np.float64]
-Kept = Mapping[str, NDArray[np.bool_]]
+#: Which of its points a fold gives to the fit, by comparison.
+Fold = Mapping[str, NDArray[np.bool_]]
 
 
-@dataclass(frozen=True)
-class FoldError:
-    """One fold: root mean square error in N at the points left out, by test.
+def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
+    """Which points each of `count` folds gives to the fit, by comparison.
 
-    rms None: the fit without them, or the analysis, failed.
-    """
+    A comparison of several specimens loses whole specimens, because the points of one err
+    together; one of a single specimen loses points drawn at random. Each point is left out exactly
+    once where there are `count` specimens, or fewer than two.
 
-    fold: int
-    rms: Mapping[str, float] | None
-
-
-def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Kept]:
-    """Which points each of the folds keeps, by test.
-
-    specimens : (n,) number of the specimen of each point, by test. A test of several specimens
-    loses whole specimens, because the points of one err together; one of a single specimen loses
-    points drawn at random. Each point is left out exactly once where a test has `count` specimens
-    or fewer than two.
+    Parameters
+    ----------
+    specimens : (n,) number of the specimen of each point, by comparison; those that are not named
+        lose nothing.
     """
     random = np.random.default_rng(seed)
     place = {}
@@ -44,29 +33,3 @@ def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> l
         else:
             place[name] = random.permutation(len(whose)) % count
     return [{name: where != fold for name, where in place.items()} for fold in range(count)]
-
-
-def validate(
-    build: Callable[[Kept | None], FitProblem],
-    start: Array,
-    folds: Sequence[Kept],
-    options: FitOptions,
-) -> list[FoldError]:
-    """Fit without the points of each fold, from the unknowns `start`, and judge at these points.
-
-    build : the problem of the points kept, of all points for None; its objectives are those of
-    strips (`loads.LoadObjective`).
-    """
-    errors = []
-    for number, kept in enumerate(folds):
-        left_out = build({name: ~mask for name, mask in kept.items()})
-        optimum = fit_from(build(kept), start, options)
-        point = None if optimum is None else left_out.evaluate(optimum.best.unknowns, False)
-        rms = None
-        if point is not None:
-            rms = {
-                test.name: test.objective.rms(history)
-                for test, history in zip(left_out.experiments, point.histories, strict=True)
-            }
-        errors.append(FoldError(number, rms))
-    return errors

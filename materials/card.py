@@ -1,53 +1,41 @@
-"""The material card `material.toml`: read, write."""
+"""The material card `material.toml`: a law, the thickness it was fitted for, where it came from.
+
+Format 2 names its form (`form = "cubic"`), and beside it what the form needs (`breaks`, `knots`).
+A file without `format` is of format 1, which knew cubics, and tri-linear laws by their breaks.
+"""
 
 from __future__ import annotations
 
-import difflib
 import math
 import sys
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
+from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
+from ..section_errors import first_error
+from ..sections import MODULUS_UNITS, ModulusUnit, Section
 from ..writing import replacing
-from .law import UNLIMITED, HypoelasticLaw
+from .forms.base import STRAIN_NAMES, UNLIMITED
+from .forms.registry import form_named, form_names, form_settings
+from .law import HypoelasticLaw, ThicknessChange
 
 #: MPa per unit.
-UNITS = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
-DIRECTIONS = ("warp", "fill", "shear")
-
-
-KEYS = (
-    "name",
-    "source",
-    "law",
-    "unit",
-    "beta",
-    "nu12",
-    "thickness_mm",
-    "thickness_change",
-    "valid_strain",
-    "breaks",
-)
-#: What the key `law` says; a tri-linear law has breaks.
-TEXTS = {
-    "polynomial": "hypoelastic orthotropic; tangent moduli of log strain; Cauchy stress",
-    "trilinear": "hypoelastic orthotropic; tri-linear: tangent moduli constant in three regions of "
-    "log strain; Cauchy stress",
-}
-HEADERS = {
-    "polynomial": "# beta_0..3: G12 of |gamma12|, beta_4..7: E2 of eps2, beta_8..11: E1 of eps1, "
-    "highest power first.\n# Outside valid_strain a modulus keeps its end value.\n",
-    "trilinear": "# Moduli beyond the second break, between the breaks, up to the first:\n"
-    "# beta_1..3: G12 of |gamma12|, beta_5..7: E2 of eps2, beta_9..11: E1 of eps1; the others "
-    "are 0.\n# Outside valid_strain a modulus keeps its end value.\n",
-}
+UNITS = MODULUS_UNITS
+FORMAT = 2
+LAW = "hypoelastic orthotropic"
+HELD = "Outside valid_strain a modulus keeps its end value."
+#: What the key `law` of a tri-linear card of format 1 holds.
+TRILINEAR_1 = "tri-linear"
+#: Thicknesses that differ by less are the same.
+SAME_THICKNESS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,109 +47,67 @@ class MaterialCard:
     name: str = ""
     source: str = ""
 
+    def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
+        """Write the card with its moduli in `unit`; `read_card` reads it."""
+        write_card(self, Path(path), unit)
 
-def write_card(card: MaterialCard, path: Path, unit: str = "GPa") -> None:
-    """Write a card with its coefficients in `unit` ("GPa", "MPa" or "Pa")."""
+
+def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
+    """What to say where `thickness` (mm) is not that of the card; None where it is.
+
+    Moduli are stresses: of a fabric twice as thick the same moduli are twice as stiff.
+    """
+    share = thickness / card.thickness - 1
+    if abs(share) < SAME_THICKNESS:
+        return None
+    more = "stiffer" if share > 0 else "softer"
+    return (
+        f"the card was fitted for a thickness of {card.thickness:g} mm, this is {thickness:g} mm: "
+        f"with the card's moduli the fabric is {100 * abs(share):.2g} % {more}"
+    )
+
+
+def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> None:
+    """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
     law, scale = card.law, UNITS[unit]
-    ends = law.strain_range
-    named = zip(DIRECTIONS, ends, strict=True)
-    valid = {name: [0.0, float(end)] for name, end in named if end < UNLIMITED}
+    named = zip(STRAIN_NAMES, law.strain_range, strict=True)
     content: dict[str, Any] = {
+        "format": FORMAT,
         "name": card.name,
         "source": card.source,
-        "law": TEXTS[law.form],
+        "law": LAW,
+        "form": law.form.name,
         "unit": unit,
         "beta": [float(b) / scale for b in law.beta],
         "nu12": law.nu12,
         "thickness_mm": card.thickness,
         "thickness_change": law.thickness_change,
-        "valid_strain": valid,
+        "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
+        **law.form.to_card(),
     }
-    if law.breaks is not None:
-        content["breaks"] = dict(zip(DIRECTIONS, law.breaks.tolist(), strict=True))
+    words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
+    header = "".join(f"# {line}\n" for line in words)
     with replacing(path) as temporary:
-        temporary.write_text(HEADERS[law.form] + tomli_w.dumps(content), encoding="utf-8")
+        temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
 
 
-def read_card(path: Path) -> MaterialCard:
-    """Read a card.
-
-    Raises
-    ------
-    InputError : naming the file and the field: not TOML, a missing key, a unit that is not one
-        of GPa, MPa, Pa, not twelve finite coefficients, a range that is not [0, end], breaks that
-        are not [first, second], coefficients that a tri-linear law does not have.
-    """
-    try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
-        raise InputError(path, "TOML syntax", str(error)) from None
-    for key in content:
-        if key not in KEYS:
-            near = difflib.get_close_matches(key, KEYS, n=1, cutoff=0.5)
-            meant = f"did you mean {near[0]!r}? " if near else ""
-            raise InputError(path, key, f"unknown key; {meant}allowed: {', '.join(KEYS)}")
-    unit = _get(path, content, "unit", str)
-    if unit not in UNITS:
-        raise InputError(path, "unit", f"expected one of {', '.join(UNITS)}, got {unit!r}")
-    beta = _get(path, content, "beta", list)
-    if len(beta) != 12:
-        raise InputError(path, "beta", f"expected 12 coefficients, got {len(beta)}")
-    if not all(_is_number(b) for b in beta):
-        raise InputError(path, "beta", "expected finite numbers only")
-    mpa = [b * UNITS[unit] for b in beta]
-    if not all(map(math.isfinite, mpa)):
-        raise InputError(path, "beta", f"{max(beta, key=abs):g} {unit} is too large a coefficient")
-    valid = _get(path, content, "valid_strain", dict, {})
-    _check_directions(path, "valid_strain", valid)
-    ends = []
-    for name in DIRECTIONS:
-        limits = valid.get(name, [0.0, UNLIMITED])
-        good = isinstance(limits, list) and len(limits) == 2 and all(map(_is_number, limits))
-        if not good or limits[0] != 0 or not limits[1] > 0:
-            raise InputError(path, f"valid_strain.{name}", f"expected [0, end], got {limits}")
-        ends.append(float(limits[1]))
-    thickness = _get(path, content, "thickness_mm", (int, float))
-    if not _is_number(thickness) or not thickness > 0:
-        raise InputError(path, "thickness_mm", f"expected > 0, got {thickness}")
-    try:
-        law = HypoelasticLaw(
-            np.array(mpa, dtype=float),
-            _get(path, content, "nu12", (int, float)),
-            np.array(ends),
-            _get(path, content, "thickness_change", str, "constant"),
-            _breaks(path, content),
-        )
-    except InputError as error:
-        raise InputError(path, error.field, error.problem) from None
-    name = _get(path, content, "name", str, "")
-    return MaterialCard(law, float(thickness), name, _get(path, content, "source", str, ""))
+def _numbers(value: Any) -> list[float]:
+    if not isinstance(value, list) or not all(map(_is_number, value)):
+        raise PydanticCustomError("numbers", "a list of finite numbers")
+    return [float(x) for x in value]
 
 
-def _breaks(path: Path, content: dict[str, Any]) -> NDArray[np.float64] | None:
-    text = _get(path, content, "law", str, "")
-    if "breaks" not in content:
-        if "tri-linear" in text:
-            raise InputError(path, "breaks", "this key is missing; `law` says tri-linear")
-        return None
-    given = _get(path, content, "breaks", dict)
-    _check_directions(path, "breaks", given)
-    for name in DIRECTIONS:
-        pair = given.get(name)
-        good = isinstance(pair, list) and len(pair) == 2 and all(map(_is_number, pair))
-        if not good or not 0 < pair[0] < pair[1]:
-            problem = f"expected [first, second], 0 < first < second, got {pair}"
-            raise InputError(path, f"breaks.{name}", problem)
-    return np.array([given[name] for name in DIRECTIONS], dtype=float)
+def _end(value: Any) -> float:
+    good = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    if not good or value[0] != 0 or not value[1] > 0:
+        raise PydanticCustomError("range", "[0, end]")
+    return float(value[1])
 
 
-def _check_directions(path: Path, key: str, table: dict[str, Any]) -> None:
-    for name in table:
-        if name not in DIRECTIONS:
-            problem = f"unknown direction; allowed: {', '.join(DIRECTIONS)}"
-            raise InputError(path, f"{key}.{name}", problem)
+def _thickness(value: Any) -> float:
+    if not _is_number(value) or not value > 0:
+        raise PydanticCustomError("thickness", "a number > 0")
+    return float(value)
 
 
 def _is_number(value: Any) -> bool:
@@ -170,10 +116,95 @@ def _is_number(value: Any) -> bool:
     return real and abs(value) <= sys.float_info.max
 
 
-def _get(path: Path, content: dict[str, Any], key: str, kind: Any, default: Any = None) -> Any:
-    value = content.get(key, default)
-    if value is None:
-        raise InputError(path, key, "this key is missing")
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise InputError(path, key, f"has the wrong type, got {value!r}")
-    return value
+_LIST = WithJsonSchema({"type": "array", "items": {"type": "number"}})
+Numbers = Annotated[list[float], PlainValidator(_numbers), _LIST]
+End = Annotated[float, PlainValidator(_end), _LIST]
+Thickness = Annotated[float, PlainValidator(_thickness), WithJsonSchema({"type": "number"})]
+
+
+class ValidStrain(Section):
+    """`valid_strain`: [0, end] of each log strain; a direction left out has no end."""
+
+    warp: End = UNLIMITED
+    fill: End = UNLIMITED
+    shear: End = UNLIMITED
+
+
+class CardFile(Section):
+    """The keys of a card that do not depend on its form."""
+
+    format: Literal[1, 2] = 1
+    name: str = ""
+    source: str = ""
+    law: str = ""
+    form: str | None = None
+    unit: ModulusUnit
+    beta: Numbers
+    nu12: float
+    thickness_mm: Thickness
+    thickness_change: ThicknessChange = "constant"
+    valid_strain: ValidStrain = Field(default_factory=ValidStrain)
+
+
+def read_card(path: Path) -> MaterialCard:
+    """Read a card of either format.
+
+    Raises
+    ------
+    InputError : naming the file and the field: not TOML, a missing or unknown key, a format, law,
+        form or unit that is none, coefficients that the form does not have, a range that is not
+        [0, end], what the form does not like (breaks, knots).
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
+        raise InputError(path, "TOML syntax", str(error)) from None
+    try:
+        return _card(content)
+    except InputError as error:
+        raise InputError(path, error.field, error.problem) from None
+
+
+def _card(content: Mapping[str, Any]) -> MaterialCard:
+    name, settings = _form(content)
+    rest = {key: value for key, value in content.items() if key not in settings}
+    try:
+        file = CardFile.model_validate(rest)
+    except ValidationError as error:
+        raise first_error(None, error, CardFile) from None
+    mpa = [b * UNITS[file.unit] for b in file.beta]
+    if not all(map(math.isfinite, mpa)):
+        largest = max(file.beta, key=abs)
+        raise InputError(None, "beta", f"{largest:g} {file.unit} is too large a coefficient")
+    # What the form says is of all strains, whatever part of them the card holds for.
+    form = form_named(name, settings, [UNLIMITED] * 3)
+    if len(mpa) != form.size:
+        raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
+    ends = np.array([file.valid_strain.warp, file.valid_strain.fill, file.valid_strain.shear])
+    law = HypoelasticLaw(np.array(mpa), file.nu12, ends, file.thickness_change, form)
+    return MaterialCard(law, file.thickness_mm, file.name, file.source)
+
+
+def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Name of the form, and what the card says beside it; keys that are none are not looked at."""
+    name, text = content.get("form"), content.get("law", "")
+    if content.get("format", 1) == 1:
+        if name is not None:
+            problem = f"this key is missing; a card that names its form is of format = {FORMAT}"
+            raise InputError(None, "format", problem)
+        if "breaks" not in content and isinstance(text, str) and TRILINEAR_1 in text:
+            raise InputError(None, "breaks", f"this key is missing; `law` says {TRILINEAR_1}")
+        name = "trilinear" if "breaks" in content else "cubic"
+    elif name is None:
+        raise InputError(None, "form", "this key is missing; add it")
+    elif text not in ("", LAW):
+        raise InputError(None, "law", f"expected {LAW!r}, got {text!r}")
+    if not isinstance(name, str):
+        raise InputError(None, "form", f"expected the name of a form, got {name!r}")
+    own = form_settings(name)
+    if not own and name not in form_names():
+        form_named(name, {}, [UNLIMITED] * 3)  # says what there is
+    return name, {key: content[key] for key in own if key in content}

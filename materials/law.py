@@ -1,20 +1,20 @@
 """The hypoelastic orthotropic law, vectorised over integration points.
 
-d sigma = D(eps) d eps in the convected warp/fill frame; tangent moduli are cubics of the
-logarithmic strain component in their own direction (Eqs 3.1-3.3):
+d sigma = D(eps) d eps in the convected warp/fill frame, with TANGENT moduli that depend on the
+logarithmic strain component in their own direction: G12 on |gamma12|, E2 on eps2, E1 on eps1.
+How the numbers beta make these three curves is the law's form (materials/forms/); as cubics
 
-    G12 = b0 g^3 + b1 g^2 + b2 g + b3,  E2 = b4 e2^3 + ... + b7,  E1 = b8 e1^3 + ... + b11,
+    G12 = b0 g^3 + b1 g^2 + b2 g + b3,  E2 = b4 e2^3 + ... + b7,  E1 = b8 e1^3 + ... + b11.
 
-or constant in three regions of that strain each (tri-linear, after Ambroziak and Klosowski):
-G12 = b3 up to its first break, b2 up to its second, b1 beyond, b0 = 0; E2 and E1 likewise.
-
-g = |gamma12|; nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame.
+nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. One increment takes the mean
+of each modulus over its own strain increment (`point_moduli`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -22,21 +22,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..caching import compiled
 from ..errors import InputError
-from .moduli import (
-    MODULI,
-    UNLIMITED,
-    UNUSED,
-    Form,
-    coefficient_rows,
-    held_strain,
-    strain_breaks,
-)
+from .forms.base import COMPONENTS, UNLIMITED, Form, held_strain, modulus_rows, pieces_of
+from .forms.polynomial import CONSTANT, CUBIC
+from .forms.trilinear import TriLinear
 from .point_law import SLOPES, membrane_stress, stress_update
 
 Array = NDArray[np.float64]
 ThicknessChange = Literal["constant", "incompressible"]
 
-__all__ = ["MODULI", "UNLIMITED", "Form", "HypoelasticLaw", "ThicknessChange"]
+__all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]
+#: Jump of a modulus at the end of a piece, over its size there, that is more than rounding.
+JUMP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,36 +41,40 @@ class HypoelasticLaw:
 
     Parameters
     ----------
-    beta : (12,) MPa, in the order of Eqs 3.1-3.3.
-    nu12 : Poisson's ratio; 0.24 in the thesis.
-    strain_range : (3,) ends (eps1, eps2, gamma12) of the range the coefficients hold for; beyond
+    beta : (size,) MPa, what the form knows: 12 coefficients, or moduli at the knots of a spline.
+    nu12 : Poisson's ratio.
+    strain_range : (3,) ends (eps1, eps2, gamma12) of the range that beta holds for; beyond
         them, and below zero, a modulus keeps its end value.
-    thickness_change : "constant" (the thesis' shells) or "incompressible" (resultant
+    thickness_change : "constant" (shells that keep it) or "incompressible" (resultant
         sigma t0 / area ratio).
-    breaks : (3, 2) two positive, increasing strains for each of (eps1, eps2, gamma12): the law
-        is tri-linear then, with beta_3, beta_2, beta_1 for G12 up to the first break, between
-        the breaks and beyond, beta_7..5 for E2, beta_11..9 for E1; beta_0, 4 and 8 are zero.
-    limits : what the compiled kernels need to know of range and breaks (`point_moduli`); made
-        here.
+    form : how beta makes the moduli; cubics unless given.
+    pieces : (3, P, 5) MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here.
 
     Raises
     ------
-    InputError : not twelve finite coefficients, a range that is not positive, breaks that do not
-        increase, or a coefficient that a tri-linear law does not have.
+    InputError : a beta that is not of the form's size, or not finite, or has an entry that the
+        form does not have; a range that is not positive.
     """
 
     beta: Array
     nu12: float = 0.24
     strain_range: Array = None  # type: ignore[assignment]
     thickness_change: ThicknessChange = "constant"
-    breaks: Array | None = None
-    limits: Array = field(init=False, repr=False)
+    form: Form = CUBIC
+    pieces: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        beta = np.array(self.beta, dtype=float)
-        if beta.shape != (12,) or not np.isfinite(beta).all():
+        beta, form = np.array(self.beta, dtype=float), self.form
+        if beta.shape != (form.size,) or not np.isfinite(beta).all():
             raise InputError(
-                None, "beta", f"expected 12 finite coefficients, got shape {beta.shape}"
+                None, "beta", f"expected {form.size} finite coefficients, got shape {beta.shape}"
+            )
+        surplus = [i for i in range(form.size) if i not in form.free and beta[i] != 0.0]
+        if surplus:
+            names = ", ".join(form.labels[i] for i in surplus)
+            values = ", ".join(f"{beta[i]:g}" for i in surplus)
+            raise InputError(
+                None, "beta", f"a {form.name} law has no {names}: expected 0, got {values}"
             )
         unlimited = [UNLIMITED] * 3
         ends = np.array(unlimited if self.strain_range is None else self.strain_range, dtype=float)
@@ -90,22 +90,9 @@ class HypoelasticLaw:
                 "thickness_change",
                 f"expected 'constant' or 'incompressible', got {self.thickness_change!r}",
             )
-        limits, pairs = ends, None
-        if self.breaks is not None:
-            pairs = strain_breaks(self.breaks)
-            pairs.flags.writeable = False
-            if any(beta[i] != 0.0 for i in UNUSED):
-                problem = "a tri-linear law has no beta_0, beta_4 and beta_8: expected 0, got "
-                raise InputError(
-                    None, "beta", problem + ", ".join(f"{beta[i]:g}" for i in sorted(UNUSED))
-                )
-            # A modulus that is held at its end never reaches a break from there on.
-            reached = np.where(pairs < ends[:, None], pairs, UNLIMITED)
-            limits = np.concatenate([ends, reached.ravel()])
-        beta.flags.writeable = ends.flags.writeable = limits.flags.writeable = False
-        for name, value in (
-            ("beta", beta), ("strain_range", ends), ("breaks", pairs), ("limits", limits)
-        ):  # fmt: skip
+        pieces = pieces_of(form, beta, ends.tolist())
+        beta.flags.writeable = ends.flags.writeable = False
+        for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):
             object.__setattr__(self, name, value)
 
     @classmethod
@@ -120,7 +107,7 @@ class HypoelasticLaw:
         """Constant moduli (MPa): the linear orthotropic law."""
         beta = np.zeros(12)
         beta[[3, 7, 11]] = g12, e2, e1
-        return cls(beta, nu12, None, thickness_change)  # type: ignore[arg-type]
+        return cls(beta, nu12, None, thickness_change, CONSTANT)  # type: ignore[arg-type]
 
     @classmethod
     def trilinear(
@@ -140,18 +127,21 @@ class HypoelasticLaw:
         e1, e2, g12 : (3,) moduli up to the first break, between the breaks, beyond the second.
         breaks : (3, 2) two strains for each of (eps1, eps2, gamma12).
         """
-        beta = np.zeros(12)
         for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
             if np.shape(values) != (3,):
                 raise InputError(None, name, f"expected 3 moduli, got {values}")
-            first = MODULI[name][0]
-            beta[[first + 3, first + 2, first + 1]] = values
-        return cls(beta, nu12, strain_range, thickness_change, breaks)  # type: ignore[arg-type]
+        beta = np.zeros(12)
+        beta[[3, 2, 1, 7, 6, 5, 11, 10, 9]] = (*g12, *e2, *e1)
+        return cls(beta, nu12, strain_range, thickness_change, TriLinear.at(breaks))  # type: ignore[arg-type]
 
-    @property
-    def form(self) -> Form:
-        """How the moduli depend on strain: "polynomial" or "trilinear"."""
-        return "polynomial" if self.breaks is None else "trilinear"
+    @cached_property
+    def jumps(self) -> bool:
+        """Whether a modulus jumps somewhere in the strain range."""
+        here, there, at = self.pieces[:, :-1, 1:], self.pieces[:, 1:, 1:], self.pieces[:, :-1, :1]
+        powers = at ** [3, 2, 1, 0]
+        before, after = (here * powers).sum(axis=-1), (there * powers).sum(axis=-1)
+        size = np.maximum(np.abs(before), np.abs(after))
+        return bool((np.abs(after - before) > JUMP * size).any())
 
     @property
     def area_power(self) -> float:
@@ -164,30 +154,25 @@ class HypoelasticLaw:
 
     def modulus(self, name: str, strain: ArrayLike) -> Array:
         """Tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape."""
-        first, component = MODULI[name]
-        coefficients = self.beta[first : first + 4]
-        if self.breaks is not None:
-            rows = self.modulus_rows(name, np.ravel(strain))
-            return np.asarray((rows @ coefficients).reshape(np.shape(strain)))
-        held = held_strain(name, strain, self.strain_range[component])
-        return np.asarray(np.polyval(coefficients, held))
+        pieces = self.pieces[COMPONENTS[name]]
+        held = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
+        c = pieces[np.searchsorted(pieces[:-1, 0], held), 1:]
+        return np.asarray(((c[..., 0] * held + c[..., 1]) * held + c[..., 2]) * held + c[..., 3])
 
     def modulus_rows(self, name: str, strain: ArrayLike) -> Array:
-        """d modulus / d (its four coefficients) at strains (n,), (n, 4), held ones included."""
-        _, component = MODULI[name]
-        held = held_strain(name, strain, self.strain_range[component])
-        return coefficient_rows(held, None if self.breaks is None else self.breaks[component])
+        """(n, size): d modulus / d beta at strains (n,), held ones included."""
+        return modulus_rows(self.form, name, strain, self.strain_range.tolist())
 
     def E1(self, strain: ArrayLike) -> Array:
-        """Warp tangent modulus (MPa), Eq. 3.3."""
+        """Warp tangent modulus (MPa) of eps1."""
         return self.modulus("E1", strain)
 
     def E2(self, strain: ArrayLike) -> Array:
-        """Fill tangent modulus (MPa), Eq. 3.2."""
+        """Fill tangent modulus (MPa) of eps2."""
         return self.modulus("E2", strain)
 
     def G12(self, strain: ArrayLike) -> Array:
-        """Shear tangent modulus (MPa), Eq. 3.1."""
+        """Shear tangent modulus (MPa) of gamma12."""
         return self.modulus("G12", strain)
 
     def increment(
@@ -201,7 +186,7 @@ class HypoelasticLaw:
             np.ascontiguousarray(np.atleast_2d(a), dtype=float)
             for a in (strain_old, strain_new, stress_old)
         )
-        return _increments(self.beta, self.nu12, self.limits, old, new, stress)
+        return _increments(self.pieces, self.nu12, old, new, stress)
 
     def second_piola_kirchhoff(
         self,
@@ -226,24 +211,24 @@ class HypoelasticLaw:
         zero = np.zeros((len(f), 3))
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
-        return _pull_backs(self.beta, self.nu12, self.limits, self.area_power, right, old, stress)
+        return _pull_backs(self.pieces, self.nu12, self.area_power, right, old, stress)
 
 
 @compiled()
-def _increments(beta, nu, limits, old, new, stress_old):  # type: ignore[no-untyped-def]
+def _increments(pieces, nu, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
     stress, tangent = np.empty((n, 3)), np.empty((n, 3, 3))
     slopes = np.empty(SLOPES)
     for i in range(n):
         if not stress_update(
-            beta, nu, limits, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
+            pieces, nu, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
         ):
             stress[i], tangent[i] = np.nan, np.nan
     return stress, tangent
 
 
 @compiled()
-def _pull_backs(beta, nu, limits, power, right, old, stress_old):  # type: ignore[no-untyped-def]
+def _pull_backs(pieces, nu, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))
     strain, stress = np.empty((n, 3)), np.empty((n, 3))
@@ -254,7 +239,7 @@ def _pull_backs(beta, nu, limits, power, right, old, stress_old):  # type: ignor
         q = 0.5 * (right[i, 0, 0] - right[i, 1, 1])
         c = right[i, 0, 1]
         if not membrane_stress(
-            m, q, c, beta, nu, limits, power, old[i], stress_old[i], strain[i], stress[i],
+            m, q, c, pieces, nu, power, old[i], stress_old[i], strain[i], stress[i],
             pk2[i], stiffness[i], p, law, slopes, pull, work,
         ):  # fmt: skip
             pk2[i], stiffness[i], strain[i], stress[i] = np.nan, np.nan, np.nan, np.nan

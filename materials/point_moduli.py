@@ -1,11 +1,13 @@
-"""The tangent modulus of one increment at one integration point, compiled: both forms of the law.
+"""The tangent modulus of one increment at one integration point, compiled.
 
-`limits` says which form it is. Polynomials: (3,), the ends of the strain range (eps1, eps2,
-gamma12). Tri-linear: (9,), the same and then the two breaks of eps1, of eps2 and of gamma12;
-breaks at or beyond an end are never reached (`law.UNLIMITED`), so that the ends say nothing more.
+`pieces` (3, P, 5) is a law's three moduli as piecewise cubics, as `forms.base.pieces_of` writes
+them: by component 0 (E1 of eps1), 1 (E2 of eps2) and 2 (G12 of gamma12, even in it) the upper
+end of each piece and its four coefficients, highest power of the strain first. Below zero strain
+and beyond the last end a modulus is held.
 
-A component is 0 (E1 of eps1), 1 (E2 of eps2) or 2 (G12 of gamma12, even in it); the four
-coefficients of its modulus begin at beta[8 - 4 component].
+The modulus of an increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F
+its integral. So a bar has the exact stress in any number of increments, a modulus that jumps
+gives a stress that does not, and d(stress)/d(strain) is the modulus at the END of the increment.
 """
 
 from __future__ import annotations
@@ -17,94 +19,170 @@ from ..caching import compiled
 
 Array = NDArray[np.float64]
 
-#: An increment of strain so small that only rounding tells its modulus from that at a point.
+#: An increment of strain across the end of a piece is not divided by where it is smaller.
 TINY = 1e-12
 
 
 @compiled()
-def _held(end: float, component: int, x: float) -> tuple[float, bool]:
-    """x (its size, for shear) held to [0, end], and whether that changed it."""
+def _place(pieces: Array, component: int, x: float) -> int:
+    """The piece that holds at x; the last one beyond the range, the first below zero."""
+    k, last = 0, pieces.shape[1] - 1
+    while k < last and x > pieces[component, k, 0]:
+        k += 1
+    return k
+
+
+@compiled()
+def _means(a: float, b: float) -> tuple[float, float, float]:
+    """Means of x^3, x^2 and x between a and b."""
+    total, squares = a + b, a * a + b * b
+    return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
+
+
+@compiled()
+def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) -> float:
+    third, second, first = _means(a, b)
+    value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
+    return value + pieces[component, k, 3] * first + pieces[component, k, 4]
+
+
+@compiled()
+def point_modulus(pieces: Array, component: int, x: float) -> float:
+    """The modulus at the strain x."""
     size = abs(x) if component == 2 else x
-    held = min(max(size, 0.0), end)
-    return held, held != size
+    held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
+    k = _place(pieces, component, held)
+    value = pieces[component, k, 1] * held + pieces[component, k, 2]
+    return (value * held + pieces[component, k, 3]) * held + pieces[component, k, 4]
 
 
 @compiled()
-def _cubic(beta: Array, end: float, component: int, x: float) -> tuple[float, float]:
-    """Modulus at the strain x, and half its slope there."""
-    first = 8 - 4 * component
-    held, changed = _held(end, component, x)
-    value = ((beta[first] * held + beta[first + 1]) * held + beta[first + 2]) * held
-    value += beta[first + 3]
-    if changed:
-        return value, 0.0
-    slope = (3.0 * beta[first] * held + 2.0 * beta[first + 1]) * held + beta[first + 2]
-    return value, -0.5 * slope if component == 2 and x < 0.0 else 0.5 * slope
+def _integral(pieces: Array, component: int, low: float, high: float) -> float:
+    """Integral of the modulus from low to high, the sum over the pieces on the way."""
+    total, start = 0.0, 0.0
+    if low < 0.0:
+        total += (min(high, 0.0) - low) * pieces[component, 0, 4]
+    for k in range(pieces.shape[1]):
+        end = pieces[component, k, 0]
+        a, b = max(low, start), min(high, end)
+        if b > a:
+            total += (b - a) * _mean_of_piece(pieces, component, k, a, b)
+        start = end
+    if high > start:
+        total += (high - max(low, start)) * point_modulus(pieces, component, start)
+    return total
 
 
 @compiled()
-def _way_below(at: float, component: int, x: float, x_old: float) -> float:
-    """Part of the way from x_old to x that is below a break (for shear: in size)."""
-    if component == 2:
-        return (min(max(x, -at), at) - min(max(x_old, -at), at)) / (x - x_old)
-    return (min(x, at) - min(x_old, at)) / (x - x_old)
-
-
-@compiled()
-def _shares(limits: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
-    """Parts of the way from x_old to x below, between and beyond the breaks; their sum is 1."""
-    a, b = limits[3 + 2 * component], limits[4 + 2 * component]
-    if abs(x - x_old) < TINY:
-        middle = 0.5 * (x + x_old)
-        size = abs(middle) if component == 2 else middle
-        if size <= a:
-            return 1.0, 0.0, 0.0
-        return (0.0, 1.0, 0.0) if size <= b else (0.0, 0.0, 1.0)
-    below = _way_below(a, component, x, x_old)
-    within = _way_below(b, component, x, x_old)
-    return below, within - below, 1.0 - within
-
-
-@compiled()
-def _mean(beta: Array, limits: Array, component: int, x: float, x_old: float) -> float:
-    first = 8 - 4 * component
-    below, between, beyond = _shares(limits, component, x, x_old)
-    return below * beta[first + 3] + between * beta[first + 2] + beyond * beta[first + 1]
-
-
-@compiled()
-def increment_modulus(
-    beta: Array, limits: Array, component: int, x: float, x_old: float
-) -> tuple[float, float, float]:
-    """Modulus for the increment from x_old to x, and its derivatives by x and by x_old.
-
-    A polynomial is taken at the midpoint. A modulus that jumps there would make the stress
-    jump with the strain, and Newton's iteration stall: a tri-linear one is the mean over the
-    increment, (F(x) - F(x_old))/(x - x_old) with F its integral, which is continuous in x and
-    gives the exact stress of a bar in any number of increments.
-    """
-    if len(limits) == 3:
-        value, half = _cubic(beta, limits[component], component, 0.5 * (x + x_old))
-        return value, half, half
-    mean = _mean(beta, limits, component, x, x_old)
+def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
+    """As `increment_modulus`, for an increment that leaves a piece."""
     change = x - x_old
     if abs(change) < TINY:
-        return mean, 0.0, 0.0
-    ahead = (_mean(beta, limits, component, x, x) - mean) / change
-    behind = (mean - _mean(beta, limits, component, x_old, x_old)) / change
+        return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
+    if component == 2 and x * x_old < 0.0:
+        whole = _integral(pieces, 2, 0.0, abs(x)) + _integral(pieces, 2, 0.0, abs(x_old))
+    elif component == 2:
+        a, b = abs(x), abs(x_old)
+        whole = _integral(pieces, 2, min(a, b), max(a, b))
+    else:
+        whole = _integral(pieces, component, min(x, x_old), max(x, x_old))
+    mean = whole / abs(change)
+    ahead = (point_modulus(pieces, component, x) - mean) / change
+    behind = (mean - point_modulus(pieces, component, x_old)) / change
     return mean, ahead, behind
 
 
 @compiled()
-def by_coefficients(limits: Array, h: Array, h_old: Array, row: Array) -> None:
-    """Write row (12,): derivative of the increment's moduli by each of their own coefficients."""
-    for component in range(3):
-        first = 8 - 4 * component
-        if len(limits) == 3:
-            middle = 0.5 * (h[component] + h_old[component])
-            x, _ = _held(limits[component], component, middle)
-            row[first], row[first + 1], row[first + 2], row[first + 3] = x * (x * x), x * x, x, 1.0
-        else:
-            below, between, beyond = _shares(limits, component, h[component], h_old[component])
-            row[first], row[first + 1] = 0.0, beyond
-            row[first + 2], row[first + 3] = between, below
+def increment_modulus(
+    pieces: Array, component: int, x: float, x_old: float
+) -> tuple[float, float, float]:
+    """Mean modulus from x_old to x, and its derivatives by x and by x_old.
+
+    These are (E(x) - mean)/(x - x_old) and (mean - E(x_old))/(x - x_old). Inside one piece all
+    three are polynomials of both strains, so that nothing cancels however small the increment.
+    """
+    a, b, sign = x_old, x, 1.0
+    if component == 2 and x <= 0.0 and x_old <= 0.0:
+        a, b, sign = -x_old, -x, -1.0
+    end = pieces[component, pieces.shape[1] - 1, 0]
+    # A strain that is not a number fails these comparisons, and the mean is not a number.
+    if component != 2 and a <= 0.0 and b <= 0.0:
+        return pieces[component, 0, 4], 0.0, 0.0
+    if a >= end and b >= end:
+        return point_modulus(pieces, component, end), 0.0, 0.0
+    low, high = min(a, b), max(a, b)
+    k = _place(pieces, component, high)
+    start = pieces[component, k - 1, 0] if k > 0 else 0.0
+    if not (low >= start and high <= pieces[component, k, 0]):
+        return _across(pieces, component, x, x_old)
+    third, second, first = (
+        pieces[component, k, 1], pieces[component, k, 2], pieces[component, k, 3]
+    )  # fmt: skip
+    mean = _mean_of_piece(pieces, component, k, a, b)
+    ab, aa, bb = 2.0 * a * b, a * a, b * b
+    ahead = third * (0.25 * (aa + ab + 3.0 * bb)) + second * ((a + 2.0 * b) * (1.0 / 3.0))
+    behind = third * (0.25 * (3.0 * aa + ab + bb)) + second * ((2.0 * a + b) * (1.0 / 3.0))
+    return mean, sign * (ahead + 0.5 * first), sign * (behind + 0.5 * first)
+
+
+@compiled()
+def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
+    third, second, first = _means(a, b)
+    weights[k, 0] += share * third
+    weights[k, 1] += share * second
+    weights[k, 2] += share * first
+    weights[k, 3] += share
+
+
+@compiled()
+def _add_way(
+    pieces: Array, component: int, low: float, high: float, whole: float, weights: Array
+) -> None:
+    """Add what the way from low to high, part of one of the length `whole`, has of each piece."""
+    start = 0.0
+    if low < 0.0:
+        _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
+    for k in range(_place(pieces, component, high) + 1):
+        end = pieces[component, k, 0]
+        a, b = max(low, start), min(high, end)
+        if b > a:
+            _add(weights, k, (b - a) / whole, a, b)
+        if high > end and k == pieces.shape[1] - 1:
+            _add(weights, k, (high - max(low, end)) / whole, end, end)
+        start = end
+
+
+@compiled()
+def by_pieces(
+    pieces: Array, component: int, x: float, x_old: float, weights: Array
+) -> tuple[int, int]:
+    """Derivative of the mean modulus by the coefficients of each piece, into weights (P, 4).
+
+    Returns the first piece on the way and the one after the last; the others are not written.
+    """
+    a, b, whole = x_old, x, abs(x - x_old)
+    if component == 2 and x * x_old >= 0.0:
+        a, b = abs(x_old), abs(x)
+    if whole < TINY:
+        a = b = 0.5 * (a + b)
+    low, high = min(a, b), max(a, b)
+    k = _place(pieces, component, high)
+    start = pieces[component, k - 1, 0] if k > 0 else 0.0
+    if low >= start and high <= pieces[component, k, 0]:
+        weights[k, 0], weights[k, 1], weights[k, 2] = _means(a, b)
+        weights[k, 3] = 1.0
+        return k, k + 1
+    turns = component == 2 and low < 0.0  # the shear changes its sign
+    first = 0 if turns else _place(pieces, component, low)
+    stop = max(k, _place(pieces, component, -low)) + 1 if turns else k + 1
+    for i in range(first, stop):
+        weights[i] = 0.0
+    if whole < TINY:
+        held = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
+        _add(weights, stop - 1, 1.0, held, held)
+    elif turns:
+        _add_way(pieces, 2, 0.0, high, whole, weights)
+        _add_way(pieces, 2, 0.0, -low, whole, weights)
+    else:
+        _add_way(pieces, component, low, high, whole, weights)
+    return first, stop

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .forms.base import COMPONENTS, UNLIMITED
 from .law import HypoelasticLaw
-from .moduli import MODULI, UNLIMITED
+from .pieces import curve_pieces
 
 Array = NDArray[np.float64]
 
@@ -18,9 +19,10 @@ POINTS = 121
 #: Where a table ends when the law's range does not: a law without a range holds its polynomials
 #: for any strain, a table cannot.
 REACH = 0.3
-#: Strain over which a table makes the jump of a tri-linear modulus: a table takes one value a
-#: strain.
+#: Strain over which a table makes the jump of a modulus: a table takes one value a strain.
 JUMP = 1e-6
+#: Difference of two pieces where they meet, over the modulus there, that is more than rounding.
+ROUNDING = 1e-9
 #: Strains between two points at which the error of a table is looked for.
 BETWEEN = 16
 
@@ -31,14 +33,15 @@ class ModulusTable:
 
     name : "E1" (of eps1), "E2" (of eps2) or "G12" (of gamma12, the engineering shear, from
     -end to end: it is even in it). strain, modulus : (n,), increasing strains and MPa. error :
-    largest relative difference from the law between the points, jumps left out. reaches : whether
-    the table covers the law's whole range.
+    largest relative difference from the law between the points, jumps left out. jumps : strains
+    from 0 where the modulus jumps. reaches : whether the table covers the law's whole range.
     """
 
     name: str
     strain: Array
     modulus: Array
     error: float
+    jumps: Array
     reaches: bool
 
     def at(self, strain: NDArray[np.float64] | float) -> Array:
@@ -53,7 +56,8 @@ def modulus_table(
 
     Parameters
     ----------
-    points : equally spaced strains from 0 to the end; each break of a tri-linear law adds two.
+    points : equally spaced strains from 0 to the end. Where one piece of the modulus gives way to
+        the next there is one more, and two where it jumps.
     reach : the end where the law has no range.
 
     Raises
@@ -64,30 +68,42 @@ def modulus_table(
         raise InputError(None, "points", f"expected at least 2, got {points}")
     if not 0 < reach < UNLIMITED:
         raise InputError(None, "reach", f"expected a positive strain, got {reach:g}")
-    component = MODULI[name][1]
+    component = COMPONENTS[name]
     end = float(law.strain_range[component])
     reaches = end < UNLIMITED
     end = end if reaches else reach
     strain = np.linspace(0.0, end, points)
-    jumps = np.empty(0)
-    if law.breaks is not None:
-        jumps = law.breaks[component][law.breaks[component] + JUMP < end]
-        # An equally spaced strain inside a jump would make it a step of two slopes.
-        near = (np.abs(strain[:, None] - jumps - JUMP / 2) < JUMP).any(axis=1)
-        strain = np.unique(np.concatenate([strain[~near], jumps, jumps + JUMP]))
+    knots, jumps = _meetings(law, name, end)
+    # An equally spaced strain inside a jump would make it a step of two slopes.
+    spaced = strain[(np.abs(strain[:, None] - knots - JUMP / 2) >= JUMP).all(axis=1)]
+    beyond = np.minimum(jumps + JUMP, end)
+    strain = np.unique(np.concatenate([[0.0, end], spaced, knots, beyond]))
     modulus = law.modulus(name, strain)
     error = _error(law, name, strain, modulus, jumps)
     if name == "G12":
         strain = np.concatenate([-strain[:0:-1], strain])
         modulus = np.concatenate([modulus[:0:-1], modulus])
-    return ModulusTable(name, strain, modulus, error, reaches)
+    return ModulusTable(name, strain, modulus, error, jumps, reaches)
 
 
 def modulus_tables(
     law: HypoelasticLaw, points: int = POINTS, reach: float = REACH
 ) -> dict[str, ModulusTable]:
     """The tables of E1, E2 and G12, by name; as `modulus_table`."""
-    return {name: modulus_table(law, name, points, reach) for name in MODULI}
+    return {name: modulus_table(law, name, points, reach) for name in COMPONENTS}
+
+
+def _meetings(law: HypoelasticLaw, name: str, end: float) -> tuple[Array, Array]:
+    """Strains before `end` where one piece gives way to the next, and those where it jumps."""
+    pieces = curve_pieces(law, name)
+    knots = pieces[:-1, 0]
+    here, there = (
+        np.array([np.polyval(piece[1:], knot) for piece, knot in zip(side, knots, strict=True)])
+        for side in (pieces[:-1], pieces[1:])
+    )
+    jump = np.abs(there - here) > ROUNDING * np.maximum(np.abs(here), np.abs(there))
+    inside = knots < end
+    return knots[inside], knots[inside & jump]
 
 
 def _error(law: HypoelasticLaw, name: str, strain: Array, modulus: Array, jumps: Array) -> float:

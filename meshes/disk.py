@@ -79,7 +79,7 @@ def _check(radius: float, elements: int, symmetry: str, generator: str) -> None:
     if not MIN_ELEMENTS <= elements <= MAX_ELEMENTS:
         problem = (
             f"expected {MIN_ELEMENTS} to {MAX_ELEMENTS} quads on the full disk, got {elements};"
-            " the thesis has 800"
+            " 800 are usual"
         )
         raise InputError(None, "elements", problem)
     if symmetry not in ("full", "quarter"):

@@ -1,4 +1,4 @@
-"""The thesis' cases of three-point bending (Table 6.1) as models."""
+"""Inflated cylinders in three-point bending as models: mesh, sections, bodies, schedule."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from ..errors import InputError
 from ..meshes.cylinder import cylinder_mesh
 from ..meshes.graded import Refinement
-from .bodies import Collar, RigidSupports, thesis_collar
+from .bodies import Collar, RigidSupports, usual_collar
 from .cylinder import CylinderModel
 from .gas import Gas
+from .reading import CurveReading, curve_reading
 
-#: Thesis section 6.1: all are 3 m long, their seam three layers thick. Its width is not given:
-#: 40 mm is ours.
+#: mm, unless given; as many layers of fabric lie upon each other in the seam.
 LENGTH, SEAM_WIDTH, SEAM_LAYERS = 3000.0, 40.0, 3
-#: Thesis section 6.4: how far the collar goes, mm; frames and increments are ours.
+#: How far the collar goes, mm, and in how many equal steps, unless given.
 DEFLECTION, FRAMES = 240.0, 60
 #: Equal increments of pressure on inflation.
 INFLATION = 10
@@ -40,16 +40,18 @@ def inflated_cylinder(
     symmetry: Literal["quarter", "full"] = "quarter",
     cap_warp: Literal["x", "y"] = "x",
     gas: Gas | None = None,
+    reading: CurveReading | None = None,
 ) -> CylinderModel:
-    """A case of the thesis (Table 6.1): mesh, sections, bodies and schedule.
+    """A cylinder that is inflated and bent.
 
     Parameters
     ----------
     diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge.
     thickness : mm of one layer; the seam has three.
     size : mm of an element, half of that along the axis next to collar and supports.
-    collar : the thesis' for this diameter unless given.
+    collar : `usual_collar` unless given.
     deflections : mm; 60 equal ones to 240 mm unless given, each an increment.
+    reading : by the diameter unless given.
 
     Raises
     ------
@@ -59,7 +61,7 @@ def inflated_cylinder(
         if not 0 < value < math.inf:
             raise InputError(None, name, f"expected > 0, got {value!r}")
     supports = supports or RigidSupports()
-    collar = collar or thesis_collar(diameter)
+    collar = collar or usual_collar(diameter)
     # Before the mesh is made, which would complain of rows where the supports are.
     if not supports.span + supports.diameter < length:
         problem = f"{supports.span:g} mm does not fit under {length:g} mm of cylinder"
@@ -77,5 +79,12 @@ def inflated_cylinder(
         deflections = np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:].tolist()
     steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
     return CylinderModel(
-        mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas()
+        mesh,
+        thickness * layers,
+        steps,
+        deflections,
+        collar,
+        supports,
+        gas or Gas(),
+        reading=reading or curve_reading(diameter),
     )

@@ -1,4 +1,4 @@
-"""The rigid bodies of the bending test: two supports and a collar (thesis section 6.2)."""
+"""The rigid bodies of the bending test: two supports and a collar."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 
 from ..errors import InputError
 
-#: Inner diameter and length of the collar by the largest diameter of cylinder it was used on.
+#: Inner diameter and length (mm) of the collar by the largest diameter of cylinder it is for: those
+#: of thesis section 6.2, which goes no further.
 COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
 
 
@@ -17,7 +18,7 @@ class RigidSupports:
 
     Parameters
     ----------
-    span : mm between their axes. The thesis' figure with the span is lost; 2000 mm is ours.
+    span : mm between their axes.
     diameter : mm, outer.
     """
 
@@ -48,17 +49,17 @@ class Collar:
             raise InputError(None, "collar.fillet", problem)
 
 
-def thesis_collar(diameter: float) -> Collar:
-    """The collar that the thesis used on a cylinder of this diameter (mm) or the next larger.
+def usual_collar(diameter: float) -> Collar:
+    """The collar for a cylinder of this diameter (mm) where none is given.
 
     Raises
     ------
-    InputError : the cylinder is larger than any of the thesis'.
+    InputError : the cylinder is larger than any that there is one for.
     """
     for largest, (inner, length) in COLLARS.items():
         if diameter <= largest:
             return Collar(inner, length)
-    problem = f"the thesis has none for {diameter:g} mm; give inner_diameter and length"
+    problem = f"there is none for {diameter:g} mm; give inner_diameter and length"
     raise InputError(None, "collar", problem)
 
 

@@ -1,4 +1,4 @@
-"""The inflated cylinder in three-point bending (thesis chapter 6) as plain data."""
+"""The inflated cylinder in three-point bending as plain data."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..meshes.mesh import Mesh
 from .bodies import Collar, RigidSupports
 from .gas import Gas
+from .reading import CurveReading, curve_reading
 
 Array = NDArray[np.float64]
 
@@ -41,8 +42,10 @@ class CylinderModel:
         strictly increasing: the frames to report.
     increments : mm, likewise, containing every deflection: the steps over which the hypoelastic
         law is integrated. The deflections unless given.
-    supports, collar : rigid, frictionless; the collar's size is to be said, as the thesis has two.
+    supports, collar : rigid, frictionless.
     gas : what is closed in.
+    reading : where the curve of load over deflection is read, which changes no result; by the
+        diameter unless given.
 
     Raises
     ------
@@ -60,9 +63,13 @@ class CylinderModel:
     supports: RigidSupports = field(default_factory=RigidSupports)
     gas: Gas = field(default_factory=Gas)
     increments: Sequence[float] = ()
+    reading: CurveReading = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         self._check_mesh()
+        if self.reading is None:
+            radius = float(np.hypot(*self.mesh.points[:, :2].T).max())
+            object.__setattr__(self, "reading", curve_reading(2 * radius))
         steps = np.array(self.increments if len(self.increments) else self.deflections, float)
         levels = {
             "inflation": np.array(self.inflation, float),

@@ -16,7 +16,7 @@ from .loads import StripCurves, plot_loads
 from .moduli import plot_moduli
 from .moduli_together import plot_moduli_together
 from .nu12 import plot_nu12
-from .optima import PUBLISHED_OPTIMA, plot_optima
+from .optima import plot_optima
 from .orders import OrderErrors, plot_orders
 from .pinned import plot_pinned
 from .profiles import plot_profiles
@@ -25,7 +25,6 @@ from .strip import plot_strip
 from .vtu import write_vtu
 
 __all__ = [
-    "PUBLISHED_OPTIMA",
     "BeamBodies",
     "BendLine",
     "BendPanel",

@@ -1,4 +1,4 @@
-"""The bent cylinder with supports and collar: from the side, cut at mid-span (Figs 6.9, 6.10)."""
+"""The bent cylinder with supports and collar: from the side, cut at mid-span."""
 
 from __future__ import annotations
 

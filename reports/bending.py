@@ -1,4 +1,4 @@
-"""Load over deflection of bent cylinders (Figs 6.12 to 6.20) and their gas (Fig. 6.11)."""
+"""Load over deflection of bent cylinders, and their gas."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def plot_bending_cases(path: Path | str, panels: Sequence[BendPanel], columns: i
 
 
 def plot_gas(path: Path | str, panel: BendPanel) -> Path:
-    """Draw gauge pressure against change of volume (as Fig. 6.11) and against deflection.
+    """Draw gauge pressure against change of volume and against deflection.
 
     Raises
     ------

@@ -51,7 +51,9 @@ class Report:
     unit : of the coefficients, "GPa" unless the project says otherwise.
     moduli_error : largest relative error of E1, E2, G12 over the strain reached (0.01 is 1 %),
         where the solution is known.
-    strain_reached : largest warp, fill and shear strain.
+    strain_reached : largest warp, fill and shear strain in any test.
+    valid_strain : by the same names, the ends up to which the moduli are fitted; as far as was
+        reached unless given.
     warnings : what a reader must know before using the numbers.
     figures : (file relative to the page, caption), in order.
     tables : further tables (R^2 of the surfaces, residuals, nuisance parameters).
@@ -67,6 +69,7 @@ class Report:
     unit: str = "GPa"
     moduli_error: Mapping[str, float] = field(default_factory=dict)
     strain_reached: Mapping[str, float] = field(default_factory=dict)
+    valid_strain: Mapping[str, float] = field(default_factory=dict)
     warnings: Sequence[str] = ()
     figures: Sequence[tuple[str, str]] = ()
     tables: Sequence[Table] = ()

@@ -20,8 +20,8 @@ Curve = tuple[ArrayLike, ArrayLike]
 
 #: Titles of the panels by name of the direction; others stand as they are.
 TITLES = {"bias": "45° bias", "bias45": "45° bias"}
-#: The index of e in a panel.
-INDEX = {"bias45": "bias"}
+#: What the errors of a panel are of.
+ERROR_OF = {"bias45": "bias"}
 DOTS: dict[str, Any] = {
     "color": GREY,
     "marker": "o",
@@ -44,7 +44,7 @@ class StripCurves:
     points : measured, of any number of specimens, in any order.
     polynomial : the load curve fitted to them, on increasing elongations.
     scatter : N, of the specimens about their curve.
-    rms : N, of each model in turn (e_warp, e_fill, e_bias of Eqs 3.4-3.6), as far as known.
+    rms : N, of each model in turn (Eqs 3.4-3.6), as far as known.
     """
 
     direction: str
@@ -115,11 +115,11 @@ def _loads(axes: Axes, strip: StripCurves, looks: Sequence[dict[str, Any]]) -> N
     axes.set_xlim(left=float(before))
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     if len(strip.rms):
-        index = INDEX.get(strip.direction, strip.direction)
+        of = ERROR_OF.get(strip.direction, strip.direction)
         values = [f"{e:.3g} N" for e in strip.rms]
         # A legend finds the place that the curves leave free.
         axes.legend(
-            lines[: len(values)], values, title=rf"$e_\mathrm{{{index}}}$ (RMS)",
+            lines[: len(values)], values, title=f"RMS error, {of}",
             title_fontsize=9, fontsize=9, framealpha=0.85, edgecolor="none",
         )  # fmt: skip
 

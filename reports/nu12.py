@@ -1,4 +1,4 @@
-"""Sensitivity to Poisson's ratio, drawn as Fig. 4.2 of the thesis."""
+"""Sensitivity to Poisson's ratio."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from .loads import TITLES
@@ -19,7 +18,6 @@ def plot_nu12(
     models: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]],
     base: float,
     response: str,
-    published: float | None = None,
 ) -> Path:
     """Draw responses relative to that at the base nu12, one panel a model.
 
@@ -30,7 +28,6 @@ def plot_nu12(
         not finite is a gap.
     base : nu12 where the ratio is one.
     response : what it is, for the axis.
-    published : half the width of a pale band about one, where there is one to compare with.
 
     Raises
     ------
@@ -45,8 +42,6 @@ def plot_nu12(
     figure = new_figure(1.6 + 3.4 * max(len(models), 1.6), 4.2)
     panels = figure.subplots(1, len(models), squeeze=False, sharey=True)[0]
     for column, (axes, (model, lines)) in enumerate(zip(panels, models.items(), strict=True)):
-        if published is not None:
-            axes.axhspan(1 - published, 1 + published, color="#EFEFEF", linewidth=0, zorder=0)
         axes.axhline(1.0, color=GREY, linewidth=0.8)
         for name, (nu12, ratio) in lines.items():
             x, y = np.asarray(nu12, dtype=float), np.asarray(ratio, dtype=float)
@@ -54,11 +49,9 @@ def plot_nu12(
         axes.plot([base], [1.0], marker="D", markersize=6, color=BLACK, linestyle="", zorder=5)
         label = f"{response} / that at nu12 = {base:g}" if column == 0 else ""
         quiet(axes, "nu12", label, TITLES.get(model, model))
-    entries: dict[str, Line2D | Patch] = {
+    entries = {
         name: Line2D([], [], marker="o", linewidth=1.4, color=colour)
         for name, colour in colours.items()
     }
-    if published is not None:
-        entries[f"within {100 * published:g} % (thesis)"] = Patch(color="#EFEFEF")
     legend_above(figure, entries, 4)
     return save(figure, path)

@@ -1,4 +1,4 @@
-"""Optima of a multistart, sorted (Fig. 4.8)."""
+"""Optima of a multistart, sorted."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from numpy.typing import ArrayLike
 
 from .style import BLUE, VERMILION, new_figure, quiet, save
 
-#: Best, median and worst of the thesis' 50 starts (Fig. 4.8).
-PUBLISHED_OPTIMA: Mapping[str, float] = {"best": 0.096, "median": 0.226, "worst": 3.2}
-
 #: What a perfect fit (zero) is drawn as on the logarithmic axis.
 SMALLEST = 1e-16
 
@@ -21,7 +18,7 @@ SMALLEST = 1e-16
 def plot_optima(
     path: Path | str,
     objectives: ArrayLike,
-    label: str = "objective e (Eq. 4.8)",
+    label: str = "objective",
     references: Mapping[str, float] | None = None,
 ) -> Path:
     """Draw the optimum of every start, sorted from worst to best.
@@ -33,7 +30,7 @@ def plot_optima(
     path : PNG, SVG or PDF.
     objectives : (starts,); starts that failed are NaN or infinite and only counted.
     label : of the objective, with its unit where it has one.
-    references : lines to compare with, such as `PUBLISHED_OPTIMA`.
+    references : lines to compare with, by name: published ones.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What each data set of a joint fit pins down: uncertainty of the moduli along strain."""
+"""What each test of a fit pins down: uncertainty of the moduli along strain."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ Array = NDArray[np.float64]
 NOT_DETERMINED = 1000.0
 #: Percent; nothing is known better than this, and a zero has to stand somewhere.
 SMALLEST = 1e-3
-#: Decades between the marks of two data sets in the band above, and for the words there.
+#: Decades between the marks of two tests in the band above, and for the words there.
 STEP, WORDS = 0.14, 0.32
 
 
 def plot_pinned(path: Path | str, strains: ArrayLike, sigma: Mapping[str, ArrayLike]) -> Path:
-    """Draw the relative uncertainty of E1, E2 and G12 from each data set and from all together.
+    """Draw the relative uncertainty of E1, E2 and G12 from each test and from all together.
 
     Parameters
     ----------
     path : PNG, SVG or PDF.
     strains : (3, k) logarithmic strain for E1, E2, G12.
-    sigma : by name ("bubble", "uniaxial", "both"): (3, k), one standard deviation in percent of
-        the modulus. Above `NOT_DETERMINED`, or not finite, it is marked in a band at the top.
+    sigma : by name ("bubble", "strips", "all together"): (3, k), one standard deviation in percent
+        of the modulus. Above `NOT_DETERMINED`, or not finite, it is marked in a band at the top.
 
     Raises
     ------

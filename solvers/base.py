@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -14,8 +14,10 @@ from ..materials.law import HypoelasticLaw
 
 Array = NDArray[np.float64]
 
-#: Parameters that a differentiating solver may be asked for, beside "beta_0" ... "beta_11".
-PARAMETERS = (*(f"beta_{i}" for i in range(12)), "nu12", "pressure_offset")
+
+def parameters_of(law: HypoelasticLaw) -> tuple[str, ...]:
+    """What a differentiating solver may be asked for: the entries of beta, and two more."""
+    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", "pressure_offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,8 @@ class History:
     whether the equilibrium at the last load is, None where the solver did not look; wrinkled:
     share of the reference surface that carries no stress in one direction (frames,), None likewise;
     iterations: what the solver counts as its work; remarks: what a reader of the result should
-    know.
+    know; early: the solver's own word for an end before the model's last frame (it found no
+    equilibrium further on), "" where there is none: fewer frames without it are no result.
     """
 
     load: Array
@@ -48,6 +51,7 @@ class History:
     stable: bool | None = None
     wrinkled: Array | None = None
     remarks: tuple[str, ...] = ()
+    early: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,59 @@ class SolverCheck:
     advice: str = ""
 
 
+@dataclass(frozen=True)
+class Diagnosis:
+    """One solver on this machine: what it is, where, and what published bars showed.
+
+    external_materials: whether it can load material libraries (None: embedded, a plug-in, or not
+    to be seen). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference:
+    the largest relative one from Marc's; None where the bars did not run. expected: somebody chose
+    this solver, so that it has to work. advice: one line, what to do or what was not tried.
+    remark: what else it says of itself, in a few words.
+    """
+
+    name: str
+    version: str
+    path: Path | None
+    origin: str
+    expected: bool
+    external_materials: bool | None
+    usable: bool
+    stresses: tuple[float, ...] | None = None
+    difference: float | None = None
+    advice: str = ""
+    remark: str = ""
+
+
+class Progress(Protocol):
+    """How far a run is."""
+
+    @property
+    def time(self) -> float:
+        """Increments of the model that are done, parts of one included."""
+
+
 @runtime_checkable
 class Solver(Protocol):
-    """A way to run a model; picked by name in `registry`."""
+    """A way to run a model; picked by name in `registry`.
+
+    name : what a project file or --solver calls it. external : whether it runs in a process of its
+    own; then it is checked before anything is run with it.
+    """
 
     name: str
     external: bool
+    #: Called with every increment that is done while a run is under way, where it is set.
+    progress: Callable[[Any], None] | None
+
+    @property
+    def identity(self) -> str:
+        """What a result depends on beside model and law: name, version, settings that matter.
+
+        Files (templates, blocks of a site) count by what is in them, not by where they lie. A
+        result is taken up again only where this is the same.
+        """
+        ...
 
     def run(
         self,
@@ -103,9 +154,12 @@ class DifferentiatingSolver(Solver, Protocol):
         self,
         model: Any,
         law: HypoelasticLaw,
-        parameters: Sequence[str] = PARAMETERS[:12],
+        parameters: Sequence[str] | None = None,
         pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
-        """History and d displacement / d parameters, (frames, nodes, 3, len(parameters))."""
+        """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
+
+        The parameters are every entry of the law's beta unless given.
+        """
         ...

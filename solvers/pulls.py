@@ -9,6 +9,7 @@ little, and its results are interpolated to the model's elongations.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,27 @@ Array = NDArray[np.float64]
 BEYOND = 1.02
 #: mm of elongation over mm of gauge below which a gauge is as long as it should be.
 AS_WANTED = 1e-9
+
+
+def grip_pulls(
+    model: UniaxialModel, law: HypoelasticLaw, opened: Callable[[Array], Array], solver: str
+) -> tuple[Array, bool]:
+    """Pulls (increments,) mm at which the solver's grips stand, and whether they are the gauge.
+
+    opened : runs the strip at given pulls and tells how far its gauge opened, (increments,) mm.
+
+    Raises
+    ------
+    SolverFailure : that run did not end well, or its gauge gets shorter.
+    """
+    driven = direct(model)
+    if driven is not None:
+        return driven, True
+    pulls = as_the_membrane(model, law)
+    if pulls is None:
+        even = evenly(model)
+        pulls = corrected(model, even, opened(even), solver)
+    return pulls, False
 
 
 def direct(model: UniaxialModel) -> Array | None:

@@ -1,38 +1,68 @@
-"""Solvers by name: the one place where a name becomes a solver."""
+"""Solvers by name: the one place where a name, with a table of settings, becomes a solver."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
-from ..errors import BubblefitError, InputError
+from pydantic import ValidationError
+
+from ..errors import BubblefitError, InputError, SolverFailure
+from ..section_errors import first_error
 from .base import Solver, SolverCheck
-from .membrane.solver import MembraneSolver
+from .calculix.settings import OFFER as CALCULIX
+from .marc.settings import OFFER as MARC
+from .membrane.settings import OFFER as MEMBRANE
+from .offer import Offer
 from .plugins import plug_in_named, plug_ins
+from .settings import SolverSettings
 
-
-def _calculix(**options: Any) -> Solver:
-    from .calculix.solver import CalculixSolver
-
-    return CalculixSolver(**options)
-
-
-def _marc(**options: Any) -> Solver:
-    from .marc.solver import MarcSolver
-
-    return MarcSolver(**options)
-
-
+#: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
-    "calculix": _calculix,
-    "marc": _marc,
-    "membrane": MembraneSolver,
+    "calculix": CALCULIX,
+    "marc": MARC,
+    "membrane": MEMBRANE,
 }
 
 
 def solver_names() -> list[str]:
     """Every solver that can be asked for, ours and those of plug-ins."""
     return sorted({*SOLVERS, *(plug_in.name for plug_in in plug_ins())})
+
+
+def solver_sections() -> dict[str, type[SolverSettings]]:
+    """What the table [solver.NAME] of a project may say, by name of a solver of ours."""
+    return {name: make.settings for name, make in SOLVERS.items() if isinstance(make, Offer)}
+
+
+def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """By name of a solver, what it is made with; ours are there without a table, too.
+
+    Parameters
+    ----------
+    path : the project's file; paths in its tables are beside it.
+    tables : [solver] of the project. A plug-in's is as it is written: the plug-in checks it.
+
+    Raises
+    ------
+    InputError : a key that there is not, a value that cannot be meant; no solver of that name.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for name, section in solver_sections().items():
+        try:
+            settings = section.model_validate(tables.get(name, {}))
+        except ValidationError as error:
+            raise first_error(path, error, section, f"solver.{name}") from None
+        found[name] = settings.given(path.parent)
+    for name in sorted(tables.keys() - found.keys()):
+        if name not in SOLVERS and name not in (known := solver_names()):
+            problem = f"no solver of this name is installed; there are: {', '.join(known)}"
+            raise InputError(path, f"solver.{name}", problem)
+        if not isinstance(tables[name], Mapping):
+            raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
+        found[name] = dict(tables[name])
+    return found
 
 
 def solver_named(name: str, **options: Any) -> Solver:
@@ -52,6 +82,43 @@ def solver_named(name: str, **options: Any) -> Solver:
     return plug_in.make(**options)
 
 
+def usable_solver(
+    name: str,
+    options: Mapping[str, Any] | None = None,
+    path: Path | None = None,
+    key: str = "fit.solver",
+) -> Solver:
+    """A new solver that is there and carries the law: one line now, not in every analysis.
+
+    More of them, each with what it prepares for a model of its own, are then had by
+    `solver_named`.
+
+    Parameters
+    ----------
+    options : what it is made with, as `solver_settings` has it.
+    path, key : the project that names it, and where.
+
+    Raises
+    ------
+    InputError : there is no such solver, or an option is wrong (says in which file).
+    SolverFailure : it is not installed, or does not carry the law.
+    """
+    try:
+        solver = solver_named(name, **(options or {}))
+    except InputError as error:
+        if error.field == "solver":
+            raise InputError(path, f"{key} (or --solver)", error.problem) from None
+        # Ours may also have their options from the command line.
+        if name not in SOLVERS and error.path is None and error.field.startswith(f"solver.{name}"):
+            raise InputError(path, error.field, error.problem) from None
+        raise
+    if solver.external:
+        found = checked(name, solver)
+        if not (found.available and found.carries_law):
+            raise SolverFailure(found.advice or "is not usable", name)
+    return solver
+
+
 def checked(name: str, solver: Solver) -> SolverCheck:
     """What `check` finds of the solver `name`.
 
@@ -68,4 +135,4 @@ def checked(name: str, solver: Solver) -> SolverCheck:
         plug_in = None if name in SOLVERS else plug_in_named(name)
         if plug_in is None:
             raise
-        raise plug_in.failure("fails its check", error) from error
+        raise plug_in.solver_failure("fails its check", error) from error

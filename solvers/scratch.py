@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import shutil
+import signal
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +21,11 @@ log = logging.getLogger(__name__)
 MEMORY = Path("/dev/shm")
 #: Free space (bytes) below which runs go to the disk instead; a bubble takes about 2 MB.
 ROOM = 256 * 1024**2
+_INTERRUPTIONS = {signal.SIGINT, signal.SIGTERM}
+#: Folders of runs under way. An interruption can fall between any two lines, also within the
+#: removal of a folder: what it leaves is removed at the end of the process.
+_under_way: set[Path] = set()
+os.register_at_fork(after_in_child=_under_way.clear)  # those are the parent's
 
 
 def fresh_folder(name: str, parent: Path | None = None) -> Path:
@@ -51,11 +59,14 @@ def run_folder(
     SolverFailure : the one that the run raised, with the folder and the log. OutputError : as
         `fresh_folder`.
     """
-    folder = fresh_folder(name, parent)
+    with _undisturbed():
+        folder = fresh_folder(name, parent)
+        _under_way.add(folder)
     try:
         yield folder
     except SolverFailure as failure:
         kept = put_aside(folder)
+        _under_way.discard(folder)
         log.info("failed run kept in %s", kept)
         tail = failure.log_tail or log_tail(kept / logs)
         kind = type(failure)
@@ -64,6 +75,7 @@ def run_folder(
         remove(folder)  # interrupted, or never begun: there is nothing to look into
         raise
     if keep:
+        _under_way.discard(folder)
         log.info("run kept in %s", folder)
     else:
         remove(folder)
@@ -96,3 +108,24 @@ def put_aside(folder: Path) -> Path:
 def remove(folder: Path) -> None:
     """Remove a scratch folder with what is in it."""
     shutil.rmtree(folder, ignore_errors=True)
+    _under_way.discard(folder)
+
+
+@atexit.register
+def remove_interrupted() -> None:
+    """Remove the folders of runs that were under way; for a process that ends without its exit."""
+    for folder in tuple(_under_way):
+        remove(folder)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Holds interruptions off: in the main thread, which alone is interrupted."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTIONS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

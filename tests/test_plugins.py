@@ -1,216 +1,28 @@
-"""Solvers of other distributions: a real one installed and run, and broken ones."""
+"""The loader of plug-ins, for all groups: names without imports, faults in one line each."""
 
-import json
-import os
-import re
 import shutil
-import subprocess
 import sys
-from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
-from bubblefit.cli.main import main
-from bubblefit.errors import InputError, SolverFailure
-from bubblefit.materials.card import MaterialCard, write_card
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import bias_strip, straight_strip
-from bubblefit.solvers.bars import BARS, strip_stresses
-from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.registry import checked, solver_named, solver_names
-from click.testing import CliRunner
+from bubblefit.errors import PlugInFailure
+from bubblefit.plugins import names_with, plug_in_named, plug_ins
 
-from .fortran_build import BETA
+from .plug_ins import install
 
-ROOT = Path(__file__).resolve().parent.parent
-ADAPTER = ROOT / "examples" / "solver-adapter"
-STRIPS = ROOT / "examples" / "uniaxial-valmex7318"
-LAW = HypoelasticLaw(BETA, strain_range=np.array([0.16, 0.24, 0.9]))
+GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers")
 
 
-@pytest.fixture(scope="session")
-def site(tmp_path_factory):
-    """A folder for PYTHONPATH with the example installed from a copy of it, by pip."""
-    place = tmp_path_factory.mktemp("adapter")
-    shutil.copytree(ADAPTER, place / "source")
-    subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
-         "--no-build-isolation", "--target", place / "site", place / "source"],
-        check=True,
-    )  # fmt: skip
-    return place / "site"
+@pytest.mark.parametrize("group", GROUPS)
+def test_a_plug_in_is_listed_without_importing_it_and_imported_when_asked_for(packages, group):
+    before = names_with(group, ["ours"])
+    install(packages, "saturating", "THING = {'a': 1}", group=group)
+    assert names_with(group, ["ours"]) == (*before[:1], *sorted({*before[1:], "saturating"}))
+    assert "acme_saturating" not in sys.modules
+    plug_in = plug_in_named(group, "saturating")
+    assert plug_in.distribution == "acme-things 2.5"
+    assert plug_in.load("table", ("keys", "values")) == {"a": 1}
+    assert all(plug_in_named(other, "saturating") is None for other in GROUPS if other != group)
 
-
-@pytest.fixture
-def strips(tmp_path):
-    """The strips with 10 increments, a project and a card."""
-    text = (STRIPS / "project.toml").read_text()
-    (tmp_path / "project.toml").write_text(text.replace("increments = 100", "increments = 10"))
-    shutil.copy(STRIPS / "curves.csv", tmp_path)
-    write_card(MaterialCard(LAW, 0.81, "Valmex"), tmp_path / "material.toml")
-    return tmp_path
-
-
-def bubblefit(site, *arguments, cwd, code=0):
-    done = subprocess.run(
-        [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, timeout=300,
-        env={**os.environ, "PYTHONPATH": str(site)},
-    )  # fmt: skip
-    assert done.returncode == code, done.stderr + done.stdout
-    return done
-
-
-# --- the example, as its README says ------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_the_example_pulls_strips_from_the_command_line(site, strips):
-    simulate = ("simulate", "uniaxial", "project.toml", "--card", "material.toml")
-    done = bubblefit(site, *simulate, "--solver", "homogeneous", "--out", "theirs", cwd=strips)
-    # What the example cannot do is named and left out, the rest is there.
-    assert "takes strips along warp or fill only" in done.stdout
-    bubblefit(site, *simulate, "--out", "ours", cwd=strips)
-    theirs, ours = (
-        json.loads((strips / f / "result.json").read_text()) for f in ("theirs", "ours")
-    )
-    assert theirs["solver"] == "homogeneous" and ours["solver"] == "membrane"
-    curves = [pd.read_csv(next((strips / f).glob("*.csv"))) for f in ("theirs", "ours")]
-    for direction in ("warp", "fill"):
-        one, other = (c[c.direction == direction] for c in curves)
-        assert len(one) > 5
-        for column in one.select_dtypes("number"):
-            np.testing.assert_allclose(one[column], other[column], rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_the_example_is_in_the_doctors_list(site, strips):
-    done = bubblefit(site, "doctor", "--solver", "homogeneous", cwd=strips)
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("homogeneous")]
-    assert "ok  version 1.0  plug-in of bubblefit-homogeneous 1.0  bars within 0.0097 %" in line
-    content = json.loads(bubblefit(site, "doctor", "--json", cwd=strips).stdout)
-    (mine,) = [one for one in content["solvers"] if one["name"] == "homogeneous"]
-    assert mine["usable"] and not mine["expected"]
-    assert mine["stresses"] == pytest.approx([bar.stress for bar in BARS], rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_fit_is_led_by_the_membrane_and_counts_the_examples_runs(site, strips):
-    """Data without a bias strip: what the example can do."""
-    path = strips / "curves.csv"
-    kept = [line for line in path.read_text().splitlines() if not line.startswith("bias")]
-    path.write_text("\n".join(kept) + "\n")
-    project = strips / "project.toml"
-    text = project.read_text()
-    assert "# strain_range = " in text and 'moduli = "cubic"' in text
-    # No bias strip says how far the shear goes.
-    text = text.replace("# strain_range = ", "strain_range = ")
-    project.write_text(text.replace('moduli = "cubic"', 'moduli = "linear"'))
-    done = bubblefit(
-        site, "uniaxial", "project.toml", "--solver", "homogeneous", "--starts", 1, "--out", "out",
-        cwd=strips,
-    )  # fmt: skip
-    result = json.loads((strips / "out" / "result.json").read_text())
-    assert result["solver"] == "homogeneous" and 0 < result["external_runs"] < 20, done.stdout
-    history = pd.read_csv(strips / "out" / "history.csv")
-    assert {"membrane", "homogeneous"} == set(history.solver)
-
-
-@pytest.fixture
-def example(site, monkeypatch):
-    monkeypatch.syspath_prepend(str(site))
-    yield
-    for name in ("bubblefit_homogeneous", "homogeneous_program"):
-        sys.modules.pop(name, None)
-
-
-@pytest.mark.parametrize("direction", ["warp", "fill"])
-@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-def test_the_example_agrees_with_the_membrane(example, direction, thickness_change):
-    law = HypoelasticLaw(BETA, 0.3, np.array([0.05, 0.05, 0.1]), thickness_change)
-    model = straight_strip(direction, 20.0, 22.0, 0.81, increments=7)
-    theirs, ours = (s.run(model, law) for s in (solver_named("homogeneous"), MembraneSolver()))
-    np.testing.assert_allclose(theirs.load, ours.load, rtol=1e-9)
-    np.testing.assert_allclose(theirs.displacement, ours.displacement, atol=1e-8)
-    np.testing.assert_allclose(theirs.strain_min, ours.strain_min, atol=1e-9)
-    np.testing.assert_allclose(theirs.strain_max, ours.strain_max, atol=1e-9)
-    for name, force in ours.reactions.items():
-        if name in theirs.reactions:
-            np.testing.assert_allclose(theirs.reactions[name], force, atol=1e-6)
-
-
-def test_the_example_carries_the_law(example):
-    assert strip_stresses(solver_named("homogeneous")) == pytest.approx(
-        [bar.stress for bar in BARS], rel=1e-4
-    )
-
-
-def test_the_examples_failures_have_their_reasons(example, tmp_path):
-    solver = solver_named("homogeneous")
-    warp, bias = straight_strip("warp", 20.0, 22.0, 0.81), bias_strip(20.0, 25.0, 0.81)
-    with pytest.raises(SolverFailure, match="homogeneous: takes strips along warp or fill only"):
-        solver.run(bias, LAW)
-    gone = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
-    with pytest.raises(
-        SolverFailure, match=r"a modulus is not positive \(exit number 3\)"
-    ) as found:
-        solver.run(warp, gone, tmp_path)
-    assert (found.value.scratch / "job.json").is_file()
-    broken = tmp_path / "broken.py"
-    for text, words in (
-        ("print('licence denied'); raise SystemExit(9)", r"exit number 9\).*\nlicence denied"),
-        ("open('job.csv', 'w').write('1,1,0\\n')", "job.csv is not complete"),
-        ("open('job.csv', 'w').write('garbage')", r"job\.csv: "),
-        ("pass", r"job\.csv: "),
-        ("import time; time.sleep(60)", "takes too long"),
-    ):
-        broken.write_text(text)
-        with pytest.raises(SolverFailure, match=words):
-            solver_named("homogeneous", program=str(broken), timeout=1.0).run(warp, LAW, tmp_path)
-    assert not checked("homogeneous", solver_named("homogeneous", program="/nowhere")).available
-
-
-def test_options_come_from_the_project_file(example, strips, monkeypatch):
-    monkeypatch.chdir(strips)
-    path = strips / "project.toml"
-    before = path.read_text()
-
-    def simulate(table, code):
-        path.write_text(before + table)
-        done = CliRunner().invoke(
-            main,
-            ["simulate", "uniaxial", "project.toml", "--card", "material.toml",
-             "--solver", "homogeneous", "--overwrite"],
-        )  # fmt: skip
-        assert done.exit_code == code, (done.output, done.exception)
-        return done.output
-
-    simulate("\n[solver.homogeneous]\ntimeout = 30.0\n", 0)
-    for table, words in (
-        ("timeout = 0.0", "project.toml: solver.homogeneous.timeout: expected > 0 s"),
-        ("colour = 1", "project.toml: solver.homogeneous: got an unexpected keyword argument"),
-        ("program = 'nowhere.py'", "homogeneous: nowhere.py is not there; set program"),
-    ):
-        text = simulate(f"\n[solver.homogeneous]\n{table}\n", 4 if "program" in table else 2)
-        assert words in text and text.count("\n") == 1
-    text = simulate("\n[solver.homogenous]\ntimeout = 30.0\n", 2)
-    assert "project.toml: solver.homogenous: no solver of this name is installed" in text
-    assert "calculix, homogeneous, marc, membrane" in text
-    path.write_text(before + "\n[solver]\nhomogeneous = 3\n")
-    assert "solver.homogeneous" in simulate("\n[solver]\nhomogeneous = 3\n", 2)
-
-
-def test_the_code_in_the_documentation_is_that_of_the_example():
-    text = (ROOT / "docs" / "writing-a-solver-adapter.md").read_text()
-    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
-    sources = [path.read_text() for path in ADAPTER.iterdir() if path.is_file()]
-    assert len(blocks) > 4
-    for block in blocks:
-        assert any(block in source for source in sources), block
-
-
-# --- broken ones --------------------------------------------------------------------------------
 
 BROKEN = {
     "missing": ("", "cannot be imported (ModuleNotFoundError: No module named 'acme_missing')"),
@@ -218,170 +30,41 @@ BROKEN = {
                 "cannot be imported (RuntimeError: no licence file)"),
     "leaving": ("import sys\nsys.exit(1)", "cannot be imported (SystemExit: 1)"),
     "nothing": ("x = 1", "cannot be imported (AttributeError"),
-    "number": ("Solver = 3", "is no factory: acme_number:Solver cannot be called"),
-    "empty": ("class Solver: name = 'empty'",
-              "gives no solver: Solver has no external, run, check"),
-    "falling": ("def Solver(): raise ValueError('no DISPLAY')",
-                "fails when it is made (ValueError: no DISPLAY)"),
+    "number": ("THING = 3", "is no form: acme_number:THING has no pieces, labels"),
 }  # fmt: skip
-WORKING = """
-class Solver:
-    name, external = "acme", True
-    def run(self, model, law, scratch=None, timeout=None): {run}
-    def check(self):
-        from bubblefit.solvers.base import SolverCheck
-        {check}
-"""
-FINE = "return SolverCheck('acme', True, '9', True)"
-
-
-def install(folder, name, text, distribution="acme-solvers", module=None):
-    """What pip leaves of a distribution with one entry point, written by hand."""
-    module = module or f"acme_{name}"
-    if text:
-        (folder / f"{module}.py").write_text(text)
-    info = folder / f"{distribution.replace('-', '_')}-2.5.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 2.5\n")
-    (info / "entry_points.txt").write_text(f"[bubblefit.solvers]\n{name} = {module}:Solver\n")
-
-
-@pytest.fixture
-def packages(tmp_path, monkeypatch):
-    folder = tmp_path / "packages"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(str(folder))
-    yield folder
-    for name in [name for name in sys.modules if name.startswith("acme_")]:
-        del sys.modules[name]
 
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_plug_in_is_one_line_with_its_distribution(packages, name):
     text, words = BROKEN[name]
     install(packages, name, text)
-    with pytest.raises(SolverFailure) as found:
-        solver_named(name)
-    message = str(found.value)
-    assert message.startswith(f"{name}: the plug-in '{name}' of acme-solvers 2.5 {words}")
+    with pytest.raises(PlugInFailure) as failure:
+        plug_in_named("bubblefit.laws", name).load("form", ("real", "pieces", "labels"))
+    message = str(failure.value)
+    assert message.startswith(f"the plug-in {name!r} of acme-things 2.5 {words}")
     assert message.endswith("; repair or uninstall it") and "\n" not in message
+    assert name in names_with("bubblefit.laws", ())  # it is still listed, and nothing else breaks
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, name):
-    install(packages, name, BROKEN[name][0])
-    monkeypatch.chdir(strips)
-    monkeypatch.setenv("BUBBLEFIT_CCX", "")
-    monkeypatch.setattr("bubblefit.solvers.diagnosis._every_calculix", lambda ccx: [])
-    run = CliRunner()
-    simulate = ["simulate", "uniaxial", "project.toml", "--card", "material.toml", "--overwrite"]
-    done = run.invoke(main, ["doctor"])
-    assert done.exit_code == 0 and "membrane    ok" in done.output
-    assert f"{name:10}  NOT USABLE  plug-in of acme-solvers 2.5\n" in done.output
-    assert BROKEN[name][1].split(" (")[0] in done.output
-    done = run.invoke(main, ["doctor", "--solver", name])
-    assert done.exit_code == 4
-    done = run.invoke(main, [*simulate, "--solver", name])
-    assert done.exit_code == 4 and "acme-solvers 2.5" in done.output
-    assert done.output.count("\n") == 1
-    done = run.invoke(main, [*simulate, "--solver", "nothere"])
-    assert done.exit_code == 2
-    words = f"is not one of: {', '.join(sorted(['calculix', 'marc', 'membrane', name]))}"
-    assert words in done.output
-    if name == "failing":  # a whole command, once
-        done = run.invoke(main, simulate)
-        assert done.exit_code == 0, done.output
-
-
-def test_two_of_one_name(packages):
-    install(packages, "acme", "Solver = 1")
-    install(packages, "acme", "Solver = 1", "other-solvers", "acme_other")
+def test_two_distributions_of_one_name(packages):
+    install(packages, "acme", "THING = 1")
+    install(packages, "acme", "THING = 2", "other-things", "acme_other")
     with pytest.raises(
-        SolverFailure, match=r"acme: is offered by acme-solvers 2\.5 and other-solvers 2\.5; uninst"
+        PlugInFailure, match=r"acme: is offered by acme-things 2\.5 and other-things 2\.5; uninst"
     ):
-        solver_named("acme")
-    assert solver_names().count("acme") == 1
+        plug_in_named("bubblefit.laws", "acme")
+    assert [one.name for one in plug_ins("bubblefit.laws")].count("acme") == 2
+    assert names_with("bubblefit.laws", ()).count("acme") == 1
 
 
 def test_the_same_one_listed_twice_is_one(packages, tmp_path, monkeypatch):
-    working = WORKING.format(run="...", check=FINE)
-    install(packages, "acme", working)
-    again = tmp_path / "again"
-    shutil.copytree(packages, again)
-    monkeypatch.syspath_prepend(str(again))
-    assert solver_named("acme").name == "acme"
+    install(packages, "acme", "THING = 1")
+    shutil.copytree(packages, tmp_path / "again")
+    monkeypatch.syspath_prepend(str(tmp_path / "again"))
+    assert plug_in_named("bubblefit.laws", "acme").load() == 1
 
 
-def test_our_own_names_stay_ours(packages, monkeypatch):
-    install(packages, "membrane", "raise RuntimeError")
-    assert isinstance(solver_named("membrane"), MembraneSolver)
-    monkeypatch.setattr("bubblefit.solvers.diagnosis._every_calculix", lambda ccx: [])
-    done = CliRunner().invoke(main, ["doctor"])
-    assert done.exit_code == 0
-    assert "membrane    NOT USABLE  plug-in of acme-solvers 2.5" in done.output
-    assert "is bubblefit's own: the plug-in needs another name" in done.output
-
-
-CHECKS = {
-    "raises": ("raise OSError('no such host')", "...", "fails its check (OSError: no such host)"),
-    "failure": ("from bubblefit.errors import SolverFailure; raise SolverFailure('no licence')",
-                "...", "no licence"),
-    "no": ("return SolverCheck('acme', False, '', False, 'install it')", "...", "install it"),
-    "silent": ("return SolverCheck('acme', True, '9', False)", "...", "says that it is not usable"),
-    "crashes": (FINE, "raise KeyError('u')", "fails on a strip (KeyError: 'u')"),
-    "wrong": (FINE, """
-        import numpy as np
-        from bubblefit.solvers.base import History
-        from bubblefit.solvers.membrane.solver import MembraneSolver
-        h = MembraneSolver().run(model, law)
-        return History(1.01 * h.load, h.displacement, h.strain_min, h.strain_max)""",
-              "does not carry the law: 0.01 from Marc's end stress"),
-    "short": (FINE, """
-        from bubblefit.solvers.base import History
-        import numpy as np
-        return History(np.ones(3), np.ones((3, 4, 3)), np.zeros(3), np.zeros(3))""",
-              "its law was not tried: acme: 3 frames of a strip of 100 elongations"),
-    "bubbles": (FINE, """
-        from bubblefit.errors import SolverFailure
-        raise SolverFailure('takes bubbles only', 'acme')""",
-                "its law was not tried: acme: takes bubbles only"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", CHECKS)
-def test_doctor_tells_what_a_plug_in_does(packages, monkeypatch, what):
-    check, run, words = CHECKS[what]
-    install(packages, "acme", WORKING.format(run=run, check=check))
-    monkeypatch.setattr("bubblefit.solvers.diagnosis._every_calculix", lambda ccx: [])
-    done = CliRunner().invoke(main, ["doctor", "--solver", "acme"])
-    # One that runs no strips is taken at its word, and the reader told.
-    taken = what in ("short", "bubbles")
-    assert done.exit_code == (0 if taken else 4), (done.output, done.exception)
-    assert words in done.output and "membrane    ok" in done.output
-    assert ("NOT USABLE  version 9" in done.output) == (what in ("silent", "crashes", "wrong"))
-
-
-def test_a_check_that_fails_stops_a_study_in_one_line(packages, strips, monkeypatch):
-    install(packages, "acme", WORKING.format(run="...", check="raise OSError('no such host')"))
-    monkeypatch.chdir(strips)
-    done = CliRunner().invoke(
-        main,
-        ["simulate", "uniaxial", "project.toml", "--card", "material.toml", "--solver", "acme"],
-    )
-    assert done.exit_code == 4
-    assert "acme-solvers 2.5 fails its check (OSError: no such host)" in done.output
-    assert done.output.count("\n") == 1
-
-
-def test_compiled_factories_without_a_signature_are_called(packages):
-    # dict tells no signature on some Pythons; whatever it is, it is no solver.
-    install(packages, "acme", "Solver = dict")
-    with pytest.raises(SolverFailure, match="gives no solver: dict has no name"):
-        solver_named("acme")
-
-
-def test_an_unknown_name_for_the_doctor_is_bad_input():
-    done = CliRunner().invoke(main, ["doctor", "--solver", "nothere"])
-    assert done.exit_code == 2 and "--solver: 'nothere' is not one of: calculix" in done.output
-    with pytest.raises(InputError, match="is not one of"):
-        solver_named("nothere")
+def test_one_of_our_names_adds_none(packages):
+    install(packages, "cubic", "raise RuntimeError")
+    assert names_with("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
+    assert names_with("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1

@@ -4,8 +4,10 @@ It runs warp and fill strips in a program of its own (homogeneous_program.py). A
 real program differs in what it writes and reads, not in its shape.
 """
 
+import hashlib
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,14 @@ class HomogeneousSolver:
         if not timeout > 0:
             raise InputError(None, f"solver.{NAME}.timeout", f"expected > 0 s, got {timeout}")
         self.timeout = timeout
+        #: Called with what is done of a run, where the program tells: this one does not.
+        self.progress: Callable[[Any], None] | None = None
+
+    @property
+    def identity(self) -> str:
+        """What results depend on; a study is taken up again only where this is the same."""
+        program = self.program.read_bytes() if self.program.is_file() else b""
+        return f"{NAME} {hashlib.sha256(program).hexdigest()}"
 
     def check(self) -> SolverCheck:
         """Is it there, which version? `bubblefit doctor` then pulls its bars by `run`."""
@@ -87,13 +97,9 @@ class HomogeneousSolver:
         """What the program is told, and the yarn that is pulled (0 warp, 1 fill)."""
         if not isinstance(model, UniaxialModel) or set(model.supports) != {"top", "symmetry_x"}:
             raise SolverFailure("takes strips along warp or fill only", NAME)
-        if law.form != "polynomial":
-            raise SolverFailure("takes polynomial moduli only", NAME)
         pulled = 0 if abs(model.warp[1]) > 0.999 else 1
-        yarns = [
-            {"cubic": law.beta[first : first + 4].tolist(), "end": float(end)}
-            for first, end in zip((8, 4), law.strain_range, strict=False)
-        ]
+        # E1 of eps1 and E2 of eps2, whatever the form of the law.
+        yarns = law.pieces[:2].tolist()
         job = {
             "along": yarns[pulled],
             "across": yarns[1 - pulled],

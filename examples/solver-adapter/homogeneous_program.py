@@ -17,21 +17,41 @@ from typing import Any
 VERSION = "1.0"
 
 
-def modulus(yarn: dict[str, Any], strain: float) -> float:
-    """A cubic (highest power first, MPa) of log strain, held outside [0, end]."""
-    cubic, x = yarn["cubic"], min(max(strain, 0.0), yarn["end"])
-    return ((cubic[0] * x + cubic[1]) * x + cubic[2]) * x + cubic[3]
+def integral(pieces: list[list[float]], strain: float) -> float:
+    """Of a modulus (MPa) from zero to a log strain.
+
+    A piece has the strain up to which it holds and a cubic, highest power first; the modulus is
+    held below zero strain and beyond the last piece.
+    """
+    first, start, total = pieces[0], 0.0, 0.0
+    if strain <= 0:
+        return first[4] * strain
+    for end, *cubic in pieces:
+        for power, factor in zip((4, 3, 2, 1), cubic, strict=True):
+            total += factor * (min(strain, end) ** power - start**power) / power
+        start = end
+        if strain <= end:
+            return total
+    a, b, c, d = pieces[-1][1:]
+    return total + (((a * start + b) * start + c) * start + d) * (strain - start)
+
+
+def mean(pieces: list[list[float]], old: float, new: float) -> float:
+    """Of a modulus over an increment of its strain; of a tiny one about it where it is smaller."""
+    if abs(new - old) < 1e-6:
+        old, new = old - 1e-6, old + 1e-6
+    return (integral(pieces, new) - integral(pieces, old)) / (new - old)
 
 
 def pull(job: dict[str, Any]) -> Iterator[tuple[float, float, float]]:
-    """Rows (stretch along, stretch across, force) of a strip; moduli at midpoint strains."""
+    """Rows (stretch along, stretch across, force) of a strip; moduli are means of an increment."""
     along = across = stress = 0.0
     for stretch in job["stretches"]:
         step, contraction = log(stretch) - along, 0.0
-        # The moduli at the midpoint depend on the contraction, which depends on them.
+        # The mean across depends on the contraction, which depends on it.
         for _ in range(50):
-            e = modulus(job["along"], along + step / 2)
-            e_across = modulus(job["across"], across + contraction / 2)
+            e = mean(job["along"], along, along + step)
+            e_across = mean(job["across"], across, across + contraction)
             if not (e > 0 and e_across > 0):
                 sys.exit(3)
             # No stress across: nu along-across is nu12 for the warp, nu21 for the fill.

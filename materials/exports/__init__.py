@@ -1,1 +1,1 @@
-"""Material cards for other programs: one module a format; see docs/exports.md."""
+"""Material cards for other programs: one module a format; see docs/how-to/exports.md."""

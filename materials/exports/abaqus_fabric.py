@@ -6,7 +6,6 @@ from ..card import MaterialCard
 from .base import (
     DENSITY,
     Export,
-    Options,
     Says,
     density_remarks,
     heading,
@@ -14,9 +13,10 @@ from .base import (
     render,
 )
 from .curves import fabric_curves
+from .formats import CurveOptions, Format
 
 
-def fabric(card: MaterialCard, options: Options) -> Export:
+def fabric(card: MaterialCard, options: CurveOptions) -> Export:
     """*MATERIAL with *FABRIC and three *UNIAXIAL tests, and how to orient it."""
     curves = fabric_curves(card, options, "nominal")
     says = Says(
@@ -30,7 +30,7 @@ def fabric(card: MaterialCard, options: Options) -> Export:
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
             f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
             "hypoelasticity: the curves are total ones; unloading is along the same curve",
-            *density_remarks(options),
+            *density_remarks(options.density),
             *range_remarks(card, options.reach),
         ),
         confirm=(
@@ -54,3 +54,6 @@ def material_name(card: MaterialCard) -> str:
     kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.upper())
     kept = kept.strip("_")[:32]
     return kept if kept[:1].isalpha() else "FABRIC"
+
+
+FORMAT = Format("abaqus-fabric", fabric, CurveOptions)

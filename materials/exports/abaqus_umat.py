@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from ..card import MaterialCard
 from .abaqus_fabric import material_name
-from .base import Export, Options, Says, heading, render
-from .fortran import CONSTANTS, law_constants
+from .base import Export, Says, heading, render
+from .formats import Format, NoOptions
+from .fortran import law_constants
 
 #: Section Poisson's ratio: how Abaqus changes the thickness (0: not at all; 0.5: incompressible).
 SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 
 
-def umat(card: MaterialCard, options: Options) -> Export:
+def umat(card: MaterialCard, options: NoOptions) -> Export:
     """The subroutine (the same for all cards) and the *USER MATERIAL with this card's constants."""
     poisson = SECTION_POISSON[card.law.thickness_change]
     says = Says(
         carries=(
-            "the whole law: tangent moduli of log strain, nu12, the range in which moduli hold, "
-            "polynomials or tri-linear; the exact, unsymmetric tangent",
+            "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
+            "moduli hold; the exact, unsymmetric tangent",
             f"thickness: by the section, POISSON={poisson:g} ({card.law.thickness_change})",
         ),
         loses=("transverse shear: give *TRANSVERSE SHEAR STIFFNESS for shells",),
@@ -25,13 +26,12 @@ def umat(card: MaterialCard, options: Options) -> Export:
             "no Abaqus was at hand: the interface is the documented one, compiled and compared "
             "point by point; pull one element",
             "STRAN is the sum of increments along axes that turn with the material: log strain "
-            "but for 1e-6 on paths of proportional stretch and shear (docs/exports.md)",
+            "but for 1e-6 on paths of proportional stretch and shear (docs/how-to/exports.md)",
         ),
     )
     context = {
         "name": material_name(card),
-        "constants": [float(value) for value in law_constants(card.law)],
-        "count": CONSTANTS,
+        "constants": list(law_constants(card.law)),
         "poisson": poisson,
         "thickness": card.thickness,
         "exact": repr,
@@ -43,3 +43,6 @@ def umat(card: MaterialCard, options: Options) -> Export:
         "abaqus/umat.inp.j2", head=heading(card, "Abaqus/Standard material", says, "**"), **context
     )
     return Export({".f": source, ".inp": material}, says)
+
+
+FORMAT = Format("abaqus-umat", umat)

@@ -1,9 +1,9 @@
-"""What every export takes and gives, and how its text is made."""
+"""What every export gives, and how its text is made."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,7 @@ import numpy as np
 from ... import __version__
 from ...errors import InputError
 from ..card import MaterialCard
-from ..moduli import MODULI, UNLIMITED
-from ..responses import Measure
-from ..tables import POINTS, REACH
+from ..forms.base import COMPONENTS, UNLIMITED
 
 TEMPLATES = Path(__file__).resolve().parent.parent.parent / "templates"
 #: t/mm3, that of water: where a program must have a density and the user gave none.
@@ -24,21 +22,6 @@ DENSITY = 1e-9
 #: Strains a modulus at which a card is looked at.
 CHECKED = 501
 WIDTH = 70
-
-
-@dataclass(frozen=True)
-class Options:
-    """What a format may need beside the card.
-
-    points : of a curve or table from zero strain to its end. reach : log strain where a curve
-    ends if the card has no range. density : t/mm3. measure : of load curves; None is the format's
-    own.
-    """
-
-    points: int = POINTS
-    reach: float = REACH
-    density: float | None = None
-    measure: Measure | None = None
 
 
 @dataclass(frozen=True)
@@ -71,10 +54,6 @@ class Export:
     says: Says
 
 
-#: From a card and options to an export. Raises InputError for a card that the format cannot take.
-Format = Callable[[MaterialCard, Options], Export]
-
-
 def check_positive(card: MaterialCard) -> None:
     """No program can use a law without stiffness.
 
@@ -84,7 +63,7 @@ def check_positive(card: MaterialCard) -> None:
         has none), or 1 - nu12 nu21 is not at zero strain.
     """
     law = card.law
-    for name, (_, component) in MODULI.items():
+    for name, component in COMPONENTS.items():
         end = law.strain_range[component]
         strain = np.linspace(0.0, end if end < UNLIMITED else 0.0, CHECKED)
         values = law.modulus(name, strain)
@@ -122,9 +101,9 @@ def render(template: str, /, **context: Any) -> str:
     return environment.get_template(template).render(context)
 
 
-def density_remarks(options: Options) -> tuple[str, ...]:
-    """What a format that needs a density has to say of it."""
-    if options.density is not None:
+def density_remarks(density: float | None) -> tuple[str, ...]:
+    """What a format that needs a density (t/mm3) has to say of it."""
+    if density is not None:
         return ()
     return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
 

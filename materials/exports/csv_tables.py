@@ -7,12 +7,13 @@ import numpy as np
 from ..card import MaterialCard
 from ..responses import trellis_angle, trellis_curve, uniaxial_curve
 from ..tables import ModulusTable, modulus_tables
-from .base import Export, Options, Says, heading, range_remarks
+from .base import Export, Says, heading, range_remarks
+from .formats import Format, TableOptions
 
 COLUMNS = "direction,log_strain,tangent_modulus_MPa,test_strain,test_stress_MPa"
 
 
-def csv(card: MaterialCard, options: Options) -> Export:
+def csv(card: MaterialCard, options: TableOptions) -> Export:
     """Tangent modulus and nominal stress by strain, warp, fill and shear below one another."""
     tables = modulus_tables(card.law, options.points, options.reach)
     says = Says(
@@ -50,3 +51,6 @@ def _rows(card: MaterialCard, table: ModulusTable) -> list[str]:
         x, y = uniaxial_curve(card.law, pulled, strain, "nominal")
     columns = zip(strain, modulus, x, y, strict=True)
     return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]
+
+
+FORMAT = Format("csv", csv, TableOptions)

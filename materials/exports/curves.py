@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..card import MaterialCard
+from ..forms.base import COMPONENTS
 from ..law import HypoelasticLaw
-from ..moduli import MODULI
 from ..responses import Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..tables import modulus_table
-from .base import Options
+from .formats import TableOptions
 
 Array = NDArray[np.float64]
 #: Log strain of the one point in compression: a curve has to begin somewhere.
@@ -50,7 +50,7 @@ class FabricCurves:
         )
 
 
-def fabric_curves(card: MaterialCard, options: Options, measure: Measure) -> FabricCurves:
+def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -> FabricCurves:
     """The curves of a card, to the end of its range or `options.reach`.
 
     Raises
@@ -58,7 +58,8 @@ def fabric_curves(card: MaterialCard, options: Options, measure: Measure) -> Fab
     InputError : a modulus is not positive on the way.
     """
     strains = {
-        name: modulus_table(card.law, name, options.points, options.reach).strain for name in MODULI
+        name: modulus_table(card.law, name, options.points, options.reach).strain
+        for name in COMPONENTS
     }
     both = []
     for pulled, name in enumerate(("E1", "E2")):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..card import MaterialCard
-from ..responses import Measure
+from ..responses import MEASURES, Measure
 from .base import (
     DENSITY,
     Export,
-    Options,
     Says,
     density_remarks,
     heading,
@@ -18,6 +19,7 @@ from .base import (
     render,
 )
 from .curves import fabric_curves
+from .formats import CurveOptions, Format, option
 
 MATERIAL = 1
 CURVES = {"warp": 101, "fill": 102, "shear": 103}
@@ -29,9 +31,19 @@ NAMES = {
 }
 
 
-def mat34(card: MaterialCard, options: Options) -> Export:
+@dataclass(frozen=True)
+class Mat34Options(CurveOptions):
+    """The measure of the curves, too: public sources disagree."""
+
+    measure: Measure = field(
+        default=MEASURE,
+        metadata=option(f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES),
+    )
+
+
+def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     """*MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
-    measure = options.measure or MEASURE
+    measure = options.measure
     curves, law = fabric_curves(card, options, measure), card.law
     says = Says(
         carries=(
@@ -46,7 +58,7 @@ def mat34(card: MaterialCard, options: Options) -> Export:
             f"{curves.yarns:.3g} MPa in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
             "hypoelasticity: the curves are total ones; unloading is along the same curve",
-            *density_remarks(options),
+            *density_remarks(options.density),
             *range_remarks(card, options.reach),
         ),
         confirm=(
@@ -87,3 +99,6 @@ def _f10(value: float) -> str:
         if len(text) <= 10:
             return f"{text:>10}"
     return f"{value:10.3E}"
+
+
+FORMAT = Format("ls-dyna-mat34", mat34, Mat34Options)

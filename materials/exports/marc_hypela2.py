@@ -12,27 +12,28 @@ from ...errors import InputError
 from ..card import MaterialCard
 from ..law import HypoelasticLaw
 from ..responses import bar
-from .base import Export, Options, Says, heading, render
-from .fortran import CONSTANTS, double, law_constants, logical
+from .base import Export, Says, heading, render
+from .formats import Format, NoOptions
+from .fortran import double, law_constants, logical
 
 #: STATE VARS, temperature included: strain, stress, and the transverse shears of thick shells.
 STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
-#: Constants of the law, transverse shear modulus (MPa), area power.
-SIZE = CONSTANTS + 2
+#: Least transverse shear modulus of thick shells, MPa.
+LEAST = 1e-3
 #: The check of a licence holder: engineering strain of one element, in equal increments.
 ELONGATION, INCREMENTS, SHEAR = 0.1, 100, 0.01
 
 SAYS = Says(
     carries=(
-        "the whole law: tangent moduli of log strain, nu12, the range in which moduli hold, "
-        "polynomials or tri-linear",
+        "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
+        "hold",
     ),
     loses=("the transverse shear of thick shells is linear, with G12 at no strain",),
     confirm=("the conventions listed below; no Marc was at hand",),
 )
 
 
-def hypela2(card: MaterialCard, options: Options) -> Export:
+def hypela2(card: MaterialCard, options: NoOptions) -> Export:
     """The subroutine for one card, whatever the number of its material in Marc."""
     head = heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
     return Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
@@ -53,7 +54,15 @@ def hypela2_source(
     own_state : strain and stress at the start from state variables, else from Marc's e and s.
     symmetric : hand over the symmetric part of the tangent, as Marc's default solver needs.
     """
-    written = [{"id": number, "constants": constants(law)} for number, law in laws.items()]
+    written: list[dict[str, Any]] = [
+        {
+            "id": number,
+            "constants": law_constants(law),
+            "across": max(float(law.G12(0.0)), LEAST),
+            "power": law.area_power,
+        }
+        for number, law in laws.items()
+    ]
     return render(
         "marc/hypela2.f.j2",
         head=head,
@@ -61,17 +70,12 @@ def hypela2_source(
         bar=_check(next(iter(laws.values()))),
         power=next(iter(laws.values())).area_power,
         states=STATE_VARIABLES,
-        size=SIZE,
+        size=max(len(law["constants"]) for law in written),
         own_state=own_state,
         symmetric=symmetric,
         double=double,
         fortran=logical,
     )
-
-
-def constants(law: HypoelasticLaw) -> tuple[float, ...]:
-    """(25,) what `bubblefit_card` sets."""
-    return (*law_constants(law), max(float(law.G12(0.0)), 1e-3), law.area_power)
 
 
 def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
@@ -90,3 +94,6 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
         "stress": stress[-1, 0] * thinning,
         "shear": float(shear[0, 2]),
     }
+
+
+FORMAT = Format("marc-hypela2", hypela2)

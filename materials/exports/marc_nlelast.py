@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ..card import MaterialCard
-from ..tables import ModulusTable, modulus_tables
-from .base import Export, Options, Says, heading, range_remarks, render
+from ..tables import JUMP, ModulusTable, modulus_tables
+from .base import Export, Says, heading, range_remarks, render
+from .formats import Format, TableOptions
 
 #: Table numbers in the deck, by modulus.
 NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
@@ -12,16 +13,16 @@ NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
 GUARD = 1.0
 
 
-def nlelast(card: MaterialCard, options: Options) -> Export:
+def nlelast(card: MaterialCard, options: TableOptions) -> Export:
     """TABLE and NLELAST blocks of an extended-format deck."""
     tables = modulus_tables(card.law, options.points, options.reach)
     largest = max(table.error for table in tables.values())
     loses = [
-        f"moduli are straight lines between {options.points} points from zero to the end of the "
-        f"range: off by {100 * largest:.2g} % at most",
+        f"moduli are straight lines between {options.points} points (more where a modulus has "
+        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most",
     ]
-    if card.law.breaks is not None:
-        loses.append("the jumps of the tri-linear moduli are 1e-6 of strain wide")
+    if any(len(table.jumps) for table in tables.values()):
+        loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")
     if card.law.area_power == 0:
         loses.append("the card's incompressible thickness: NLELAST has no such choice")
     says = Says(
@@ -33,7 +34,7 @@ def nlelast(card: MaterialCard, options: Options) -> Export:
         loses=(*loses, *range_remarks(card, options.reach)),
         confirm=(
             "the data blocks of NLELAST and the variable type 73 of its tables: no public deck "
-            "shows them (docs/marc-deck.md of bubblefit)",
+            "shows them (docs/reference/marc-deck.md of bubblefit)",
             "that tables of G12 are looked up with the engineering shear, sign included",
         ),
     )
@@ -67,3 +68,6 @@ def _name(card: MaterialCard) -> str:
 def _real(value: float) -> str:
     """20 columns with 13 digits."""
     return f"{value:20.13E}"
+
+
+FORMAT = Format("marc", nlelast, TableOptions)

@@ -7,8 +7,11 @@ from typing import Any
 
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
+from ..base import History
+from .analysis import Run, Setup
 from .deck import deck_files
 from .library import constants
+from .results import bubble_history
 from .shells import ShellMesh
 
 DECK = "bubble.inp.j2"
@@ -23,6 +26,18 @@ FIRST = 0.003
 LEAST = (1e-6, 1 / 256)
 MOST_INCREMENTS = 200
 ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
+
+
+def analyse(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+    """History of the inflation of a bubble.
+
+    Raises
+    ------
+    SolverFailure : a run that did not end well. InputError : a template that cannot be used.
+    """
+    shells = setup.shells(model.mesh)
+    files = decks(model, law, shells, setup.element, setup.templates)
+    return run(files, lambda frd, iterations: bubble_history(frd, model, shells, iterations))
 
 
 def decks(

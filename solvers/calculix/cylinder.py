@@ -20,7 +20,7 @@ DECK, MESH = "cylinder.inp.j2", "solids.inp.j2"
 #: Incompatible modes: flat solids lock without.
 ELEMENT = "C3D8I"
 TOLERANCES = (1e-4, 1e-3)
-#: Newton's method gets as many iterations as in DESIGN.md, 4a.
+#: Newton's method gets more iterations than CalculiX gives it by default: contact needs them.
 TIME_INCREMENTATION = "6, 10, 9, 30, 14, 6, , 8"
 #: First and least increment of CalculiX as parts of one of the law: at first the flat caps have
 #: no stiffness but bending. Bending has its own.

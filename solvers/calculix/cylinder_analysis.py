@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 from ...materials.law import HypoelasticLaw
 from ...models.cylinder import CylinderModel
 from ..base import History
+from .analysis import Converged, Run, Setup
 from .cylinder import cylinder_decks
 from .cylinder_bending import bending_context
 from .cylinder_gas import GasCurve, better_pressure, compliance, gas_pressure
@@ -24,19 +23,12 @@ from .solids import solid_mesh
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
-#: Steps and increments that converged, of a run that stopped early; None when it did not.
-Converged = Collection[tuple[int, int]] | None
-Read = Callable[[Path, int, Converged], Any]
-#: Runs a deck in a scratch folder and hands .frd file and iterations to a reader; the flag says
-#: whether the reader is to have a run that stopped early as well.
-Run = Callable[[dict[str, str], Read, bool], Any]
-
 #: Most passes at the pressures that the last one's volumes give, and what may be left between the
 #: gas and the deck, over absolute pressure: p V is constant to that.
 PASSES, SETTLED = 4, 3e-4
 
 
-def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run: Run) -> History:
+def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
     """History of inflation and bending with a constant mass of gas.
 
     CalculiX knows no gas: the deck has its pressure over the collar's way, and the volumes found
@@ -47,22 +39,24 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, folder: Path | None, run:
     ------
     SolverFailure : inflation did not end well, or bending not even its first reported deflection.
     """
-    solids = solid_mesh(model)
+    solids, folder = solid_mesh(model), setup.templates
 
-    def blown(frd: Path, iterations: int, _: Converged) -> tuple[Array, Array]:
+    def blown(frd: Path, iterations: int) -> tuple[Array, Array]:
         start = whole_times(frd, len(model.inflation), len(solids.points))[0]
         return start[-1], volumes(model, solids.middle(start))
 
-    def bent(frd: Path, iterations: int, stopped: Converged) -> BentCylinder:
-        return bent_cylinder(frd, model, solids, iterations, stopped)
+    def bent(
+        frd: Path, iterations: int, stopped: Converged | None = None, why: str = ""
+    ) -> BentCylinder:
+        return bent_cylinder(frd, model, solids, iterations, stopped, why)
 
-    start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown, False)
+    start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown)
     rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
     slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
     gas = GasCurve(np.zeros(1), np.full(1, model.pressure))
     for number in range(1, PASSES + 1):
         context = bending_context(model, solids, start, gas)
-        found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, True)
+        found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, bent)
         given = gas.at(found.deflection)
         closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
         gap = gas_pressure(closed, found.volume) - given

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.cylinder import CylinderModel
+from ..rigid import SUPPORT_COUNTS, collar_body, support_body
 from .cylinder_gas import GasCurve
-from .rigid import SUPPORT_COUNTS, collar_body, support_body
 from .solids import SolidMesh
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ INTO, ABOVE = 0.02, 0.5
 BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
 #: Time that the collar stands still, and of the first increment, which must end before it moves.
 REST, FIRST = 1.5, 1.0
-#: mm of the collar's way: longest increment (its effect: docs/calculix.md), and the one
+#: mm of the collar's way: longest increment (its effect: docs/how-to/calculix.md), and the one
 #: at which contact is given up.
 LONGEST, LEAST = 5.0, 1e-4
 

@@ -56,7 +56,7 @@ class BentCylinder:
     deflection (n,) mm that the collar has gone down since it met the inflated cylinder;
     displacement (n, nodes, 3) mm of the middle surface; forces of the cylinder's contacts on
     the whole (n, 3) N, `supports` and `collar`; volume (n,) mm^3 of the whole; iterations: those
-    of the run; stopped: whether it ended early.
+    of the run; stopped: whether it ended early, and why.
     """
 
     deflection: Array
@@ -65,6 +65,7 @@ class BentCylinder:
     volume: Array
     iterations: int
     stopped: bool
+    why: str = ""
 
 
 def bent_cylinder(
@@ -73,6 +74,7 @@ def bent_cylinder(
     solids: SolidMesh,
     iterations: int,
     converged: Collection[tuple[int, int]] | None = None,
+    why: str = "",
 ) -> BentCylinder:
     """What the result file of a deck with both steps holds of bending.
 
@@ -80,6 +82,7 @@ def bent_cylinder(
     ----------
     converged : steps and increments that converged, of a run that stopped early. None: the run
         ended well.
+    why : it stopped early.
 
     Raises
     ------
@@ -120,7 +123,13 @@ def bent_cylinder(
     for values in reactions.values():
         values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
     return BentCylinder(
-        np.array(deflections), middle, reactions, volumes(model, middle), iterations, not ended
+        np.array(deflections),
+        middle,
+        reactions,
+        volumes(model, middle),
+        iterations,
+        not ended,
+        why,
     )
 
 
@@ -143,9 +152,10 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         raise SolverFailure(problem, "calculix")
     at = partial(_between, bent.deflection, wanted=wanted)
     reactions = {name: at(values) for name, values in bent.reactions.items()}
-    remarks: tuple[str, ...] = ()
+    early = ""
     if bent.stopped:
-        remarks = (f"the run stopped early; the last increment is at {reached:.4g} mm",)
+        early = f"the run stopped early; the last increment is at {reached:.4g} mm"
+        early += f": {bent.why}" if bent.why else ""
     return History(
         -reactions["collar"][:, 1],
         at(bent.displacement),
@@ -155,7 +165,8 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         cavity_volume=at(bent.volume),
         iterations=bent.iterations,
         path=bent.displacement,
-        remarks=remarks,
+        remarks=(early,) if early else (),
+        early=early if len(wanted) <= len(model.deflections) else "",
     )
 
 

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from ...materials.card import MaterialCard
-from ...materials.exports.base import Export, Options, Says, heading, render
+from ...materials.exports.base import Export, Says, heading, render
+from ...materials.exports.formats import Format, NoOptions
+from .law_file import SUFFIX, law_text
 from .library import FLAGS, LIBRARY_FILE, MATERIAL, SOURCE, STATE_VARIABLES, constants
 
 
-def calculix(card: MaterialCard, options: Options) -> Export:
-    """*MATERIAL with *USER MATERIAL and *DEPVAR, and the C source to be compiled for it."""
+def calculix(card: MaterialCard, options: NoOptions) -> Export:
+    """*MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, and its moduli."""
     says = Says(
         carries=(
-            "the whole law: tangent moduli of log strain, nu12, the range in which moduli hold, "
-            "polynomials or tri-linear, thickness constant or incompressible",
+            "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
+            "moduli hold, thickness constant or incompressible",
         ),
         loses=(
             "the unsymmetric part of the tangent (CalculiX takes the symmetric one): more "
             "iterations, the same result",
-            "through the thickness and in transverse shear the material is linear (constants 18 "
-            "and 19)",
+            "through the thickness and in transverse shear the material is linear (constants 3 "
+            "and 4)",
         ),
         confirm=("that this ccx loads material libraries (Debian's does not): bubblefit doctor",),
     )
@@ -31,4 +33,8 @@ def calculix(card: MaterialCard, options: Options) -> Export:
         library=LIBRARY_FILE,
         flags=" ".join(FLAGS),
     )
-    return Export({".inp": text, ".c": SOURCE.read_text(encoding="utf-8")}, says)
+    source = SOURCE.read_text(encoding="utf-8")
+    return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
+
+
+FORMAT = Format("calculix", calculix)

@@ -1,6 +1,7 @@
 /* The hypoelastic orthotropic law as a CalculiX material: *MATERIAL, NAME=@BUBBLEFIT_HYPOELASTIC
  * (several in one deck: @BUBBLEFIT_HYPOELASTIC@BODY, ...). The in-plane law is that of
- * materials/point_law.py, function by function; tests/test_calculix_law.py compares the two.
+ * materials/point_law.py and point_moduli.py, function by function;
+ * tests/solvers/calculix/test_calculix_law.py compares the two.
  *
  * One increment goes from the committed state (*DEPVAR) to the end of the increment:
  *   F -> C = F'F in the material frame -> log strain -> d sigma = D d eps (moduli: `modulus`)
@@ -10,30 +11,31 @@
  * CalculiX gives and takes everything in global axes, with an *ORIENTATION or without. *STEP
  * needs NLGEOM.
  */
+#define _POSIX_C_SOURCE 200809L
+#include <dirent.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-enum { /* *USER MATERIAL, CONSTANTS=22, or 28 for a tri-linear law: the order of library.py */
-    BETA = 0,           /* 12 coefficients, MPa: G12, E2, E1, highest power first (Eqs 3.1-3.3) */
-    NU12 = 12,
-    RANGE_END = 13,     /* 3: eps1, eps2, gamma12, where the moduli are held */
-    AREA_POWER = 16,    /* 1 constant thickness, 0 incompressible */
-    NORMAL_MODULUS = 17,
-    TRANSVERSE_SHEAR = 18,
-    ANGLE = 19,         /* degrees from the first in-plane axis to warp, about the normal */
-    NORMAL_AXIS = 20,   /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
-    WHOLE_TIMES = 21,   /* 1: the state is committed only where the total time is a whole number;
+enum { /* *USER MATERIAL: the order of library.py */
+    NU12 = 0,
+    AREA_POWER = 1,     /* 1 constant thickness, 0 incompressible */
+    NORMAL_MODULUS = 2,
+    TRANSVERSE_SHEAR = 3,
+    ANGLE = 4,          /* degrees from the first in-plane axis to warp, about the normal */
+    NORMAL_AXIS = 5,    /* 3: axes 1, 2 in plane (warp from 1); 1: cylindrical (warp from 3) */
+    WHOLE_TIMES = 6,    /* 1: the state is committed only where the total time is a whole number;
                            -n: so up to the total time n, then at every increment; 0: at every one */
-    CONSTANTS = 22,
-    BREAKS = 22,        /* 6, tri-linear: two strains each of eps1, eps2, gamma12, where the
-                           modulus changes from coefficient 4 of its block to 3 and to 2 */
-    TRILINEAR_CONSTANTS = 28
+    LAW = 7,            /* number of the law: of the file *.law where ccx runs that says it */
+    LAW_PIECES = 8,     /* how many pieces E1, E2 and G12 have together there */
+    CONSTANTS = 9
 };
 enum { STATES = 6 };    /* *DEPVAR: eps1, eps2, gamma12, sigma1, sigma2, tau12 (material frame) */
 
 static const double SMALLER_INCREMENT = 0.5;
-static const double TINY = 1e-12; /* a change of strain that is rounding */
+static const double TINY = 1e-12; /* an increment across the end of a piece: not divided by */
 
 static double dot(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -125,60 +127,145 @@ static int log_strain(double m, double q, double c, double *h, double p[3][3]) {
     return 1;
 }
 
+/* A tangent modulus: a cubic of its own strain in each piece (row: upper end, which belongs to the
+ * piece, and coefficients, highest power of the strain first). Below zero strain and beyond the
+ * last end it is held. `even`: G12, of the size of its strain. */
+enum { A_PIECE = 5, MOST_PIECES = 100000 };
+typedef struct {
+    double (*piece)[A_PIECE];
+    int count, even;
+} Curve;
+
+/* E1 of eps1, E2 of eps2, G12 of gamma12. */
+typedef struct Law {
+    double number;
+    Curve curve[3];
+    struct Law *next;
+} Law;
+
+/* The law of a file (law_file.py) if it has this number. */
+static Law *read_law(const char *name, double number) {
+    FILE *file = fopen(name, "r");
+    double found;
+    int counts[3], all = 0;
+    Law *law = 0;
+    if (!file) return 0;
+    int good = fscanf(file, "bubblefit law %lf", &found) == 1 && found == number;
+    for (int i = 0; i < 3 && good; i++) {
+        good = fscanf(file, "%d", counts + i) == 1 && counts[i] > 0 && counts[i] < MOST_PIECES;
+        if (good) all += counts[i];
+    }
+    double(*rows)[A_PIECE] = good ? malloc(sizeof *rows * (size_t)all) : 0;
+    for (int i = 0; rows && i < A_PIECE * all; i++)
+        good = good && fscanf(file, "%lf", rows[0] + i) == 1;
+    fclose(file);
+    if (good && rows) law = malloc(sizeof *law);
+    if (!law) {
+        free(rows);
+        return 0;
+    }
+    law->number = number, law->next = 0;
+    for (int i = 0; i < 3; rows += counts[i++]) {
+        Curve c = {rows, counts[i], i == 2};
+        law->curve[i] = c;
+    }
+    return law;
+}
+
+/* The law of this number, read when it is first asked for; ccx calls from several threads. */
+static const Law *law_of(double number) {
+    static pthread_mutex_t guard = PTHREAD_MUTEX_INITIALIZER;
+    static Law *laws;
+    pthread_mutex_lock(&guard);
+    Law *law = laws;
+    while (law && law->number != number) law = law->next;
+    DIR *folder = law ? 0 : opendir(".");
+    for (struct dirent *entry; folder && !law && (entry = readdir(folder));) {
+        const char *end = strrchr(entry->d_name, '.');
+        if (!end || strcmp(end, ".law") || !(law = read_law(entry->d_name, number))) continue;
+        law->next = laws, laws = law;
+    }
+    if (folder) closedir(folder);
+    pthread_mutex_unlock(&guard);
+    return law;
+}
+
+/* The piece that holds at x; the last one beyond the range, the first below zero. */
+static int piece_at(Curve c, double x) {
+    int i = 0;
+    while (i < c.count - 1 && x > c.piece[i][0]) i++;
+    return i;
+}
+
+static double mean_of_piece(const double *p, double a, double b) {
+    double total = a + b, squares = a * a + b * b;
+    double value = p[1] * (0.25 * total * squares) + p[2] * ((squares + a * b) * (1.0 / 3.0));
+    return value + p[3] * (0.5 * total) + p[4];
+}
+
+static double at_point(Curve c, double x) {
+    double size = c.even ? fabs(x) : x, held = fmin(fmax(size, 0), c.piece[c.count - 1][0]);
+    const double *p = c.piece[piece_at(c, held)];
+    return ((p[1] * held + p[2]) * held + p[3]) * held + p[4];
+}
+
+/* Integral of the modulus from low to high, the sum over the pieces on the way. */
+static double integral(Curve c, double low, double high) {
+    double total = 0, start = 0;
+    if (low < 0) total += (fmin(high, 0) - low) * c.piece[0][4];
+    for (int i = 0; i < c.count; i++) {
+        double end = c.piece[i][0], a = fmax(low, start), b = fmin(high, end);
+        if (b > a) total += (b - a) * mean_of_piece(c.piece[i], a, b);
+        start = end;
+    }
+    if (high > start) total += (high - fmax(low, start)) * at_point(c, start);
+    return total;
+}
+
 /* A modulus over one increment, and its slope by the strain at the end of it. */
 typedef struct {
     double value, slope;
 } Modulus;
 
-/* A cubic (highest power first) at the midpoint, held to [0, end]; no slope where held. */
-static Modulus cubic(const double *b, double x, double x_old, double end, int even) {
-    double mid = 0.5 * (x + x_old), size = even ? fabs(mid) : mid;
-    double held = size < 0 ? 0 : size > end ? end : size;
-    Modulus m = {((b[0] * held + b[1]) * held + b[2]) * held + b[3], 0};
-    if (held == size) m.slope = 0.5 * ((3 * b[0] * held + 2 * b[1]) * held + b[2]);
-    if (even && mid < 0) m.slope = -m.slope;
-    return m;
-}
-
-/* A tri-linear modulus at a strain: b[3] up to the first break, then b[2], then b[1]. */
-static double in_region(const double *b, double x, const double *breaks, int even) {
-    double size = even ? fabs(x) : x;
-    return size <= breaks[0] ? b[3] : size <= breaks[1] ? b[2] : b[1];
-}
-
-/* Part of the way from x_old to x that is below a break (in size, where even). */
-static double way_below(double at, double x, double x_old, int even) {
-    double low = even ? -at : -HUGE_VAL;
-    return (fmin(fmax(x, low), at) - fmin(fmax(x_old, low), at)) / (x - x_old);
-}
-
-/* Its mean over the increment: continuous in x, where the value at the midpoint would jump. */
-static Modulus mean(const double *b, double x, double x_old, const double *breaks, int even) {
-    double change = x - x_old;
-    Modulus m = {in_region(b, 0.5 * (x + x_old), breaks, even), 0};
+/* As `modulus`, for an increment that leaves a piece. */
+static Modulus across(Curve c, double x, double x_old) {
+    double change = x - x_old, whole;
+    Modulus m = {at_point(c, 0.5 * (x + x_old)), 0};
     if (fabs(change) < TINY) return m;
-    double below = way_below(breaks[0], x, x_old, even);
-    double within = way_below(breaks[1], x, x_old, even);
-    m.value = below * b[3] + (within - below) * b[2] + (1 - within) * b[1];
-    m.slope = (in_region(b, x, breaks, even) - m.value) / change;
+    double a = c.even ? fabs(x) : x, b = c.even ? fabs(x_old) : x_old;
+    if (c.even && x * x_old < 0)
+        whole = integral(c, 0, a) + integral(c, 0, b);
+    else
+        whole = integral(c, fmin(a, b), fmax(a, b));
+    m.value = whole / fabs(change);
+    m.slope = (at_point(c, x) - m.value) / change;
     return m;
 }
 
-/* E1, E2 or G12: component 0, 1, 2. */
-static Modulus modulus(const double *k, const double *breaks, int component, const double *h,
-                       const double *h_old) {
-    const double *b = k + BETA + 8 - 4 * component;
-    double x = h[component], x_old = h_old[component];
-    if (breaks) return mean(b, x, x_old, breaks + 2 * component, component == 2);
-    return cubic(b, x, x_old, k[RANGE_END + component], component == 2);
+/* The mean of a modulus over the increment, (F(x) - F(x_old))/(x - x_old) with F its integral,
+ * and its slope by x, (E(x) - mean)/(x - x_old). Inside one piece both are polynomials of the two
+ * strains: nothing cancels, however small the increment. */
+static Modulus modulus(Curve c, double x, double x_old) {
+    int mirrored = c.even && x <= 0 && x_old <= 0;
+    double a = mirrored ? -x_old : x_old, b = mirrored ? -x : x;
+    double low = fmin(a, b), high = fmax(a, b);
+    Modulus m = {c.piece[0][4], 0};
+    if (!c.even && high <= 0) return m;
+    int i = piece_at(c, high);
+    const double *p = c.piece[i];
+    if (!(low >= (i > 0 ? c.piece[i - 1][0] : 0) && high <= p[0])) return across(c, x, x_old);
+    m.value = mean_of_piece(p, a, b);
+    double ahead = p[1] * (0.25 * (a * a + 2 * a * b + 3 * b * b));
+    ahead += p[2] * ((a + 2 * b) * (1.0 / 3.0));
+    m.slope = (mirrored ? -1 : 1) * (ahead + 0.5 * p[3]);
+    return m;
 }
 
 /* s = s_old + D (h - h_old) and d = ds/dh; 0 when a modulus or 1 - nu12 nu21 is not positive. */
-static int stress_update(const double *k, const double *breaks, const double *h,
-                         const double *h_old, const double *s_old, double *s, double d[3][3]) {
-    double nu = k[NU12];
-    Modulus e1 = modulus(k, breaks, 0, h, h_old), e2 = modulus(k, breaks, 1, h, h_old);
-    Modulus g12 = modulus(k, breaks, 2, h, h_old);
+static int stress_update(const Curve *curve, double nu, const double *h, const double *h_old,
+                         const double *s_old, double *s, double d[3][3]) {
+    Modulus e1 = modulus(curve[0], h[0], h_old[0]), e2 = modulus(curve[1], h[1], h_old[1]);
+    Modulus g12 = modulus(curve[2], h[2], h_old[2]);
     double warp = e1.value, fill = e2.value, shear = g12.value;
     double slope1 = e1.slope, slope2 = e2.slope, slope3 = g12.slope;
     if (!(shear > 0 && fill > 0 && warp > 0)) return 0;
@@ -224,13 +311,12 @@ static void pull_back(double m, double q, double c, const double *t, double *s, 
 }
 
 /* In-plane S = (S11, S22, S12), g = dS/dE with engineering shear, and the new state. */
-static int membrane_stress(const double *k, const double *breaks, double c11, double c22,
-                           double c12, const double *old, double *state, double *s,
-                           double g[3][3]) {
+static int membrane_stress(const Curve *curve, const double *k, double c11, double c22, double c12,
+                           const double *old, double *state, double *s, double g[3][3]) {
     double m = 0.5 * (c11 + c22), q = 0.5 * (c11 - c22), p[3][3], d[3][3], w[3][3], t[3];
     double *h = state, *sigma = state + 3;
     if (!log_strain(m, q, c12, h, p)) return 0;
-    if (!stress_update(k, breaks, h, old, old + 3, sigma, d)) return 0;
+    if (!stress_update(curve, k[NU12], h, old, old + 3, sigma, d)) return 0;
     double power = k[AREA_POWER], ratio = exp(power * (h[0] + h[1]));
     for (int i = 0; i < 3; i++) t[i] = ratio * sigma[i];
     pull_back(m, q, c12, t, s, w, g);
@@ -260,14 +346,19 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
     (void)amat, (void)emec, (void)emec0, (void)beta, (void)xokl, (void)voj, (void)vj;
     (void)ithermal, (void)t1l, (void)dtime, (void)ielas, (void)ipkon;
     (void)size;
+    const double *const k = constants, e3 = k[NORMAL_MODULUS], g3 = k[TRANSVERSE_SHEAR];
     int given = -100 - *kode;
-    if ((given != CONSTANTS && given != TRILINEAR_CONSTANTS) || *nstate < STATES) {
-        printf(" *ERROR in HYPOELASTIC: %d or %d constants and *DEPVAR %d are needed, "
-               "not %d and %d\n", CONSTANTS, TRILINEAR_CONSTANTS, STATES, given, *nstate);
+    if (given != CONSTANTS || *nstate < STATES) {
+        printf(" *ERROR in HYPOELASTIC: %d constants and *DEPVAR %d are needed, not %d and %d\n",
+               CONSTANTS, STATES, given, *nstate);
         exit(201);
     }
-    const double *const k = constants, e3 = k[NORMAL_MODULUS], g3 = k[TRANSVERSE_SHEAR];
-    const double *breaks = given == TRILINEAR_CONSTANTS ? k + BREAKS : 0;
+    const Law *law = law_of(k[LAW]);
+    if (!law || law->curve[0].count + law->curve[1].count + law->curve[2].count != k[LAW_PIECES]) {
+        printf(" *ERROR in HYPOELASTIC: no file *.law in the folder of the deck has the law %.0f "
+               "of %.0f pieces\n", k[LAW], k[LAW_PIECES]);
+        exit(201);
+    }
     size_t place = (size_t)*nstate * ((size_t)mi[0] * (*iel - 1) + (*iint - 1));
     const double *old = xstateini + place;
     double a[3][3], f[3][3], state[STATES] = {0}, plane[3], g[3][3];
@@ -277,7 +368,7 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
         for (int i = 0; i < 3; i++)
             f[n][i] = xkl[i] * a[n][0] + xkl[i + 3] * a[n][1] + xkl[i + 6] * a[n][2];
     double c11 = dot(f[0], f[0]), c22 = dot(f[1], f[1]), c12 = dot(f[0], f[1]);
-    int good = membrane_stress(k, breaks, c11, c22, c12, old, state, plane, g);
+    int good = membrane_stress(law->curve, k, c11, c22, c12, old, state, plane, g);
     double normal = 0.5 * (dot(f[2], f[2]) - 1);
     double shear1 = dot(f[0], f[2]), shear2 = dot(f[1], f[2]);
     good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);

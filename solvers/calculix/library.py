@@ -13,6 +13,8 @@ from pathlib import Path
 from ...caching import cache_folder
 from ...errors import InputError, OutputError, SolverFailure
 from ...materials.law import HypoelasticLaw
+from ...materials.pieces import piece_constants
+from .law_file import law_number
 
 #: Name on `*MATERIAL`: CalculiX loads libBUBBLEFIT.so and calls HYPOELASTIC. Several materials in
 #: one deck: MATERIAL + "@BODY", MATERIAL + "@SEAM".
@@ -23,14 +25,9 @@ LIBRARY_FILE = "libBUBBLEFIT.so"
 STATE_VARIABLES = 6
 #: A law without stiffness is for the analysis to refuse, not for the deck: MPa.
 LEAST = 1e-3
-#: `*USER MATERIAL, CONSTANTS=`. Never a multiple of 8: CalculiX reads one more line then.
-CONSTANTS = 22
-#: The same and the breaks of a tri-linear law.
-TRILINEAR_CONSTANTS = 28
-
 SOURCE = Path(__file__).with_name("law.c")
 # No contraction: the same rounding on every machine.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-pthread")
 
 
 def constants(
@@ -42,11 +39,12 @@ def constants(
     whole_times: bool = False,
     whole_until: int = 0,
 ) -> tuple[float, ...]:
-    """The constants of `*USER MATERIAL`, (22,) or (28,) for a tri-linear law, as `law.c` has them.
+    """The constants of `*USER MATERIAL`, (9,), as `law.c` has them.
 
-    beta (12, MPa), nu12, ends of the strain range (3), area power, normal modulus (MPa),
-    transverse shear modulus (MPa), angle (degrees), normal axis, whole times; then, tri-linear,
-    the breaks of eps1, eps2, gamma12 (6; 1e9 where the modulus is held before it).
+    nu12, area power, normal modulus (MPa), transverse shear modulus (MPa), angle (degrees), normal
+    axis, whole times; the number of the law in `law_files` and how many pieces its moduli have.
+    Their number is never a multiple of 8, of which CalculiX reads one more line, and never above
+    21, of which it writes beyond a field.
 
     Parameters
     ----------
@@ -77,12 +75,10 @@ def constants(
             raise InputError(None, name, f"expected > 0 MPa, got {value}")
     if normal_axis not in (1, 3):
         raise InputError(None, "normal_axis", f"expected 1 or 3, got {normal_axis}")
-    ends = (float(end) for end in law.strain_range)
-    coefficients = (float(b) for b in law.beta)
-    through = (law.area_power, normal_modulus, transverse_shear, float(angle), float(normal_axis))
-    breaks = (float(strain) for strain in law.limits[3:])
     whole = -float(whole_until) if whole_until else float(whole_times)
-    return (*coefficients, law.nu12, *ends, *through, whole, *breaks)
+    shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), whole)
+    moduli = (float(law_number(law)), sum(piece_constants(law)[:3]))
+    return (law.nu12, law.area_power, *shape, *moduli)
 
 
 def compiler() -> list[str]:

@@ -12,6 +12,7 @@ import jinja2
 
 from ...errors import OutputError, SolverFailure
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law
+from .law_file import law_files
 from .library import MATERIAL, STATE_VARIABLES, constants, material_library
 
 TEMPLATES = Path(__file__).parent.parent.parent / "templates" / "calculix"
@@ -67,7 +68,11 @@ def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> t
 
 
 def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float, ...]:
-    (folder / "bars.inp").write_text(bar_deck(), encoding="utf-8")
+    files = {"bars.inp": bar_deck()}
+    for bar in BARS:
+        files |= law_files(bar_law(bar.model))
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
     paths = [str(library.parent), os.environ.get("LD_LIBRARY_PATH", "")]
     search = os.pathsep.join(path for path in paths if path)
     variables = {**os.environ, "LD_LIBRARY_PATH": search, "OMP_NUM_THREADS": "1"}

@@ -18,6 +18,9 @@ _TOO_SMALL = re.compile(
     r"increment size smaller than minimum|max\. # of increments|too many cutbacks", re.IGNORECASE
 )
 
+#: CalculiX' own word for an increment that it cannot make any smaller.
+_GAVE_UP = re.compile(r"increment size smaller than minimum|too many cutbacks", re.IGNORECASE)
+
 
 @dataclass(frozen=True)
 class Increment:
@@ -78,6 +81,18 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     if FINISHED not in text:
         return f"ended without '{FINISHED}' {reached}: is this CalculiX?"
     return None
+
+
+def collapsed(folder: Path, job: str, outcome: Outcome) -> bool:
+    """Whether CalculiX itself gave up, its increment as small as it may be.
+
+    What converged until then is a result that ends early. After any other bad end (killed, out of
+    time, disk full, an error) there is none.
+    """
+    text = log_tail(folder / f"{job}.log", 400)
+    if outcome.timed_out or outcome.signal_name or _disk_full(folder, text, outcome):
+        return False
+    return _GAVE_UP.search(text) is not None
 
 
 def _disk_full(folder: Path, text: str, outcome: Outcome) -> str:

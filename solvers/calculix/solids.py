@@ -4,7 +4,7 @@ The seam's layers all lie outside because the gas must meet a surface without st
 of a step inside, unloaded, the pressure would be out of balance by enough to bend the cylinder.
 
 Shells will not do: where they meet at an angle, at the edge of a cap, CalculiX ties rotations
-together, and Newton's method stalls as soon as contact comes in (DESIGN.md, 4a).
+together, and Newton's method stalls as soon as contact comes in.
 """
 
 from __future__ import annotations

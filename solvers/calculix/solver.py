@@ -3,36 +3,40 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import InputError, SolverFailure
+from ...errors import BubblefitError, InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
-from ..base import History, SolverCheck
+from ..analyses import analysis_of
+from ..base import History, Progress, SolverCheck
+from ..identity import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder
 from . import bubble, cylinder_analysis, strip
+from .analysis import Reader, Rescue, Run, Setup
 from .executable import ADVICE, Executable, find_ccx
+from .law_file import law_files
 from .library import material_library
-from .reasons import Increment, increments, reason
-from .results import bubble_history
+from .reasons import collapsed, increments, reason
 from .shells import ELEMENTS, ShellMesh, shell_mesh
 
 log = logging.getLogger(__name__)
 
 JOB = "job"
 TIMEOUT_S = 3600.0
-Model = BubbleModel | UniaxialModel | CylinderModel
 T = TypeVar("T")
-#: Makes something of the .frd file and the number of iterations.
-Reader = Callable[[Path, int], T]
-#: The same of a run that stopped early; the steps and increments that converged.
-Rescue = Callable[[Path, int, set[tuple[int, int]]], T]
+#: What is done with each model.
+ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
+    BubbleModel: bubble.analyse,
+    UniaxialModel: strip.analyse,
+    CylinderModel: cylinder_analysis.analyse,
+}
 
 
 class CalculixSolver:
@@ -41,7 +45,7 @@ class CalculixSolver:
     Parameters
     ----------
     ccx : the program; found by `find_ccx` unless given.
-    templates : the user's own folder of templates, see docs/calculix.md.
+    templates : the user's own folder of templates, see docs/how-to/calculix.md.
     element : "S8R" or "S4".
     timeout : s, of one run, unless `run` is given another.
     scratch : folder for scratch folders; memory, else the temporary folder, unless given.
@@ -66,7 +70,7 @@ class CalculixSolver:
         scratch: Path | None = None,
         keep: bool = False,
         threads: int = 1,
-        progress: Callable[[Increment], None] | None = None,
+        progress: Callable[[Progress], None] | None = None,
     ) -> None:
         if element not in ELEMENTS:
             problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
@@ -78,6 +82,20 @@ class CalculixSolver:
         self.threads, self.progress = threads, progress
         self._found: Executable | None = None
         self._shells: tuple[Mesh, ShellMesh] | None = None
+
+    @property
+    def identity(self) -> str:
+        """The version of ccx, the element, and the user's templates by what is in them."""
+        try:
+            version = self.executable().version
+        except BubblefitError:
+            version = ""  # whoever runs it is told
+        return in_words(
+            self.name,
+            version,
+            element=self.element,
+            templates=templates_mark(self.templates),
+        )
 
     def check(self) -> SolverCheck:
         """Whether there is a ccx that can load the law; its version."""
@@ -96,7 +114,7 @@ class CalculixSolver:
 
     def run(
         self,
-        model: Model,
+        model: Any,
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
@@ -114,26 +132,17 @@ class CalculixSolver:
         InputError : a template that cannot be used, a ccx that cannot be started.
         """
 
-        def once(files: dict[str, str], read: Reader[T], rescue: Rescue[T] | None = None) -> T:
-            place, seconds = scratch or self.scratch, timeout or self.timeout
-            return self._once(files, read, place, seconds, rescue)
+        place, seconds = scratch or self.scratch, timeout or self.timeout
 
-        if isinstance(model, CylinderModel):
+        def run(files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None) -> T:
+            return self._once({**files, **law_files(law)}, read, place, seconds, rescue)
 
-            def bent(files: dict[str, str], read: cylinder_analysis.Read, early: bool) -> Any:
-                return once(files, lambda frd, n: read(frd, n, None), read if early else None)
-
-            return cylinder_analysis.analyse(model, law, self.templates, bent)
-        shells = self._shell_mesh(model)
-
-        if isinstance(model, UniaxialModel):
-            return strip.analyse(model, law, shells, self.element, self.templates, once)
-        files = bubble.decks(model, law, shells, self.element, self.templates)
-        return once(files, lambda frd, n: bubble_history(frd, model, shells, n))
+        analyse = analysis_of(ANALYSES, model, self.name)
+        return analyse(model, law, Setup(self.element, self.templates, self._shell_mesh), run)
 
     def _once(
         self,
-        files: dict[str, str],
+        files: Mapping[str, str],
         read: Reader[T],
         parent: Path | None,
         timeout: float,
@@ -149,7 +158,7 @@ class CalculixSolver:
         folder: Path,
         program: Path,
         library: Path,
-        files: dict[str, str],
+        files: Mapping[str, str],
         timeout: float,
         read: Reader[T],
         rescue: Rescue[T] | None,
@@ -182,16 +191,16 @@ class CalculixSolver:
         if problem is not None:
             log.info("stopped early: %s", problem)
             try:
-                if rescue is None:
+                if rescue is None or not collapsed(folder, JOB, outcome):
                     raise SolverFailure(problem, self.name, outcome.exit_code)
                 converged = {(i.step, i.increment) for i in done}
-                return rescue(folder / f"{JOB}.frd", iterations, converged)
+                return rescue(folder / f"{JOB}.frd", iterations, converged, problem)
             except SolverFailure:
                 # Why it stopped says more than what its results then lack.
                 raise SolverFailure(problem, self.name, outcome.exit_code) from None
         return read(folder / f"{JOB}.frd", iterations)
 
-    def _shell_mesh(self, model: Model) -> ShellMesh:
-        if self._shells is None or self._shells[0] is not model.mesh:
-            self._shells = (model.mesh, shell_mesh(model.mesh, self.element))
+    def _shell_mesh(self, mesh: Mesh) -> ShellMesh:
+        if self._shells is None or self._shells[0] is not mesh:
+            self._shells = (mesh, shell_mesh(mesh, self.element))
         return self._shells[1]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +11,14 @@ from numpy.typing import NDArray
 from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
 from ..base import History
-from ..pulls import as_the_membrane, corrected, direct, evenly
+from ..pulls import grip_pulls
+from .analysis import Run, Setup
 from .deck import deck_files
 from .library import constants
 from .shells import ShellMesh
 from .strip_results import strip_history, strip_run
 
 Array = NDArray[np.float64]
-#: Runs a deck in a scratch folder and hands .frd file and iterations to a reader.
-Run = Callable[[dict[str, str], Callable[[Path, int], Any]], Any]
 
 DECK = "strip.inp.j2"
 #: Those of the bubble would do, but the increments are a hundredth of the whole: the load is
@@ -31,14 +28,7 @@ TOLERANCES = (1e-5, 1e-4)
 LEAST = 1 / 256
 
 
-def analyse(
-    model: UniaxialModel,
-    law: HypoelasticLaw,
-    shells: ShellMesh,
-    element: str,
-    folder: Path | None,
-    run: Run,
-) -> History:
+def analyse(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
     """History of a strip, at the model's elongations of the gauge.
 
     CalculiX drives the grips, see `pulls`.
@@ -47,24 +37,21 @@ def analyse(
     ------
     SolverFailure : a run that did not end well, a gauge that did not reach its length.
     """
+    shells = setup.shells(model.mesh)
 
     def decks(pulls: Array) -> dict[str, str]:
-        return strip_decks(model, law, shells, element, pulls, folder)
+        return strip_decks(model, law, shells, setup.element, pulls, setup.templates)
 
-    pulls = direct(model)
-    if pulls is None:
-        pulls = as_the_membrane(model, law)
-    if pulls is None:
-        even = evenly(model)
-        first = run(decks(even), lambda frd, _: strip_run(frd, model, shells, len(even)))
-        pulls = corrected(model, even, first.gauge, "calculix")
+    def opened(pulls: Array) -> Array:
+        return run(decks(pulls), lambda frd, _: strip_run(frd, model, shells, len(pulls))).gauge
+
+    pulls, _ = grip_pulls(model, law, opened, "calculix")
     count = len(pulls)
 
     def read(frd: Path, iterations: int) -> History:
         return strip_history(strip_run(frd, model, shells, count), model, shells, iterations)
 
-    history: History = run(decks(pulls), read)
-    return history
+    return run(decks(pulls), read)
 
 
 def strip_decks(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.cylinder import CylinderModel
-from ..calculix.rigid import RigidBody, collar_body, support_body
+from ..rigid import RigidBody, collar_body, support_body
 
 Array = NDArray[np.float64]
 

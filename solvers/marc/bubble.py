@@ -6,12 +6,26 @@ import numpy as np
 
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
+from ..base import History
+from .analysis import Run
 from .deck import deck_text, law_context, schedule, supports, time_table
 from .fabric import fabric_context, node_sets
+from .results import bubble_history
 from .settings import MarcSettings
 
 TEMPLATE = "bubble.dat.j2"
 WARP = np.array([1.0, 0.0, 0.0])
+
+
+def analyse(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
+    """History of the inflation of a bubble.
+
+    Raises
+    ------
+    SolverFailure : a run that did not end well. InputError : as `bubble_deck`.
+    """
+    deck, count = bubble_deck(model, law, settings), len(model.increments)
+    return run(deck, count, lambda t19, iterations: bubble_history(t19, model, iterations))
 
 
 def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings) -> str:

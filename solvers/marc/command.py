@@ -13,7 +13,10 @@ from pathlib import Path
 from ...errors import InputError, SolverFailure
 from .settings import VARIABLE, MarcSettings
 
-ADVICE = f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; see docs/marc.md"
+ADVICE = (
+    f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; "
+    "see docs/how-to/marc.md"
+)
 SECONDS = 60.0
 
 

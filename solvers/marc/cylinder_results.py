@@ -66,9 +66,11 @@ def cylinder_history(
         raise SolverFailure(f"no usable results: {problem}", "marc")
     u = displacements([found[time] for time in times])
     forces, remarks = _forces(model, [found[time] for time in times])
+    early = ""
     if len(times) < len(wanted):
         last = wanted[times[-1]]
-        remarks.append(f"the run stopped early; the last increment is at {last:g} mm of deflection")
+        early = f"the run stopped early; the last increment is at {last:g} mm of deflection"
+        remarks.append(early)
     mesh = model.mesh
     volume = model.copies * np.array([enclosed_volume(mesh.points + one, mesh.quads) for one in u])
     full = float(volume[0])
@@ -84,6 +86,7 @@ def cylinder_history(
         iterations=iterations,
         path=u,
         remarks=tuple(remarks),
+        early=early,
     )
 
 
@@ -112,11 +115,13 @@ def _forces(
         # Along x and z the forces of a quarter cancel against those of the others. The inflated
         # cylinder has not touched the bodies yet.
         found[body][1:, 1] = [model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]]
-    remarks = [f"the collar's force is the sum of {name!r}, which is not confirmed (docs/marc.md)"]
+    remarks = [
+        f"the collar's force is the sum of {name!r}, which is not confirmed (docs/how-to/marc.md)"
+    ]
     collar, supports = found["collar"][-1, 1], found["supports"][-1, 1]
     if abs(collar + supports) > UNBALANCED * abs(collar):
         remarks.append(
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
-            "see run 5 in docs/marc.md"
+            "see run 5 in docs/how-to/marc.md"
         )
     return found, remarks

@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...errors import SolverFailure
+from ..base import Progress
 from ..process import Watch, run_process
 from ..scratch import remove, run_folder
+from .analysis import Reader
 from .command import find_marc, run_command
 from .deck import JOB
 from .reasons import Ending, ending
 from .settings import MarcSettings
-from .sts import Increment, increments
+from .sts import increments
 
 log = logging.getLogger(__name__)
 
@@ -24,9 +26,7 @@ NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
 #: What Marc writes and is read, and what is added to the name of a file that is too old to be.
 WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
 T = TypeVar("T")
-#: Makes something of the .t19 file and the number of iterations.
-Reader = Callable[[Path, int], T]
-Tell = Callable[[Increment], None]
+Tell = Callable[[Progress], None]
 
 
 class NoLicence(SolverFailure):
@@ -117,7 +117,7 @@ def _in(
     log.info("stopped early: %s", end.problem)
     kind = NoLicence if end.licence else SolverFailure
     try:
-        if rescue is not None and not end.licence:
+        if rescue is not None and end.collapse:
             return rescue(results, end.iterations), end
     except SolverFailure as failure:
         # Why it stopped says more than what its results then lack.

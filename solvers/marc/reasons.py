@@ -9,10 +9,10 @@ from pathlib import Path
 from ..process import Outcome, log_tail
 from .sts import exit_number, increments, repeated
 
-NORMAL = 3004
+NORMAL, NO_SMALLER = 3004, 3015
 #: Exit numbers that public sources explain; others are reported as they are.
 MEANINGS = {
-    3015: "the time step could not get smaller: no convergence",
+    NO_SMALLER: "the time step could not get smaller: no convergence",
     3: "run_marc could not compile or link the user subroutine",
 }
 #: Total time that may be missing at the end: the .sts has few digits.
@@ -40,6 +40,16 @@ class Ending:
     licence: bool
     iterations: int
     repeated: int
+
+    @property
+    def collapse(self) -> bool:
+        """Whether Marc itself gave up, its time step as small as it may be.
+
+        What it wrote until then is a result that ends early; after any other bad end (killed, out
+        of time, an element inside out) there is none.
+        """
+        said = self.problem is not None and self.problem.startswith(MEANINGS[NO_SMALLER])
+        return self.number == NO_SMALLER and said
 
 
 def ending(

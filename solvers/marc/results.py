@@ -23,7 +23,8 @@ MOVED, REACTION = "Displacement", "Reaction Force"
 #: Six digits: times of some hundreds are good to this, nodes to this part of the mesh's size.
 NEAR_TIME, NEAR_PLACE = 1e-2, 1e-5
 NO_REACTIONS = (
-    f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own (docs/marc.md)"
+    f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
+    "(docs/how-to/marc.md)"
 )
 
 

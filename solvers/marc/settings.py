@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
-from ...projects.schema_errors import first_error
+from ...section_errors import first_error
+from ..offer import Offer
+from ..settings import Override, SolverSettings
 
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
@@ -29,8 +31,6 @@ BLOCKS = (
     "pressure",
     "stepping",
 )
-#: Keys whose values are paths, relative to the file that they are in.
-PATHS = ("scratch", "templates")
 
 Seconds = Annotated[float, Field(gt=0, le=1e9)]
 Count = Annotated[int, Field(ge=1, le=1024)]
@@ -38,8 +38,8 @@ Count = Annotated[int, Field(ge=1, le=1024)]
 Word = Annotated[str, Field(pattern=r"^[^\s\x00]+$")]
 
 
-class MarcSettings(BaseModel):
-    """Every setting, with its default.
+class MarcSettings(SolverSettings):
+    """Every setting of MSC Marc, with its default.
 
     executable : `run_marc`, by path or by name. version : of Marc, for the record.
     options : names of run_marc's options, "current" (-j, -nte, -nts) or "older" (-jid, -nprocd).
@@ -59,14 +59,28 @@ class MarcSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
+    paths = ("scratch", "templates")
+    # A bare name may also be in a folder that `modules` put on the PATH.
+    programs = ("executable",)
+    overrides = (
+        Override(
+            "marc",
+            "The Marc to run: run_marc, or a site's .toml.",
+            metavar="PATH",
+            look="The Marc (run_marc, or a site's .toml) to look at.",
+        ),
+        Override("templates", "Folder of your own input decks.", metavar="PATH", path=True),
+        Override("element", "Shell element", "139, 75 or 18"),
+    )
+
     executable: str = "run_marc"
     version: str = ""
     options: Literal["current", "older"] = "current"
     processors: Count = 1
     threads: Count = 1
-    arguments: list[Word] = []
-    environment: dict[Word, str] = {}
-    modules: list[Word] = []
+    arguments: list[Word] = Field(default_factory=list)
+    environment: dict[Word, str] = Field(default_factory=dict)
+    modules: list[Word] = Field(default_factory=list)
     law: Literal["nlelast", "hypela2"] = "nlelast"
     own_state: bool = True
     symmetric: bool = True
@@ -74,7 +88,7 @@ class MarcSettings(BaseModel):
     increments: Annotated[int, Field(ge=0, le=1_000_000)] = 100
     pressure_type: Annotated[int, Field(ge=0, le=1000)] = 2
     pressure_sign: Literal[1, -1] = -1
-    include: dict[str, str] = {}
+    include: dict[str, str] = Field(default_factory=dict)
     templates: str | None = None
     timeout: Seconds = 3600.0
     licence_wait: Annotated[float, Field(ge=0, le=1e9)] = 0.0
@@ -86,15 +100,13 @@ class MarcSettings(BaseModel):
         """What was given, None for the rest; paths from `folder` (of the file it was in)."""
         values: dict[str, Any] = dict.fromkeys(type(self).model_fields)
         values |= self.model_dump(include=self.model_fields_set)
-        for name in PATHS:
-            if values[name] is not None:
+        for name in (*self.paths, *self.programs):
+            if values[name] is not None and (name in self.paths or os.sep in values[name]):
                 values[name] = str(_beside(folder, values[name]))
-        # A bare name is a program on the PATH, or in a folder that `modules` put there.
-        if values["executable"] is not None and os.sep in values["executable"]:
-            values["executable"] = str(_beside(folder, values["executable"]))
         if values["include"] is not None:
             values["include"] = {k: str(_beside(folder, v)) for k, v in values["include"].items()}
-        return values
+        # The file that --marc names is beneath all this.
+        return {"marc": None, **values}
 
 
 def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
@@ -173,3 +185,6 @@ def _check_files(settings: MarcSettings) -> None:
 def _beside(folder: Path, given: str) -> Path:
     # Absolute: runs happen in a scratch folder.
     return (folder / os.path.expanduser(given)).absolute()
+
+
+OFFER = Offer("marc", __package__, "MarcSolver", MarcSettings)

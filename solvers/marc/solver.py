@@ -13,25 +13,27 @@ from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
-from ..base import History, SolverCheck
-from ..pulls import as_the_membrane, corrected, direct, evenly
-from .bubble import bubble_deck
+from ..analyses import analysis_of
+from ..base import History, Progress, SolverCheck
+from ..identity import file_mark, in_words, templates_mark
+from . import bubble, cylinder_analysis, strip
+from .analysis import Reader, Run
 from .command import find_marc
-from .cylinder import APPROACH, bending_deck, inflation_deck
-from .cylinder_results import cylinder_history, inflated
-from .job import Job, Reader, run_job
-from .results import bubble_history, opened, strip_history
+from .job import Job, run_job
 from .settings import MarcSettings, marc_settings
-from .strip import strip_deck
-from .sts import Increment
 
-#: Settings that change what the deck or the subroutine says.
-DECK_SETTINGS = (
+#: Settings that change what the deck or the subroutine says, or what Marc makes of them.
+MATTERING = (
     "law", "element", "increments", "pressure_type", "pressure_sign", "own_state", "symmetric",
-    "templates",
+    "arguments",
 )  # fmt: skip
-Model = BubbleModel | UniaxialModel | CylinderModel
 T = TypeVar("T")
+#: What is done with each model.
+ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
+    BubbleModel: bubble.analyse,
+    UniaxialModel: strip.analyse,
+    CylinderModel: cylinder_analysis.analyse,
+}
 
 
 class MarcSolver:
@@ -55,7 +57,7 @@ class MarcSolver:
     def __init__(
         self,
         marc: Path | str | None = None,
-        progress: Callable[[Increment], None] | None = None,
+        progress: Callable[[Progress], None] | None = None,
         **settings: Any,
     ) -> None:
         self.settings: MarcSettings = marc_settings(settings, None if marc is None else str(marc))
@@ -63,14 +65,23 @@ class MarcSolver:
 
     @property
     def identity(self) -> str:
-        """All that changes a result: the settings of the deck, and the site's own blocks."""
-        return repr([
-            *(getattr(self.settings, name) for name in DECK_SETTINGS),
-            *((name, Path(file).read_bytes()) for name, file in self.settings.include.items()),
-        ])  # fmt: skip
+        """The settings of the deck; the site's templates and blocks by what is in them."""
+        settings = self.settings
+        return in_words(
+            self.name,
+            settings.version,
+            **{name: getattr(settings, name) for name in MATTERING},
+            include={name: file_mark(Path(file)) for name, file in settings.include.items()},
+            templates=templates_mark(
+                None if settings.templates is None else Path(settings.templates)
+            ),
+        )
 
     def check(self) -> SolverCheck:
-        """Whether there is a run_marc. That it carries the law, `doctor` and docs/marc.md show."""
+        """Whether there is a run_marc.
+
+        That it carries the law, `doctor` and docs/how-to/marc.md show.
+        """
         try:
             find_marc(self.settings)
         except SolverFailure as failure:
@@ -79,7 +90,7 @@ class MarcSolver:
 
     def run(
         self,
-        model: Model,
+        model: Any,
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
@@ -107,55 +118,12 @@ class MarcSolver:
             early = early or end.problem or ""
             return found
 
-        if isinstance(model, BubbleModel):
-            deck = bubble_deck(model, law, self.settings)
-            history = once(
-                deck, len(model.increments), lambda t19, n: bubble_history(t19, model, n)
-            )
-        elif isinstance(model, UniaxialModel):
-            history = self._strip(model, law, once)
-        else:
-            history = self._cylinder(model, law, once)
+        history = analysis_of(ANALYSES, model, self.name)(model, law, settings, once)
         remarks = [*history.remarks, *([early] if early else [])]
         if repeats:
             remarks.append(f"{repeats} increments were repeated after they did not converge")
-        return replace(history, remarks=tuple(remarks))
-
-    def _strip(
-        self, model: UniaxialModel, law: HypoelasticLaw, once: Callable[..., Any]
-    ) -> History:
-        """A strip, its grips driven as `pulls` tells."""
-        driven = direct(model)
-        pulls = driven if driven is not None else as_the_membrane(model, law)
-        if pulls is None:
-            even = evenly(model)
-            deck = strip_deck(model, law, self.settings, even)
-            gauge = once(deck, len(even), lambda t19, _: opened(t19, model, len(even)))
-            pulls = corrected(model, even, gauge, self.name)
-        count = len(pulls)
-
-        def read(t19: Path, iterations: int) -> History:
-            return strip_history(t19, model, count, driven is not None, iterations)
-
-        history: History = once(strip_deck(model, law, self.settings, pulls), count, read)
-        return history
-
-    def _cylinder(
-        self, model: CylinderModel, law: HypoelasticLaw, once: Callable[..., Any]
-    ) -> History:
-        """Inflation alone, to know where collar and supports touch; then all, up to a collapse."""
-        shape = once(
-            inflation_deck(model, law, self.settings),
-            len(model.inflation),
-            lambda t19, _: inflated(t19, model),
-        )
-        history: History = once(
-            bending_deck(model, law, self.settings, shape),
-            len(model.inflation) + APPROACH + len(model.increments),
-            lambda t19, n: cylinder_history(t19, model, n),
-            lambda t19, n: cylinder_history(t19, model, n, ended=False),
-        )
-        return history
+        why = f"{history.early}: {early}" if history.early and early else history.early
+        return replace(history, remarks=tuple(remarks), early=why)
 
     def _subroutine(self, law: HypoelasticLaw) -> str | None:
         """HYPELA2 with the law's constants, where it is the way that was chosen."""

@@ -7,14 +7,36 @@ from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
+from ..base import History
+from ..pulls import grip_pulls
+from .analysis import Run
 from .deck import MEMBRANE, deck_text, fixed, law_context, schedule, supports, time_table
 from .fabric import fabric_context, named_set, node_sets
+from .results import opened, strip_history
 from .settings import MarcSettings
 
 Array = NDArray[np.float64]
 
 TEMPLATE = "uniaxial.dat.j2"
 FLAT = "all_nodes"
+
+
+def analyse(model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
+    """History of a strip, its grips driven as `pulls` tells.
+
+    Raises
+    ------
+    SolverFailure : a run that did not end well, a gauge that did not reach its length.
+    InputError : as `strip_deck`.
+    """
+
+    def gauge(pulls: Array) -> Array:
+        deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+        return run(deck, count, lambda t19, _: opened(t19, model, count))
+
+    pulls, driven = grip_pulls(model, law, gauge, "marc")
+    deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+    return run(deck, count, lambda t19, n: strip_history(t19, model, count, driven, n))
 
 
 def strip_deck(

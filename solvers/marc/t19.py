@@ -3,7 +3,7 @@
 Blocks between `=beg=NNNNN (name)` and `=end=`; fields of 13 columns, six a line, each record on
 lines of its own; the model first, then an increment between `****` and `----`, again and again,
 and `++++` at the end. A file that does not hold what its blocks announce, or stops before its end
-mark, is refused: a job that was killed leaves such a file. Layout: docs/marc-deck.md.
+mark, is refused: a job that was killed leaves such a file. Layout: docs/reference/marc-deck.md.
 """
 
 from __future__ import annotations

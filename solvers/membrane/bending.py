@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,11 @@ from ...models.inflated import InflatedModel, RigidCylinder
 from ..base import History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
+from .march import Asked, Loading, NoEquilibrium, march, straight_on
 from .settling import settled
 
 Array = NDArray[np.float64]
 
-MOST_CUTS = 3
 #: A node further from where the last increments led to than this many times the collar's way.
 SNAP = 4.0
 #: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
@@ -30,6 +31,7 @@ def analyse(
     pressure: float,
     extremes: tuple[Array, Array],
     sides: NDArray[np.bool_],
+    asked: Asked,
 ) -> History:
     """Frames of the bending: first the inflated state, then one for every reported displacement.
 
@@ -61,32 +63,33 @@ def analyse(
     wrinkle = membrane.wrinkle.copy()
     gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
     snaps: list[float] = []
+    early = ""
     wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
-    for wanted in plan.displacements:
-        start = path[-1]
-        if len(path) > 2:
-            ahead = (wanted - moves[-1]) / (moves[-1] - moves[-2])
-            start = start + ahead * (path[-1] - path[-2])
-        found = _reach(membrane, bodies, moves[-1], path[-1], wanted, start, MOST_CUTS)
-        if found is None:
-            between = f"between {moves[-1]:.4g} and {wanted:.4g} mm of deflection"
-            remarks.append(f"the run stopped early: no equilibrium {between}")
-            break
-        if len(path) > 2 and np.abs(found - start).max() > SNAP * (wanted - moves[-1]):
-            snaps.append(wanted)
-        work = membrane.wrinkle_work(wrinkle)
-        wrinkle = membrane.wrinkle.copy()
-        membrane.accept()
-        path.append(found)
-        moves.append(wanted)
-        gas.append((membrane.pressure, membrane.volume))
-        pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
-        wrinkled.append(membrane.wrinkled_share(sides))
-        of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
-        now = membrane.reference + found
-        deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
-        np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
-        np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
+    moving = Moving(membrane, bodies)
+    # What has no equilibrium on the way ends the history, and is no failure.
+    try:
+        steps = march(moving, plan.displacements, asked, (0.0, inflated), len(model.pressures))
+        for wanted, found in zip(plan.displacements, steps, strict=True):
+            if len(path) > 2 and np.abs(found - moving.expected).max() > SNAP * (
+                wanted - moves[-1]
+            ):
+                snaps.append(wanted)
+            work = membrane.wrinkle_work(wrinkle)
+            wrinkle = membrane.wrinkle.copy()
+            membrane.accept()
+            path.append(found)
+            moves.append(wanted)
+            gas.append((membrane.pressure, membrane.volume))
+            pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
+            wrinkled.append(membrane.wrinkled_share(sides))
+            of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
+            now = membrane.reference + found
+            deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
+            np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
+            np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
+    except NoEquilibrium as failure:
+        early = f"the run stopped early: {failure.reason}"
+        remarks.append(early)
     frames = [0]
     for i in range(len(plan.displacements)) if plan.reported is None else plan.reported:
         if i + 1 < len(path):
@@ -121,21 +124,34 @@ def analyse(
         path=np.array(path),
         wrinkled=np.array(wrinkled)[frames],
         remarks=tuple(remarks),
+        early=early,
     )
 
 
-def _reach(membrane, bodies, before, u_before, wanted, start, cuts):  # type: ignore[no-untyped-def]
-    """Equilibrium with the collar at `wanted`, through halved ways from `before`."""
-    membrane.bodies = bodies(wanted)
-    found = membrane.equilibrium(start, membrane.pressure)
-    if found is None:
+class Moving(Loading):
+    """A membrane that a collar is moved into, by its way (mm).
+
+    expected : where the last increments led to.
+    """
+
+    most_cuts = 3
+
+    def __init__(
+        self, membrane: ClosedMembrane, bodies: Callable[[float], tuple[RigidCylinder, ...]]
+    ) -> None:
+        self.membrane, self.bodies = membrane, bodies
+        self.expected = np.zeros_like(membrane.reference)
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        self.membrane.bodies = self.bodies(level)
+        found = self.membrane.equilibrium(start, self.membrane.pressure)
         # Wrinkles that come and go leave Newton's iteration nowhere to go; so does a limit load.
-        found = settled(membrane, start)
-    if found is not None or cuts == 0:
-        return found
-    middle = 0.5 * (before + wanted)
-    halfway = _reach(membrane, bodies, before, u_before, middle, u_before, cuts - 1)
-    if halfway is None:
-        return None
-    onward = 2.0 * halfway - u_before
-    return _reach(membrane, bodies, middle, halfway, wanted, onward, cuts - 1)
+        return found if found is not None else settled(self.membrane, start)
+
+    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        # The way from the inflated state to the first contact says nothing of what follows.
+        self.expected = straight_on(levels, path, level) if len(path) > 2 else path[-1]
+        return self.expected
+
+    def problem(self, before: float, level: float, place: str) -> str:
+        return f"no equilibrium between {before:.4g} and {level:.4g} mm of deflection"

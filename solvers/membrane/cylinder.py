@@ -3,9 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...materials.law import HypoelasticLaw
 from ...models.cylinder import CylinderModel
 from ...models.inflated import Bending, InflatedModel, RigidCylinder
+from ..base import History
+from . import closed_model, inflated
+from .closed import ClosedMembrane
+from .march import Asked
+from .wall import Wall
+
+Array = NDArray[np.float64]
+
+
+def prepare(
+    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall
+) -> ClosedMembrane:
+    """What does not change from one law to the next."""
+    return closed_model.prepare(closed_membrane_of(model), law, tolerance, wall)
+
+
+def analyse(membrane: ClosedMembrane, model: CylinderModel, asked: Asked) -> tuple[History, Array]:
+    """As `inflated.analyse`."""
+    return inflated.analyse(membrane, closed_membrane_of(model), asked)
 
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:

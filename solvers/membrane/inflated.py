@@ -14,23 +14,17 @@ from ..base import History
 from . import bending
 from .closed import ClosedMembrane
 from .closed_model import closed_membrane
+from .march import Asked, Loading, Record, halved, march, straight_on
 from .newton import initial_moduli
 from .snap import through_snap
 
 Array = NDArray[np.float64]
 
-MOST_CUTS = 8
 #: An increment in which the volume grows by a larger share is gone through by volume.
 MOST_GROWTH = 0.1
 
 
-def analyse(
-    membrane: ClosedMembrane,
-    model: InflatedModel,
-    parameters: Sequence[str],
-    pressure_offset: float,
-    guess: Array | None,
-) -> tuple[History, Array]:
+def analyse(membrane: ClosedMembrane, model: InflatedModel, asked: Asked) -> tuple[History, Array]:
     """History of the inflation, or of the bending where the model has one; no derivatives yet.
 
     The membrane is fresh: no strain, no stress.
@@ -40,29 +34,23 @@ def analyse(
     InputError : derivatives, an offset of the pressure or a guess was asked for.
     SolverFailure : an increment of the pressure has no equilibrium.
     """
-    if parameters or pressure_offset or guess is not None:
+    if asked.parameters or asked.pressure_offset or asked.guess is not None:
         raise InputError(
             None, "parameters", "a closed membrane takes no parameters, pressure offset or guess"
         )
-    levels, shape = np.array(model.pressures), membrane.reference.shape
-    path, forces = (np.zeros((len(levels), *shape)) for _ in range(2))
+    levels = np.array(model.pressures)
     volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
-    low, high = np.zeros(3), np.zeros(3)
-    remarks: list[str] = []
-    sides = outside_caps(model)
+    sides, filling = outside_caps(model), Filling(membrane)
+    record = Record(membrane, len(levels))
     membrane.keep_tangent = False
-    for i in range(len(levels)):
-        path[i], snapped = _increment(membrane, path[:i], levels, i)
-        if snapped:
-            remarks.append(
-                f"snaps, or nearly, between {levels[i - 1] * 1e3:.4g} and "
-                f"{levels[i] * 1e3:.4g} kPa: passed by leading the volume"
-            )
-        membrane.accept()
-        forces[i], volume[i] = membrane.residual.reshape(shape), membrane.volume
-        wrinkled[i] = membrane.wrinkled_share(sides)
-        np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
-        np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
+    for i, u in enumerate(march(filling, levels, asked)):
+        record.accept(i, u)
+        volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
+    remarks = tuple(
+        f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
+        "leading the volume"
+        for before, level in filling.snaps
+    )
     if model.bending is not None:
         bent = closed_membrane(
             model, membrane.law, membrane.tolerance, model.fixed(bent=True),
@@ -71,24 +59,27 @@ def analyse(
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
         bent.iterations = membrane.iterations
-        history = bending.analyse(bent, model, path[-1], float(levels[-1]), (low, high), sides)
+        extremes = (record.low, record.high)
+        start = (record.path[-1], float(levels[-1]))
+        history = bending.analyse(bent, model, *start, extremes, sides, asked)
         history = replace(history, remarks=(*remarks, *history.remarks))
     else:
         reactions = {
-            name: forces[:, model.mesh.node_sets[name]].sum(axis=1) for name in model.supports
+            name: record.forces[:, model.mesh.node_sets[name]].sum(axis=1)
+            for name in model.supports
         }
         history = History(
             levels,
-            path,
-            low,
-            high,
+            record.path,
+            record.low,
+            record.high,
             reactions,
             cavity_pressure=levels,
             cavity_volume=model.copies * volume,
             iterations=membrane.iterations,
-            path=path,
+            path=record.path,
             wrinkled=wrinkled,
-            remarks=tuple(remarks),
+            remarks=remarks,
         )
     return history, np.zeros((*history.displacement.shape, 0))
 
@@ -100,57 +91,65 @@ def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
     return sides
 
 
-def _increment(membrane: ClosedMembrane, path: Array, levels: Array, i: int) -> tuple[Array, bool]:
-    """Displacement at level i, and whether the membrane snaps on the way."""
-    level = float(levels[i])
-    if i == 0:
-        return _from_slack(membrane, level, MOST_CUTS), False
-    before = float(levels[i - 1])
-    start = path[-1]
-    if i > 1:
-        start = start + (level - before) / (before - levels[i - 2]) * (path[-1] - path[-2])
-    found = _reach(membrane, before, path[-1], level, start, MOST_CUTS)
-    if found is not None:
-        now, then = (membrane.cavity.measure(membrane.reference + u)[0] for u in (found, path[-1]))
-        if now < (1.0 + MOST_GROWTH) * then:
-            return found, False
-        # Newton may leap over a limit point, but the law needs the strain path on the way.
-    found = through_snap(membrane, path[-1], before, level)
-    if found is None:
-        raise SolverFailure(
-            f"no equilibrium at {level * 1e3:.4g} kPa (increment {i + 1} of {len(levels)}); "
-            "more increments usually help, unless the membrane has a limit pressure below this one"
+class Filling(Loading):
+    """A closed membrane under a pressure (MPa).
+
+    snaps : the pressures between which it snaps, as they are met.
+    """
+
+    most_cuts = 8
+
+    def __init__(self, membrane: ClosedMembrane) -> None:
+        self.membrane = membrane
+        self.snaps: list[tuple[float, float]] = []
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        return self.membrane.equilibrium(start, level)
+
+    def first(self, level: float) -> Array:
+        return self._from_slack(level, self.most_cuts)
+
+    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        return straight_on(levels, path, level)
+
+    def reached(
+        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    ) -> Array | None:
+        found = self._directly(lower, u, level, start, cuts)
+        if found is not None:
+            cavity, reference = self.membrane.cavity, self.membrane.reference
+            now, then = (cavity.measure(reference + at)[0] for at in (found, u))
+            if now < (1.0 + MOST_GROWTH) * then:
+                return found
+            # Newton may leap over a limit point, but the law needs the strain path on the way.
+        self.snaps.append((lower, level))
+        return through_snap(self.membrane, u, lower, level)
+
+    def problem(self, before: float, level: float, place: str) -> str:
+        return (
+            f"no equilibrium at {level * 1e3:.4g} kPa ({place}); more increments usually help, "
+            "unless the membrane has a limit pressure below this one"
         )
-    return found, True
 
+    def _directly(
+        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    ) -> Array | None:
+        found = self.equilibrium(start, level)
+        if found is None and cuts == self.most_cuts:
+            # Folds of a cap come and go: what helps against slack helps here before smaller steps.
+            found = self.membrane.equilibrium_from_slack(u, level)
+        return found if found is not None else halved(self, lower, u, level, cuts)
 
-def _from_slack(membrane: ClosedMembrane, level: float, cuts: int) -> Array:
-    """First increment: facets carry no pressure until they are stretched."""
-    initial_moduli(membrane.law)
-    found = membrane.equilibrium_from_slack(np.zeros_like(membrane.reference), level)
-    if found is not None:
-        return found
-    if cuts > 0:
-        lower = _from_slack(membrane, 0.25 * level, cuts - 1)
-        found = _reach(membrane, 0.25 * level, lower, level, lower, cuts)
+    def _from_slack(self, level: float, cuts: int) -> Array:
+        """Facets carry no pressure until they are stretched."""
+        initial_moduli(self.membrane.law)
+        none = np.zeros_like(self.membrane.reference)
+        found = self.membrane.equilibrium_from_slack(none, level)
         if found is not None:
             return found
-    raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
-
-
-def _reach(
-    membrane: ClosedMembrane, lower: float, u_lower: Array, level: float, start: Array, cuts: int
-) -> Array | None:
-    """Equilibrium at `level`, through halved steps from `lower`; strain history as for bubbles."""
-    found = membrane.equilibrium(start, level)
-    if found is None and lower > 0 and cuts == MOST_CUTS:
-        # Folds of a cap come and go: what helps against slack helps here before smaller steps do.
-        found = membrane.equilibrium_from_slack(u_lower, level)
-    if found is not None or cuts == 0:
-        return found
-    middle = 0.5 * (lower + level)
-    u_middle = _reach(membrane, lower, u_lower, middle, u_lower, cuts - 1)
-    if u_middle is None:
-        return None
-    onward = 2.0 * u_middle - u_lower
-    return _reach(membrane, middle, u_middle, level, onward, cuts - 1)
+        if cuts > 0:
+            lower = self._from_slack(0.25 * level, cuts - 1)
+            found = self._directly(0.25 * level, lower, level, lower, cuts)
+            if found is not None:
+                return found
+        raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")

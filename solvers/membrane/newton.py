@@ -25,8 +25,8 @@ CHORD_GAIN = 0.15
 # rounding (fine meshes at low pressure reach 1e-8): the iterate is as good as it gets.
 ROUNDING_BELOW = 1e-6
 MOST_IDLE = 3
-# The tangent of a tri-linear law jumps where a point passes a break, and full steps can go to and
-# fro between two sides for ever. After this many without progress every step has to make some.
+# Where a modulus jumps (a tri-linear one at a break) so does the tangent, and full steps can go to
+# and fro between two sides for ever. After this many without progress every step has to make some.
 MOST_FRUITLESS = 3
 
 
@@ -76,7 +76,7 @@ class Membrane:
         law, e = self.law, self.elements
         force = assemble(
             self.reference + u, self.quads, e.values, e.slopes, e.area, self.section, pressure,
-            law.beta, law.nu12, law.limits, law.area_power, self.strain_old,
+            law.pieces, law.nu12, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
             -1.0 if self.wrinkle_stiffness is None else self.wrinkle_stiffness, self.wrinkle,
@@ -117,7 +117,7 @@ class Membrane:
         step = before = np.empty(0)
         last, scale, backtracks, chord = np.inf, 1.0, 0, False
         least, idle = np.inf, 0
-        jumps, fruitless = self.law.breaks is not None, 0
+        jumps, fruitless = self.law.jumps, 0
         for _ in range(MOST_ITERATIONS):
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             if norm < self.tolerance:

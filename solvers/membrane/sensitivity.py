@@ -28,42 +28,33 @@ from ...materials.point_law import (
     SLOPES,
     membrane_stress,
 )
-from ...materials.point_moduli import by_coefficients
+from ...materials.point_moduli import by_pieces
 from .kernel import base_vectors, metric
 
-#: Column numbers of solvers.base.PARAMETERS.
-NU12, PRESSURE_OFFSET = 12, 13
 #: What `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), law tangent (9).
 POINT = 24
 
 
 @compiled(fastmath=FAST)
 def explicit(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, beta, nu, limits, power,
-    h_old, s_old, which, dh_old, ds_old, ds_new, point, rate,
+    position, quads, values, slopes, area, thickness, pieces, nu, power,
+    h_old, s_old, rows, by_nu, push, dh_old, ds_old, ds_new, point, rate,
 ):  # fmt: skip
     """Derivative of the residual at fixed displacement.
 
-    which (np,) parameter numbers; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of
-    the increment; writes ds_new (same shape; the part at fixed displacement), point
-    (elements, 4, POINT) and rate (3 n, np).
+    rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_nu (np,) that
+    of Poisson's ratio, push the number of the parameter that is a pressure, or -1; dh_old, ds_old
+    (elements, 4, 3, np) derivatives at the start of the increment; writes ds_new (same shape; the
+    part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
     """
-    count = len(which)
+    count = len(by_nu)
     rate[:] = 0.0
     h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
-    row, steep = np.empty(12), np.empty(SLOPES)
+    weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))
     x, f = np.empty((4, 3)), np.empty((2, 3))
-    # Explicit derivatives of (E1, E2, G12) by each parameter; only these entries ever change.
-    own = np.zeros((3, count))
-    by_nu = np.zeros(count)
-    push = -1
-    for j in range(count):
-        if which[j] == NU12:
-            by_nu[j] = 1.0
-        elif which[j] == PRESSURE_OFFSET:
-            push = j
+    own = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
     t0, t1, t2 = np.empty(count), np.empty(count), np.empty(count)
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
@@ -76,13 +67,20 @@ def explicit(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, beta, nu, limits, power, h_old[e, g], s_old[e, g], h, s_new,
+                m, q, c, pieces, nu, power, h_old[e, g], s_old[e, g], h, s_new,
                 pk2, stiff, p, law, steep, pull, work,
             )  # fmt: skip
-            by_coefficients(limits, h, h_old[e, g], row)
-            for j in range(count):
-                if which[j] < 12:
-                    own[2 - which[j] // 4, j] = row[which[j]]
+            for i in range(3):
+                first, stop = by_pieces(pieces, i, h[i], h_old[e, g, i], weights)
+                row = own[i]
+                row[:] = 0.0
+                for k in range(first, stop):
+                    w0, w1, w2, w3 = weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3]
+                    third, second, first_power, constant = rows[i, k]
+                    for j in range(count):
+                        row[j] += (
+                            w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
+                        )
             dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
             wt = area[e, g] * thickness[e]
             for i in range(3):
@@ -121,11 +119,11 @@ def explicit(  # type: ignore[no-untyped-def]
                     local[3 * n, push] -= share * nx
                     local[3 * n + 1, push] -= share * ny
                     local[3 * n + 2, push] -= share * nz
-            kept = point[e, g]
+            record = point[e, g]
             for k in range(3):
-                kept[k], kept[3 + k] = f[0, k], f[1, k]
+                record[k], record[3 + k] = f[0, k], f[1, k]
                 for i in range(3):
-                    kept[6 + 3 * i + k], kept[15 + 3 * i + k] = p[i, k], law[i, k]
+                    record[6 + 3 * i + k], record[15 + 3 * i + k] = p[i, k], law[i, k]
         for n in range(4):
             for k in range(3):
                 for j in range(count):
@@ -139,15 +137,15 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
     e0, e1, e2 = np.empty(count), np.empty(count), np.empty(count)
     for e in range(quads.shape[0]):
         for g in range(4):
-            kept, dn = point[e, g], slopes[e, g]
+            record, dn = point[e, g], slopes[e, g]
             e0[:] = 0.0
             e1[:] = 0.0
             e2[:] = 0.0
             for n in range(4):
                 for k in range(3):
-                    b0 = dn[0, n] * kept[k]
-                    b1 = dn[1, n] * kept[3 + k]
-                    b2 = dn[0, n] * kept[3 + k] + dn[1, n] * kept[k]
+                    b0 = dn[0, n] * record[k]
+                    b1 = dn[1, n] * record[3 + k]
+                    b2 = dn[0, n] * record[3 + k] + dn[1, n] * record[k]
                     row = du[3 * quads[e, n] + k]
                     for j in range(count):
                         e0[j] += b0 * row[j]
@@ -155,10 +153,10 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                         e2[j] += b2 * row[j]
             strain, stress = dh[e, g], ds[e, g]
             for j in range(count):
-                a0 = kept[6] * e0[j] + kept[7] * e1[j] + kept[8] * e2[j]
-                a1 = kept[9] * e0[j] + kept[10] * e1[j] + kept[11] * e2[j]
-                a2 = kept[12] * e0[j] + kept[13] * e1[j] + kept[14] * e2[j]
+                a0 = record[6] * e0[j] + record[7] * e1[j] + record[8] * e2[j]
+                a1 = record[9] * e0[j] + record[10] * e1[j] + record[11] * e2[j]
+                a2 = record[12] * e0[j] + record[13] * e1[j] + record[14] * e2[j]
                 strain[0, j], strain[1, j], strain[2, j] = a0, a1, a2
-                stress[0, j] += kept[15] * a0 + kept[16] * a1 + kept[17] * a2
-                stress[1, j] += kept[18] * a0 + kept[19] * a1 + kept[20] * a2
-                stress[2, j] += kept[21] * a0 + kept[22] * a1 + kept[23] * a2
+                stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
+                stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
+                stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2

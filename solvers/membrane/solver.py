@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,31 @@ from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
-from ..base import PARAMETERS, History, SolverCheck
-from . import bubble, closed_model, inflated, strip
-from .closed import ClosedMembrane
-from .cylinder import closed_membrane_of
+from ..analyses import analysis_of
+from ..base import History, Progress, SolverCheck, parameters_of
+from ..identity import in_words
+from . import bubble, closed_model, cylinder, inflated, strip
+from .march import Asked
 from .newton import Membrane
 from .wall import Wall
 
 Array = NDArray[np.float64]
-Model = BubbleModel | UniaxialModel | InflatedModel | CylinderModel
+
+
+class Analysis(NamedTuple):
+    """How a model is run: (model, law, tolerance, wall) -> membrane; (membrane, model, asked)."""
+
+    prepare: Callable[..., Membrane]
+    analyse: Callable[..., tuple[History, Array]]
+
+
+#: What each model needs.
+ANALYSES: dict[type, Analysis] = {
+    BubbleModel: Analysis(bubble.prepare, bubble.analyse),
+    UniaxialModel: Analysis(strip.prepare, strip.analyse),
+    InflatedModel: Analysis(closed_model.prepare, inflated.analyse),
+    CylinderModel: Analysis(cylinder.prepare, cylinder.analyse),
+}
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
@@ -59,7 +76,13 @@ class MembraneSolver:
         bending_stiffness: float = 1.0,
     ) -> None:
         self.tolerance, self.wall = tolerance, Wall(wrinkle_stiffness, bending_stiffness)
-        self._prepared: tuple[Model, Membrane] | None = None
+        self.progress: Callable[[Progress], None] | None = None
+        self._prepared: tuple[Any, Membrane] | None = None
+
+    @property
+    def identity(self) -> str:
+        """The tolerance, and what the wall of a closed membrane does."""
+        return in_words(self.name, __version__, tolerance=self.tolerance, wall=self.wall)
 
     def check(self) -> SolverCheck:
         """Always there; the law is its own."""
@@ -67,7 +90,7 @@ class MembraneSolver:
 
     def run(
         self,
-        model: Model,
+        model: Any,
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
@@ -89,53 +112,46 @@ class MembraneSolver:
 
     def run_with_sensitivity(
         self,
-        model: Model,
+        model: Any,
         law: HypoelasticLaw,
-        parameters: Sequence[str] = PARAMETERS[:12],
+        parameters: Sequence[str] | None = None,
         pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
         """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
 
-        Derivatives by coefficients are per MPa, by the pressure offset per MPa. Those of a
-        strip's load are in the history (`load_slope`).
+        The parameters are every entry of the law's beta unless given. Derivatives by them are per
+        MPa, by the pressure offset per MPa. Those of a strip's load are in the history
+        (`load_slope`).
         """
-        unknown = [name for name in parameters if name not in PARAMETERS]
+        known = parameters_of(law)
+        if parameters is None:
+            parameters = known[: law.form.size]
+        unknown = [name for name in parameters if name not in known]
         if unknown:
-            raise InputError(None, "parameters", f"{unknown} not among {PARAMETERS}")
+            raise InputError(None, "parameters", f"{unknown} not among {known}")
         return self._analyse(model, law, parameters, pressure_offset, guess)
 
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
         self,
-        model: Model,
+        model: Any,
         law: HypoelasticLaw,
         parameters: Sequence[str],
         pressure_offset: float,
         guess: Array | None,
     ) -> tuple[History, Array]:
-        membrane = self._membrane(model, law)
-        if isinstance(model, UniaxialModel):
-            return strip.analyse(membrane, model, parameters, pressure_offset, guess)
-        if isinstance(model, CylinderModel):
-            model = closed_membrane_of(model)
-        if isinstance(model, InflatedModel):
-            assert isinstance(membrane, ClosedMembrane)
-            return inflated.analyse(membrane, model, parameters, pressure_offset, guess)
-        return bubble.analyse(membrane, model, parameters, pressure_offset, guess)
+        asked = Asked(parameters, pressure_offset, guess, self.progress)
+        history, slope = analysis_of(ANALYSES, model, self.name).analyse(
+            self._membrane(model, law), model, asked
+        )
+        return history, slope
 
-    def _membrane(self, model: Model, law: HypoelasticLaw) -> Membrane:
+    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane:
         """Geometry and sparsity are made once a model; strain history anew every run."""
         if self._prepared is None or self._prepared[0] is not model:
-            membrane: Membrane
-            if isinstance(model, UniaxialModel):
-                membrane = strip.prepare(model, law, self.tolerance)
-            elif isinstance(model, CylinderModel | InflatedModel):
-                closed = closed_membrane_of(model) if isinstance(model, CylinderModel) else model
-                membrane = closed_model.prepare(closed, law, self.tolerance, self.wall)
-            else:
-                membrane = bubble.prepare(model, law, self.tolerance)
-            self._prepared = (model, membrane)
+            prepare = analysis_of(ANALYSES, model, self.name).prepare
+            self._prepared = (model, prepare(model, law, self.tolerance, self.wall))
         membrane = self._prepared[1]
         membrane.law = law
         membrane.keep_tangent, membrane.iterations = False, 0

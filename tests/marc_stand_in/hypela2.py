@@ -2,7 +2,7 @@
 
 Marc would call it at every point; here the moduli are found from what it answers. From zero the
 strain goes up in steps of one component. The stresses of a step give D11 and D12 (or D22, G12) of
-that step, and with nu12 = D12/D22 at zero strain E1, E2 and G12 at its middle.
+that step, and with nu12 = D12/D22 at zero strain the means of E1, E2 and G12 over it.
 """
 
 from __future__ import annotations
@@ -10,15 +10,17 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from bubblefit.materials.law import HypoelasticLaw, ThicknessChange
+from bubblefit.materials.law import UNLIMITED, HypoelasticLaw, ThicknessChange
 from numpy.typing import NDArray
 
 from .endings import NotCompiled
 from .fields import DeckError
-from .law import EXACT, Modulus, cubic_through, law_of
+from .law import longest_stretch
+from .piecewise import piecewise_law
 
 Array = NDArray[np.float64]
 
@@ -83,7 +85,7 @@ def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
 
     Raises
     ------
-    DeckError : its moduli are neither cubics nor constants in three regions.
+    DeckError : its moduli are no cubics, piece by piece.
     """
     thickness = _thickness(library, states)
     thin = 1.0 if thickness == "incompressible" else 0.0
@@ -95,7 +97,7 @@ def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
     a, c, g12 = (_tangents(library, states, k, 1, thin, STEPS)[:, k] for k in range(3))
     e1 = 0.5 * (a + np.sqrt(a * a - 4.0 * a * k))
     e2 = c / (1.0 + c * nu12**2 / (d11 * coupling))
-    return law_of(*(_modulus(y) for y in (e1, e2, g12)), float(nu12), thickness)
+    return piecewise_law(*(_pieces(y) for y in (e1, e2, g12)), float(nu12), thickness)
 
 
 def _tangents(
@@ -130,47 +132,47 @@ def _thickness(library: ctypes.CDLL, states: int) -> ThicknessChange:
     raise DeckError(f"hypela2: shear stress changes with eps1 by {fall:g}")
 
 
-def _modulus(y: Array) -> Modulus:
-    """What the moduli of all steps lie on."""
+def _pieces(y: Array) -> Array:
+    """Pieces (n, 5) of a modulus from its means over the steps; held beyond the last."""
     step = REACH / STEPS
-    x, size = step * (np.arange(len(y)) + 0.5), EXACT * np.abs(y).max()
-    tail = len(y) - 1
-    while tail and abs(y[tail - 1] - y[-1]) < size:
-        tail -= 1
-    if tail == 0:
-        return Modulus(np.array([0.0, 0.0, 0.0, y[-1]]))
-    held = len(y) - tail > 1
-    some = tail - 1 if held else len(y)
-    whole = cubic_through(x[:some], y[:some])
-    if whole is None:
-        return _steps(y, step, size)
-    if not held:
-        return Modulus(whole)
-    end = _end(whole, y[-1], step * tail, step)
-    # One constant up to the first break of a tri-linear modulus is a cubic as well.
-    return _steps(y, step, size) if end is None else Modulus(whole, end)
-
-
-def _end(cubic: Array, value: float, guess: float, step: float) -> float | None:
-    """Strain near `guess` where the cubic has the value that is held from there on."""
-    roots = np.roots(cubic - np.array([0.0, 0.0, 0.0, value])).real
-    near = roots[np.abs(roots - guess) < 2 * step]
-    reached = near[np.abs(np.polyval(cubic, near) - value) < 1e-7 * abs(value)]
-    return float(reached[np.argmin(np.abs(reached - guess))]) if len(reached) else None
-
-
-def _steps(y: Array, step: float, size: float) -> Modulus:
-    """Constants; a step of strain that goes over a break has the mean of both sides."""
-    values, breaks, i = [float(y[0])], [], 1
+    middle = step * (np.arange(len(y)) + 0.5)
+    stretches, i = [], 0
     while i < len(y):
-        if abs(y[i] - values[-1]) < size:
-            i += 1
-            continue
-        after = y[min(i + 1, len(y) - 1)]
-        share = (y[i] - after) / (values[-1] - after) if after != y[i] else 0.0
-        if not 0 <= share < 1:
-            raise DeckError("hypela2: a modulus is neither a cubic nor of steps")
-        breaks.append(step * (i + share))
-        values.append(float(after))
-        i += 2 if share else 1
-    return Modulus(None, steps=(values, breaks))
+        last, cubic = longest_stretch(middle, y, i, _mean_powers)
+        if cubic is not None:
+            stretches.append((i, last, cubic))
+        elif not stretches or stretches[-1][1] != i - 1:
+            raise DeckError("hypela2: a modulus lies on no cubics, piece by piece")
+        i = last + 1
+    rows = []
+    for (_, here, before), (there, _, after) in pairwise(stretches):
+        # In the step between two stretches one piece gives way to the next.
+        end = step * there if there == here + 1 else _place(y[here + 1], here + 1, before, after)
+        rows.append([end, *before])
+    rows.append([UNLIMITED, *stretches[-1][2]])
+    return np.array(rows)
+
+
+def _mean_powers(middle: Array) -> Array:
+    """(n, 4) means of powers, highest first, over the steps with these middles."""
+    a, b = middle - 0.5 * REACH / STEPS, middle + 0.5 * REACH / STEPS
+    columns = [(a + b) * (a * a + b * b) / 4, (a * a + a * b + b * b) / 3, (a + b) / 2, 1 + 0 * a]
+    return np.stack(columns, axis=1)
+
+
+def _place(mean: float, step: int, before: Array, after: Array) -> float:
+    """Where in a step one cubic gives way to another, when this is its mean over the step."""
+    start, end = REACH / STEPS * step, REACH / STEPS * (step + 1)
+
+    def off(place: float) -> float:
+        lower = np.polyval(np.polyint(before), place) - np.polyval(np.polyint(before), start)
+        upper = np.polyval(np.polyint(after), end) - np.polyval(np.polyint(after), place)
+        return float(lower + upper - mean * (end - start))
+
+    low, high = start, end
+    if off(low) * off(high) > 0:  # both cubics are the same but for rounding
+        return low if abs(off(low)) < abs(off(high)) else high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if off(low) * off(middle) > 0 else (low, middle)
+    return 0.5 * (low + high)

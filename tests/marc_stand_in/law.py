@@ -1,22 +1,23 @@
 """The law that a deck holds, from values of its moduli: tables of NLELAST, or HYPELA2 at work.
 
-The membrane solver takes cubics or three constants of strain, and holds a modulus beyond the end
-of its range; a table is straight between its points. What the points lie on is recognised: one
-value, ONE cubic through all points of the range (least squares, to `EXACT` of the largest), or
-steps. So the stand-in's moduli are those of the law and not of its table, which is lower or higher
-by up to 2e-4 between two of 121 points. Anything else is refused.
+The membrane solver takes piecewise cubics; a table is straight between its points. What the points
+lie on is recognised, piece by piece: ONE cubic through all points of a stretch (least squares, to
+`EXACT` of the largest), with jumps between two stretches. So the stand-in's moduli are those of
+the law and not of its table, which is lower or higher by up to 2e-4 between two of 121 points.
+Points on no such curve are refused.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
-from bubblefit.materials.law import UNLIMITED, HypoelasticLaw, ThicknessChange
+from bubblefit.materials.law import HypoelasticLaw
 from numpy.typing import NDArray
 
 from .content import Content, Table
 from .fields import DeckError
+from .piecewise import piecewise_law
 
 Array = NDArray[np.float64]
 
@@ -24,41 +25,10 @@ Array = NDArray[np.float64]
 EXACT = 1e-9
 #: Strain over which a table's modulus jumps, at most.
 JUMP = 1e-5
-
-
-@dataclass
-class Modulus:
-    """Coefficients of a cubic (highest power first) up to `end`; or steps = (moduli, breaks)."""
-
-    cubic: Array | None
-    end: float = UNLIMITED
-    steps: tuple[list[float], list[float]] | None = None
-
-
-def law_of(
-    e1: Modulus, e2: Modulus, g12: Modulus, nu12: float, thickness: ThicknessChange = "constant"
-) -> HypoelasticLaw:
-    """The law of three moduli (MPa): cubics, unless one has steps."""
-    ends = np.array([e1.end, e2.end, g12.end])
-    moduli = (g12, e2, e1)
-    if all(m.cubic is not None for m in moduli):
-        beta = np.concatenate([m.cubic for m in moduli])  # type: ignore[misc]
-        return HypoelasticLaw(beta, nu12, ends, thickness)
-    values, breaks = zip(*(_three(m) for m in (e1, e2, g12)), strict=True)
-    return HypoelasticLaw.trilinear(*values, breaks, nu12, ends, thickness)
-
-
-def _three(modulus: Modulus) -> tuple[list[float], list[float]]:
-    """Three constants and two breaks, the last of which may be out of reach."""
-    if modulus.steps is None:
-        if modulus.cubic is None or modulus.cubic[:3].any():
-            raise DeckError("a law of steps and cubics")
-        modulus.steps = ([float(modulus.cubic[3])], [])
-    values, breaks = modulus.steps
-    if len(breaks) > 2:
-        raise DeckError(f"a modulus of {len(values)} steps")
-    away = [UNLIMITED / 4, UNLIMITED / 2]
-    return (values + [values[-1]] * 2)[:3], (breaks + away[len(breaks) :])[:2]
+#: Points that a cubic is recognised by: one more than it has coefficients.
+FEWEST = 5
+#: From the places of a cubic's values to the powers there: of points, or means over steps.
+Powers = Callable[[Array], Array]
 
 
 def law_of_tables(content: Content) -> HypoelasticLaw:
@@ -67,18 +37,23 @@ def law_of_tables(content: Content) -> HypoelasticLaw:
     assert material is not None and material.kind == "nlelast"
     if material.tables[2] != 0:
         raise DeckError("nlelast: nu12 with a table")
-    found = []
+    curves = []
     for name, k in (("E1", 0), ("E2", 1), ("G12", 3)):
         factor, number = material.multipliers[k], material.tables[k]
         if number == 0:
-            found.append(Modulus(np.array([0.0, 0.0, 0.0, factor])))
+            curves.append(held(factor))
             continue
-        found.append(_of_table(content.tables[number], name, factor))
-    return law_of(*found, material.multipliers[2])
+        curves.append(_of_table(content.tables[number], name, factor))
+    return piecewise_law(*curves, material.multipliers[2])
 
 
-def _of_table(table: Table, name: str, factor: float) -> Modulus:
-    """The modulus for strains from zero up, after a look at those below."""
+def held(value: float, end: float = 1.0) -> Array:
+    """(1, 5) one piece of a constant modulus; it is held beyond `end`."""
+    return np.array([[end, 0.0, 0.0, 0.0, value]])
+
+
+def _of_table(table: Table, name: str, factor: float) -> Array:
+    """Pieces (n, 5) of the modulus for strains from zero up, after a look at those below."""
     x, y = table.x, factor * table.y
     if not (y > 0).all():
         raise DeckError(f"table {table.number} of {name}: a modulus is not above 0")
@@ -91,26 +66,53 @@ def _of_table(table: Table, name: str, factor: float) -> Modulus:
     if x[0] != 0.0:
         raise DeckError(f"table {table.number} of {name} has no point at zero")
     if np.ptp(y) <= EXACT * y.max():
-        return Modulus(np.array([0.0, 0.0, 0.0, y[0]]))
+        return held(float(y[0]), float(x[-1]))
     if y[-1] == y[-2]:  # the point that holds the end
         x, y = x[:-1], y[:-1]
-    cubic = cubic_through(x, y)
-    if cubic is not None:
-        return Modulus(cubic, float(x[-1]))
-    jumps = np.flatnonzero(np.diff(y) != 0.0)
-    if (np.diff(x)[jumps] > JUMP).any() or len(jumps) > 2:
-        raise DeckError(f"table {table.number} of {name} is neither a cubic nor of three steps")
-    values = [float(v) for v in y[[0, *(jumps + 1)]]]
-    return Modulus(None, float(x[-1]), (values, x[jumps].tolist()))
+    rows, i = [], 0
+    while i < len(x) - 1:
+        last, cubic = longest_stretch(x, y, i, powers_at)
+        if cubic is not None:
+            rows.append([x[last], *cubic])
+            # At a knot the next piece begins with this point, after a jump with the one beyond.
+            i = last
+        elif rows and x[i + 1] - x[i] < JUMP:
+            i += 1
+        else:
+            raise DeckError(f"table {table.number} of {name} lies on no cubics, piece by piece")
+    return np.array(rows)
 
 
-def cubic_through(x: Array, y: Array) -> Array | None:
-    """(4,) of the one cubic through all points; None where there is none."""
-    if len(x) < 5:
-        return None
-    size = float(np.abs(x).max())
-    rows = np.vander(x / size, 4)
+def powers_at(x: Array) -> Array:
+    """(n, 4) powers of strains, highest first."""
+    return np.vander(x, 4)
+
+
+def longest_stretch(x: Array, y: Array, first: int, powers: Powers) -> tuple[int, Array | None]:
+    """Last point of the longest stretch from `first` on that lies on one cubic, and the cubic.
+
+    Equal values are one from two on; other cubics from FEWEST on.
+    """
+    size, equal = EXACT * float(np.abs(y).max()), first
+    while equal + 1 < len(y) and abs(y[equal + 1] - y[first]) <= size:
+        equal += 1
+    last, cubic = first, None
+    if equal > first:
+        last, cubic = equal, np.array([0.0, 0.0, 0.0, y[first : equal + 1].mean()])
+    for n in range(max(equal + 1, first + FEWEST - 1), len(x)):
+        through = cubic_through(x[first : n + 1], y[first : n + 1], powers, size)
+        if through is None:
+            break
+        last, cubic = n, through
+    return last, cubic
+
+
+def cubic_through(x: Array, y: Array, powers: Powers, size: float) -> Array | None:
+    """(4,) of the one cubic through all points, to `size`; None where there is none."""
+    scale = float(np.abs(x).max())
+    weights = scale ** np.arange(3, -1, -1)
+    rows = powers(x) / weights
     found = np.linalg.lstsq(rows, y, rcond=None)[0]
-    if np.abs(rows @ found - y).max() > EXACT * np.abs(y).max():
+    if np.abs(rows @ found - y).max() > size:
         return None
-    return np.asarray(found / size ** np.arange(3, -1, -1))
+    return np.asarray(found / weights)

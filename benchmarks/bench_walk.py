@@ -1,0 +1,100 @@
+"""Through which modules a bubble test goes, from its project file to the report.
+
+Runs the example with a known solution, coarse, one start, in one process, and notes each module of
+bubblefit in which a function is called, in the order in which they are first entered. Compiled
+functions (the kernel) are counted by the modules that call them. docs/reference/walk.md tells the
+same as a story.
+
+    python benchmarks/bench_walk.py [--list]
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+import bubblefit as bf
+from bubblefit.fits.best import best_fit
+from bubblefit.fits.result import Fit
+from bubblefit.fits.setup import prepare_fit
+from bubblefit.fits.start import run_start
+
+ROOT = Path(bf.__file__).resolve().parent
+KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
+
+
+@contextmanager
+def entered(modules: list[str]) -> Iterator[None]:
+    """Append each module (or template), once, when one of its functions is called."""
+    known: dict[str, str | None] = {}
+
+    def watch(frame: FrameType, event: str, _: object) -> None:
+        code = frame.f_code
+        if event != "call" or code.co_name == "<module>":
+            return
+        if code.co_filename not in known:
+            path = Path(code.co_filename).resolve()
+            inside = path.is_file() and path.is_relative_to(ROOT)
+            inside = inside and path.parent != ROOT / "benchmarks"
+            known[code.co_filename] = str(path.relative_to(ROOT)) if inside else None
+        name = known[code.co_filename]
+        if name is not None and name not in modules:
+            modules.append(name)
+
+    sys.setprofile(watch)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
+def walk() -> dict[str, list[str]]:
+    """Modules by step, each where it is entered first."""
+    steps: dict[str, list[str]] = {}
+    modules: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "project.toml"
+        path.write_text(KNOWN.read_text().replace("elements = 800", "elements = 48"))
+
+        def step(name: str) -> None:
+            told = {module for several in steps.values() for module in several}
+            steps[name] = [module for module in modules if module not in told]
+
+        with entered(modules):
+            project = bf.read_project(path)
+        step("read the project")
+        with entered(modules):
+            setup = prepare_fit(project, project.chosen(None, fitted=True))
+        step("prepare the tests")
+        with entered(modules):
+            problem = setup.problem()
+            record = run_start(problem, setup.options, project.fit.seed, 0, lambda _: None)
+        step("fit from one start")
+        with entered(modules):
+            fit = Fit(setup, problem, best_fit(problem, [record], project.fit.tolerance), 0.0)
+            _ = fit.card, fit.findings
+        step("assess the best")
+        with entered(modules):
+            fit.report(Path(folder) / "out")
+        step("write the report")
+    return steps
+
+
+def main() -> None:
+    """Steps with their numbers of modules; with --list their names."""
+    walk()  # imports everything: what they run is no part of the walk
+    steps = walk()
+    for name, modules in steps.items():
+        print(f"{name:20s} {len(modules):3d}")
+        if "--list" in sys.argv[1:]:
+            for module in modules:
+                print(f"    {module}")
+    print(f"{'modules in all':20s} {sum(map(len, steps.values())):3d}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""The example with a known solution, as the benchmarks take it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bubblefit.experiments.bubble.sources import KnownSolution
+from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.fits.project import Project, read_project
+from bubblefit.fits.setup import FitSetup, prepare_fit
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bubble import BubbleModel
+
+EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bubble-known-solution"
+
+
+def known_project(elements: int | None = None, **fit: Any) -> Project:
+    """The example's project; of another mesh, data and fit alike, and with other settings."""
+    project = read_project(EXAMPLE / "project.toml").with_fit(**fit)
+    if elements is None:
+        return project
+    (test,) = project.tests.values()
+    assert isinstance(test, BubbleTest) and isinstance(test.data, KnownSolution)
+    data = replace(test.data, elements=elements)
+    changed: Mapping[str, Any] = {test.name: replace(test, elements=elements, data=data)}
+    return replace(project, tests=changed)
+
+
+def known_setup(project: Project) -> FitSetup:
+    """The fit, its data computed."""
+    return prepare_fit(project, project.chosen(None, fitted=True))  # type: ignore[arg-type]
+
+
+def known_model_and_law() -> tuple[BubbleModel, HypoelasticLaw]:
+    """The example's model and the law behind its data."""
+    (prepared,) = known_setup(known_project()).tests
+    assert prepared.known is not None
+    return prepared.test.models()["bubble"], prepared.known

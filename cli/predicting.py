@@ -1,0 +1,98 @@
+"""What the commands that predict share: options, progress, words for the terminal, exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import InputError
+from .options import solver_choice, with_checks, with_solver
+from .progress import RunsProgress
+
+if TYPE_CHECKING:
+    from ..fits.prediction_result import Predictions
+    from ..fits.project import Project
+    from ..materials.card import MaterialCard
+
+WORSE = 1  # exit code of --fail-above
+
+
+def prediction_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of every series of predictions; the command gets them by name."""
+    decorators: list[Callable[..., Any]] = [
+        click.option("--out", type=click.Path(path_type=Path), help="Output folder [out/NAME]."),
+        click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores]."),
+        solver_choice,
+        click.option(
+            "--fail-above", type=float, metavar="E",
+            help="Exit 1 when an RMS error is above E of the largest measured load.",
+        ),
+        click.option("--resume", is_flag=True, help="Keep the runs that the output folder holds."),
+        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
+        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+        click.option("--quiet", is_flag=True, help="No progress."),
+    ]  # fmt: skip
+    return with_checks(command, decorators)
+
+
+def run_predictions(
+    project: Project,
+    folder: Path,
+    options: Mapping[str, Any],
+    tests: Sequence[str] | None = None,
+    cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
+) -> None:
+    """Predict, write the folder, tell; exits as asked.
+
+    Raises
+    ------
+    InputError, OutputError, SolverFailure : as `bubblefit.predict`; nothing was measured that
+        --fail-above could be about.
+    KeyboardInterrupt : after saying how to go on.
+    """
+    from ..fits.predictions import measured_tests, predict
+
+    project = with_solver(project, options["solver_given"])
+    if options["fail_above"] is not None and not measured_tests(project, tests):
+        problem = "no test has measured loads to compare with; leave it out"
+        raise InputError(project.path, "--fail-above", problem)
+    quiet = options["quiet"] or options["as_json"]
+    try:
+        with RunsProgress(quiet) as progress:
+            predictions = predict(
+                project,
+                tests,
+                cards,
+                jobs=options["jobs"],
+                out=folder,
+                resume=options["resume"],
+                overwrite=options["overwrite"],
+                progress=progress.saw,
+            )
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
+        raise
+    predictions.report(folder)
+    tell(predictions, folder, options["fail_above"], options["as_json"])
+
+
+def tell(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
+    """Print the outcome; exit 1 when a run is further from its measurement than asked for."""
+    lines = [*predictions.lines(), f"written to {folder} (open report.html)"]
+    click.echo(json.dumps(predictions.result, indent=1) if as_json else "\n".join(lines))
+    if fail_above is None:
+        return
+    words, worst, silent = "", predictions.worst, predictions.silent()
+    if worst is not None and worst > fail_above:
+        words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
+    elif silent:
+        run = predictions.each[silent[0]]
+        words = f"{run.test.name} with {run.card} gave nothing to compare"
+    if words:
+        click.echo(f"bubblefit: {words} (--fail-above)", err=True)
+        sys.exit(WORSE)

@@ -1,0 +1,120 @@
+"""`bubblefit study`: what refinement, and Poisson's ratio, change in analyses with a card."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from .options import data_folders, exits, read_with_solver, result_folder, solver_choice
+from .progress import SeriesProgress
+
+What = Literal["elements", "increments"]
+
+
+def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """PROJECT, --card and the options of every study of a card; errors are handled."""
+    path = click.Path(path_type=Path)
+    decorators: list[Callable[..., Any]] = [
+        click.argument("project", type=path),
+        click.option(
+            "--card", required=True,
+            help="The material card's file, or the name of a card of the project.",
+        ),
+        click.option(
+            "--test", "--case", "tests", multiple=True,
+            help="A test by its name, or a kind of tests; several [all].",
+        ),
+        click.option("--out", type=path, help="Output folder [out/NAME-STUDY]."),
+        click.option(
+            "--data", multiple=True, metavar="[TEST=]DIR", help="Folder of the measured data."
+        ),
+        solver_choice,
+        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
+        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+    ]  # fmt: skip
+    wrapped = exits(command)
+    for decorate in reversed(decorators):
+        wrapped = decorate(wrapped)
+    return wrapped
+
+
+def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **given: Any) -> None:
+    """Read the project, run the study, write its folder, tell."""
+    path: Path = options["project"]
+    project = read_with_solver(
+        path, options["solver_given"], data_folders(options["data"]), need_data=False
+    )
+    folder = result_folder(path, name, options["out"], options["overwrite"])
+    with SeriesProgress(options["as_json"]) as progress:
+        done = study(
+            project, options["card"], tests=options["tests"], progress=progress.saw, **given
+        )
+    done.write(folder)
+    if options["as_json"]:
+        click.echo(json.dumps(done.result, indent=1))
+        return
+    for words in done.lines():
+        click.echo(words)
+    click.echo(f"written to {folder}")
+
+
+@click.group("study")
+def command() -> None:
+    """What refinement, or nu12, changes in the analyses of a project."""
+
+
+@command.command("mesh")
+@card_options
+@click.option(
+    "--what",
+    type=click.Choice(["elements", "increments"]),
+    default="elements",
+    show_default=True,
+    help="What is refined.",
+)
+@click.option(
+    "--levels", type=click.IntRange(2, 8), default=4, show_default=True,
+    help="Refinements, all told.",
+)  # fmt: skip
+@click.option(
+    "--factor", type=click.IntRange(2, 10), default=2, show_default=True,
+    help="Between levels: edges, or increments, are divided by it.",
+)  # fmt: skip
+@click.option(
+    "--coarser", type=click.IntRange(min=0),
+    help="Levels coarser than the project's own [1 of elements, 0 of increments].",
+)  # fmt: skip
+def study_mesh(what: What, levels: int, factor: int, coarser: int | None, **options: Any) -> None:
+    """Run PROJECT.toml with a card on finer and finer meshes (or increments).
+
+    Reports the quantities of interest and the cost of each level, the observed order of
+    convergence and Richardson's limit. A level whose analysis fails is named and left out; when
+    fewer than two end well the exit code is 4.
+    """
+    from ..studies.refinement import refine
+
+    study = functools.partial(refine, what=what, levels=levels, factor=factor, coarser=coarser)
+    run_study(what if what == "increments" else "mesh", study, options)
+
+
+@command.command("nu12")
+@card_options
+@click.option(
+    "--nu12", "values", type=float, multiple=True,
+    help="A value to run, as often as wanted [0.05 0.15 0.25 0.35 0.45].",
+)  # fmt: skip
+def study_nu12(values: tuple[float, ...], **options: Any) -> None:
+    """Run PROJECT.toml with a card whose Poisson's ratio is changed, the moduli as they are.
+
+    Reports every response relative to that at the card's own nu12 and relative to the mean of the
+    values. A value whose analysis fails is named and left out; when the card's own fails, or all
+    others do, the exit code is 4.
+    """
+    from ..studies.poisson import NU12, vary_nu12
+
+    run_study("nu12", functools.partial(vary_nu12, values=values or NU12), options)

@@ -1,0 +1,154 @@
+"""Load over deflection of three-point bending, as sensors or a notebook recorded it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .column_names import LENGTH_UNITS, LOAD_UNITS, scale_of
+from .machine_tables import MachineTable, TableOptions, column_of, read_machine_table
+
+Array = NDArray[np.float64]
+Zero = Literal["none", "first", "line"]
+
+#: N per kg of the weights on the strap, and N in one of each unit of load.
+GRAVITY = 9.80665
+FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
+NEEDED = ("deflection", "load")
+#: Readings that the straight line of zero = "line" goes through.
+FIRST_READINGS = 4
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What a column of readings means: scale * reading + offset, in `unit`.
+
+    Parameters
+    ----------
+    column : its name in the file; found by what names mean unless given.
+    unit : mm, cm, m; N, kN, kg. The file's own unless given; needed with a scale.
+    scale, offset : of a sensor, such as 200 mm per volt.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class BendingCurve:
+    """One repetition of a bending test, as far as it was loaded.
+
+    Parameters
+    ----------
+    repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
+    """
+
+    repetition: str
+    deflection: Array
+    load: Array
+    path: Path | None = None
+
+
+def read_bending_curves(
+    path: Path | str,
+    *,
+    deflection: Channel = Channel(),
+    load: Channel = Channel(),
+    repetition: str | None = None,
+    preload: float = 0.0,
+    zero: Zero = "none",
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> tuple[BendingCurve, ...]:
+    """Read the repetitions in one file, in its order; one where no column tells them apart.
+
+    The table is found as in the exports of test machines (`machine_tables`). Of each repetition
+    the readings up to the largest deflection are kept: what comes after is unloading.
+
+    Parameters
+    ----------
+    repetition : name of the column of repetitions, where there is one of another name.
+    preload : N on the beam beside what the readings say: collar and strap.
+    zero : of each repetition's deflection: "none", as read; "first", the first reading is zero;
+        "line", the straight line through the first four readings goes through the origin.
+    format : name of the file's format; found by its content unless given.
+
+    Raises
+    ------
+    InputError : naming file and line: columns that are not there or may be several, no or unknown
+        units, cells that are not numbers, a repetition of one reading, or whose first readings
+        show no stiffness to find a zero by.
+    """
+    path = Path(path)
+    named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
+    if repetition is not None:
+        named["repetition"] = repetition
+    found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
+    way = _quantity(found, column_of(found, "deflection", named, NEEDED), deflection, LENGTH_UNITS)
+    force = _quantity(found, column_of(found, "load", named, NEEDED), load, FORCE_UNITS) + preload
+    which = column_of(found, "repetition", named, NEEDED)
+    names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
+    curves = []
+    for name in dict.fromkeys(names):
+        rows = [row for row, own in enumerate(names) if own == name]
+        at = f"line {found.table.lines[rows[0]]}"
+        if len(rows) < 2:
+            raise InputError(path, at, f"repetition {name!r} has one reading; expected two or more")
+        full = f"{path.stem} {name}" if which else name
+        curves.append(_zeroed(BendingCurve(full, way[rows], force[rows], path), zero, at))
+    return tuple(_loading(curve) for curve in curves)
+
+
+def _quantity(
+    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
+) -> Array:
+    """A column (rows,) in mm or N."""
+    path, at = found.table.path, f"line {found.header}, column {column!r}"
+    known, own = dict(units), found.units[column]
+    said = scale_of(own, known) if own else None
+    raw = channel.scale != 1.0
+    if raw and said is not None:
+        problem = f"is in {own} already: leave the scale {channel.scale:g} out"
+        raise InputError(path, at, problem)
+    unit = channel.unit or ("" if raw else own)
+    if not unit:
+        what = "after scaling" if raw else "of the readings"
+        raise InputError(path, at, f"say the unit {what}, one of {', '.join(known)}")
+    scale = scale_of(unit, known)
+    if scale is None:
+        advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
+        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {', '.join(known)}; {advice}")
+    if channel.unit and own and not raw and said != scale:
+        problem = f"the file says {own!r}, the project {channel.unit!r}; correct one of them"
+        raise InputError(path, at, problem)
+    return (channel.scale * found.table.numbers(column) + channel.offset) * scale
+
+
+def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
+    if zero == "none":
+        return curve
+    start = float(curve.deflection[0])
+    if zero == "line":
+        x, y = curve.deflection[:FIRST_READINGS], curve.load[:FIRST_READINGS]
+        slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else (0.0, 0.0)
+        if not slope > 0:
+            problem = f"the first readings of {curve.repetition!r} do not rise: no zero to be found"
+            raise InputError(curve.path, at, problem)
+        start = float(-intercept / slope)
+    return replace(curve, deflection=curve.deflection - start)
+
+
+def _loading(curve: BendingCurve) -> BendingCurve:
+    """The readings up to the largest deflection, sorted: a sensor's noise is no unloading."""
+    part = slice(int(np.argmax(curve.deflection)) + 1)
+    order = np.argsort(curve.deflection[part], kind="stable")
+    return replace(curve, deflection=curve.deflection[part][order], load=curve.load[part][order])

@@ -1,0 +1,108 @@
+"""Frames of image correlation (DIC): places in the reference picture, and how they moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .registry import read_file
+
+#: Reference place and displacement, in the order of a frame's columns.
+QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A surface in one frame.
+
+    Parameters
+    ----------
+    points : (m, 3) mm, reference places; NaN where correlation was lost, z also where it was not
+        asked for.
+    displacement : (m, 3) mm; NaN where correlation was lost.
+    path : the file, None when the frame did not come from one.
+    dropped : rows of the file that are not among the points: marked as doubtful.
+    """
+
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    path: Path | None = None
+    dropped: int = 0
+
+    def __post_init__(self) -> None:
+        if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
+            shapes = f"{self.points.shape} and {self.displacement.shape}"
+            raise ValueError(f"expected (m, 3) points and displacements, got {shapes}")
+
+
+@dataclass(frozen=True)
+class FrameOptions:
+    """What a reader of frames is told beside the file.
+
+    Parameters
+    ----------
+    quantities : of `QUANTITIES`, those that the file must hold.
+    columns : the file's own name of each of them; None where the format knows what they are called.
+    flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
+    comment : lines that start so are skipped, where the format has no comments of its own.
+    length_scale : mm in one unit of length of a file that does not name its unit.
+    holes : whether empty cells and "nan" are lost correlation; otherwise they are mistakes.
+
+    Raises
+    ------
+    InputError : a quantity without a name, a scale that is not above zero.
+    """
+
+    quantities: tuple[str, ...] = QUANTITIES
+    columns: Mapping[str, str] | None = None
+    flag_column: str | None = None
+    comment: str = "#"
+    length_scale: float = 1.0
+    holes: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.length_scale < math.inf:
+            problem = f"expected mm per unit, above 0, got {self.length_scale}"
+            raise InputError(None, "length_scale", problem)
+        named = self.quantities if self.columns is None else self.columns
+        unnamed = [name for name in self.quantities if name not in named]
+        if unnamed:
+            raise InputError(None, "columns", f"expected a name for each of {', '.join(unnamed)}")
+
+
+def read_frames(
+    files: Sequence[Path | str],
+    options: FrameOptions = FrameOptions(),
+    format: str | None = None,
+) -> tuple[Frame, ...]:
+    """Read frames in the order of the files; most formats have one a file.
+
+    Exports that write zeros where correlation was lost need a flag column: zeros alone cannot be
+    told from a point that did not move.
+
+    Parameters
+    ----------
+    format : its name (`registry.format_names("frame")`); found by the files' content unless given.
+
+    Raises
+    ------
+    InputError : naming file, line and column: no files, no such file, a format that cannot be
+        told, missing columns, cells that are not numbers.
+    """
+    if not files:
+        raise InputError(None, "files", "expected one file a frame, got none")
+    return tuple(frame for file in files for frame in _frames(Path(file), options, format))
+
+
+def _frames(path: Path, options: FrameOptions, format: str | None) -> Sequence[Frame]:
+    frames: Sequence[Frame] = read_file("frame", path, format, options)
+    for frame in frames:
+        if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
+            raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
+    return frames

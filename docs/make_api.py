@@ -1,0 +1,184 @@
+"""Write docs/reference/api: pages of the Python interface, from the docstrings.
+
+python docs/make_api.py            # write them (make docs)
+python docs/make_api.py --check    # exit 1 where one is not up to date
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+API = HERE / "reference" / "api"
+#: By page: its title, and what is on it, as MODULE or MODULE:NAME,NAME (in bubblefit).
+PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "fits": (
+        "Projects, fits, predictions",
+        ("fits.project:read_project,Project", "fits.fit:fit", "fits.result:Fit",
+         "fits.simulation", "fits.predictions:predict", "fits.prediction_result:Predictions",
+         "materials.card:MaterialCard,read_card,write_card,thickness_difference"),
+    ),
+    "studies": (
+        "Studies",
+        ("studies.refinement:refine,Refinement", "studies.poisson:vary_nu12,Nu12Study,Ratios",
+         "studies.laws:compare_laws,LawComparison",
+         "studies.convergence:convergence,Convergence"),
+    ),
+    "tests": ("Kinds of test", ("experiments.base",
+                                "identification.comparison:Comparison,Objective")),
+    "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base",
+                      "materials.forms.registry")),
+    "readers": ("Readers of data", ("data.registry",)),
+    "solvers": ("Solvers", ("solvers.base", "solvers.registry")),
+    "methods": ("Optimisers", ("identification.methods.base", "identification.methods.registry")),
+}  # fmt: skip
+HEAD = "<!-- Written by docs/make_api.py from the docstrings: change those, then `make docs`. -->\n"
+#: "name : words", at the start of a line and after the end of another entry.
+ENTRY = re.compile(r"\S[\w*, ]* : ")
+BESIDE = re.compile(r"(?<=[.;]) ([A-Za-z_]\w*(?:, \w+)*) : ")
+SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
+
+
+def page(title: str, parts: tuple[str, ...]) -> str:
+    """The whole page."""
+    blocks = [HEAD, f"# {title}"]
+    for part in parts:
+        module_name, _, names = part.partition(":")
+        module = importlib.import_module(f"bubblefit.{module_name}")
+        blocks.append(f"## `bubblefit.{module_name}`")
+        if not names:
+            blocks.append(text_of(module))
+        for name in names.split(",") if names else public_names(module):
+            blocks += described(name, getattr(module, name))
+    return "\n\n".join(block.strip() for block in blocks if block.strip()) + "\n"
+
+
+def public_names(module: Any) -> list[str]:
+    """Functions and classes that the module itself defines, in its order."""
+    found = [
+        (inspect.getsourcelines(thing)[1], name)
+        for name, thing in vars(module).items()
+        if not name.startswith("_")
+        and (inspect.isclass(thing) or inspect.isfunction(thing))
+        and thing.__module__ == module.__name__
+    ]
+    return [name for _, name in sorted(found)]
+
+
+def described(name: str, thing: Any) -> list[str]:
+    """Heading, signature and docstring; of a class those of its members, too."""
+    if not inspect.isclass(thing):
+        return [f"### {name}", signature(name, thing), text_of(thing)]
+    blocks = [f"### class {name}"]
+    if "__init__" in vars(thing) and not getattr(thing, "_is_protocol", False):
+        blocks.append(signature(name, thing))
+    blocks.append(text_of(thing))
+    for member, value in vars(thing).items():
+        function: Any = value
+        if isinstance(value, classmethod | staticmethod):
+            function = value.__func__
+        if member.startswith("_"):
+            continue
+        if isinstance(function, property) or hasattr(function, "attrname"):
+            read = function.fget if isinstance(function, property) else function.func
+            result = str(read.__annotations__.get("return", ""))
+            words = f"`{member}`" + (f": `{result}`" if result else "")
+            blocks.append(f"{words}. {text_of(read)}")
+        elif inspect.isfunction(function):
+            blocks += [signature(member, function), text_of(function)]
+    return blocks
+
+
+def signature(name: str, thing: Any) -> str:
+    """As it is written, a line an argument where it is long."""
+    said = inspect.signature(thing)
+    arguments = [_argument(p) for p in said.parameters.values() if p.name != "self"]
+    starred = [i for i, p in enumerate(said.parameters.values()) if p.kind is p.KEYWORD_ONLY]
+    if starred and not any(a.startswith("*") for a in arguments):
+        first = [*said.parameters].index([*said.parameters][starred[0]])
+        arguments.insert(first - ("self" in said.parameters), "*")
+    result = said.return_annotation
+    plain = inspect.isclass(thing) or result is inspect.Signature.empty
+    arrow = "" if plain else f" -> {_annotation(result)}"
+    words = f"{name}({', '.join(arguments)}){arrow}"
+    if len(words) > 96:
+        words = "\n".join([f"{name}(", *(f"    {a}," for a in arguments), f"){arrow}"])
+    return f"```python\n{words}\n```"
+
+
+def _argument(parameter: inspect.Parameter) -> str:
+    words = parameter.name
+    if parameter.kind is parameter.VAR_POSITIONAL:
+        words = f"*{words}"
+    elif parameter.kind is parameter.VAR_KEYWORD:
+        words = f"**{words}"
+    if parameter.annotation is not parameter.empty:
+        words += f": {_annotation(parameter.annotation)}"
+    if parameter.default is not parameter.empty:
+        words += f" = {parameter.default!r}"
+    return words
+
+
+def _annotation(annotation: Any) -> str:
+    return annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+
+
+def text_of(thing: Any) -> str:
+    """The docstring, its sections in bold, their entries as lists."""
+    text = inspect.getdoc(thing) or ""
+    if inspect.isclass(thing) and (thing.__doc__ or "").startswith(f"{thing.__name__}("):
+        return ""  # what `dataclass` writes where nobody wrote anything
+    parts = SECTION.split(text)
+    blocks = [parts[0].strip()]
+    for head, body in zip(parts[1::2], parts[2::2], strict=True):
+        blocks.append(f"**{head}**\n\n{_entries(body)}")
+    return "\n\n".join(blocks)
+
+
+def _entries(body: str) -> str:
+    """A list of what is entered as "name : words", several in a line too."""
+    lines: list[str] = []
+    for line in body.strip().splitlines():
+        if ENTRY.match(line) or not lines:
+            lines.append(line.strip())
+        else:
+            lines[-1] += f" {line.strip()}"
+    text = BESIDE.sub(r"\n\1 : ", "\n".join(lines))
+    return "\n".join(
+        f"- `{name}`: {words}" if words else name
+        for name, _, words in (line.partition(" : ") for line in text.splitlines())
+    )
+
+
+def pages() -> dict[Path, str]:
+    """Every page by its file, the list of them among these."""
+    written = {API / f"{name}.md": page(*what) for name, what in PAGES.items()}
+    listed = "\n".join(f"- [{title}]({name}.md)" for name, (title, _) in PAGES.items())
+    about = "`import bubblefit as bf`: what a notebook writes, and all that the commands call."
+    written[API / "README.md"] = f"{HEAD}\n# Python interface\n\n{about}\n\n{listed}\n"
+    return written
+
+
+def main() -> int:
+    """Write, or check."""
+    stale = [
+        path for path, text in pages().items() if not path.exists() or path.read_text() != text
+    ]
+    if "--check" in sys.argv[1:]:
+        for path in stale:
+            print(f"{path.relative_to(HERE.parent)} is not up to date: make docs")
+        return 1 if stale else 0
+    API.mkdir(parents=True, exist_ok=True)
+    for path in stale:
+        path.write_text(pages()[path], encoding="utf-8")
+        print(f"wrote {path.relative_to(HERE.parent)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

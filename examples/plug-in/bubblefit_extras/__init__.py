@@ -1,0 +1,1 @@
+"""An example of each thing that a distribution can add to bubblefit."""

@@ -1,0 +1,75 @@
+"""What a bubble test puts on the page of a fit: cuts, heights, the inflated surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...reports import plot_heights, plot_profiles, write_vtu
+from ..base import Exhibit, Findings, FittedTest, Output, Shown
+from .findings import objective_of
+from .objective import displacement_offset
+from .tables import misfit_table, surface_tables, write_surface_table
+
+if TYPE_CHECKING:
+    from .prepared import PreparedBubble
+
+PROFILES, HEIGHTS, SURFACE = "profiles.png", "heights.png", "bubble.vtu"
+
+
+def exhibit(
+    prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output
+) -> Exhibit:
+    """Write the figures, surfaces.csv and bubble.vtu."""
+    files = [
+        *write_surface_table(prepared, out),
+        (out.name(SURFACE), "the inflated bubble at the last pressure, for ParaView"),
+    ]
+    model = fitted.comparisons[0].model
+    write_vtu(model.mesh, fitted.histories[0].displacement[-1], out.path(SURFACE))
+    return Exhibit(
+        facts=_facts(prepared, findings),
+        figures=_figures(prepared, fitted, out),
+        tables=[misfit_table(prepared, fitted), *surface_tables(prepared)],
+        files=files,
+    )
+
+
+def _figures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
+    """Cuts and heights against what was measured."""
+    test, offset = prepared.test, displacement_offset(fitted.nuisance)
+    displacement = fitted.histories[0].displacement
+    label = "known solution" if prepared.known is not None else "measured"
+    plot_profiles(
+        out.path(PROFILES),
+        test.pressures,
+        fitted.comparisons[0].model.mesh.points,
+        displacement + offset,
+        measured=[(f.points, f.displacement) for f in prepared.fields],
+        measured_label=label,
+    )
+    targets = objective_of(fitted).targets
+    plot_heights(
+        out.path(HEIGHTS),
+        test.pressures,
+        [t.displacement[:, 2] for t in targets],
+        [t.at(u)[:, 2] + offset[2] for t, u in zip(targets, displacement, strict=True)],
+        label,
+    )
+    return [
+        (out.name(PROFILES), f"{test.name}: cuts through the bubble along warp and fill"),
+        (out.name(HEIGHTS), f"{test.name}: modelled against measured height"),
+    ]
+
+
+def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, object]]:
+    numbers = findings.numbers
+    facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
+    dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
+    if any(dropped):
+        facts.append(("points left out", f"{dropped[0]} doubtful, {dropped[1]} beyond the rim"))
+    shift, pressure = numbers["nuisance"].values()
+    if shift is not None:
+        facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
+    if pressure is not None:
+        facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
+    return facts

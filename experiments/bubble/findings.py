@@ -1,0 +1,84 @@
+"""What a fit means for a bubble test: how far it is off, what the offsets took, what was left
+out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...identification.assessment import moduli_error
+from ..base import Findings, FittedTest
+from .objective import FieldObjective, displacement_offset
+
+if TYPE_CHECKING:
+    from .prepared import PreparedBubble
+
+#: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
+FAITHFUL = 6
+
+
+def objective_of(fitted: FittedTest) -> FieldObjective:
+    """The objective of the test's one comparison."""
+    (comparison,) = fitted.comparisons
+    assert isinstance(comparison.objective, FieldObjective)
+    return comparison.objective
+
+
+def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
+    """Numbers for result.json, warnings, and words for terminal, card and page."""
+    test, objective = prepared.test, objective_of(fitted)
+    offset = displacement_offset(fitted.nuisance)
+    mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
+    numbers: dict[str, Any] = {
+        "mean_abs_mm": mean,
+        "nuisance": {
+            "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
+            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
+        },
+        "data": {
+            "matched_by": test.match_by,
+            "places": [len(t.displacement) for t in objective.targets],
+            "doubtful_dropped": prepared.dropped,
+            "outside_dropped": prepared.outside,
+        },
+    }
+    if prepared.surfaces:
+        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
+    lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    if prepared.known is not None:
+        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
+        numbers["moduli_error"] = errors
+        said = ", ".join(f"{name} {_percent(value)}" for name, value in errors.items())
+        lines.append(f"largest error of the moduli over the strain reached: {said}")
+    lines += _offset_words(prepared, fitted)
+    return Findings(
+        numbers,
+        tuple(_warnings(prepared)),
+        tuple(lines),
+        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
+        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
+    )
+
+
+def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:
+    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance}
+    if not units:
+        return []
+    said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
+    return [f"nuisance: {said}"]
+
+
+def _warnings(prepared: PreparedBubble) -> list[str]:
+    test = prepared.test
+    if test.match_by != "surfaces" or test.match_degree >= FAITHFUL:
+        return []
+    return [
+        f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk closely "
+        "and bias the moduli, also without noise; matching by points does not"
+    ]
+
+
+def _percent(value: float) -> str:
+    from ...reports import percent
+
+    return percent(value)

@@ -1,0 +1,154 @@
+"""Residuals of a bubble test (Eqs 4.5-4.8).
+
+A residual block is one displacement direction at one pressure: (model - measured) / (largest
+measured |value| * sqrt(n)). The norm of a block is e_x/max(P_x) of Eq. 4.8, e is the sum of the
+block norms. With plain millimetres the scale is one and e is a sum of RMS errors in mm.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...solvers.base import History
+
+Array = NDArray[np.float64]
+
+
+#: Nuisance of a measured field: a rigid displacement, mm.
+OFFSETS = ("offset_x", "offset_y", "offset_z")
+
+
+def displacement_offset(nuisance: Mapping[str, float]) -> Array:
+    """(3,) mm; zero where it is no unknown."""
+    return np.array([nuisance.get(name, 0.0) for name in OFFSETS])
+
+
+@dataclass(frozen=True, eq=False)
+class FieldTarget:
+    """What the displacement field should be at one pressure.
+
+    displacement (n, 3) mm at n places; `sample` (n, nodes) takes model nodes to these places
+    (None: the places are the nodes).
+    """
+
+    pressure: float
+    displacement: Array
+    sample: sp.csr_matrix | None = None
+
+    def at(self, nodal: Array) -> Array:
+        """Model displacement (nodes, ...) at the places, (n, ...)."""
+        if self.sample is None:
+            return nodal
+        return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
+
+
+class FieldObjective:
+    """Residual blocks for displacement fields at several pressures, x, y, z at each.
+
+    Parameters
+    ----------
+    targets : one a reported pressure, in the order of the model's frames.
+    normalise : "e" (Eq. 4.8) or "mm".
+    weight : of every block in e.
+
+    Raises
+    ------
+    InputError : a direction without any displacement cannot be normalised by it.
+    """
+
+    #: What the residuals are in after `scale`, and the least noise to reckon with where the data
+    #: are exact (computed): that of a good image correlation.
+    unit, least_noise = "mm", 0.05
+
+    def __init__(
+        self,
+        targets: Sequence[FieldTarget],
+        normalise: Literal["e", "mm"] = "e",
+        weight: float = 1.0,
+    ) -> None:
+        self.targets = tuple(targets)
+        self.scales = []
+        for target in self.targets:
+            largest = np.abs(target.displacement).max(axis=0)
+            if normalise == "e" and not (largest > 0).all():
+                axis = "xyz"[int(np.argmin(largest))]
+                raise InputError(
+                    None,
+                    f"data at {target.pressure * 1e3:g} kPa",
+                    f"d{axis} is zero everywhere: nothing to match (is a column mapped wrongly?)",
+                )
+            count = np.sqrt(len(target.displacement))
+            self.scales.append(count / weight * (largest if normalise == "e" else np.ones(3)))
+        self.sizes = tuple(len(t.displacement) for t in self.targets for _ in "xyz")
+
+    @property
+    def scale(self) -> Array:
+        """(m,): millimetres in one unit of each residual."""
+        return np.repeat(np.concatenate(self.scales), self.sizes)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Everything measured that the residual depends on."""
+        places = [t.sample.data for t in self.targets if t.sample is not None]
+        return (*(t.displacement for t in self.targets), *places)
+
+    def shifted(self, here: History, there: History) -> FieldObjective:
+        """The objective of a model that moves as `here` where this one moves as `there`."""
+        other = copy.copy(self)
+        by = here.displacement - there.displacement
+        other.targets = tuple(
+            replace(target, displacement=target.displacement - target.at(moved))
+            for target, moved in zip(self.targets, by, strict=True)
+        )
+        return other
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Blocks laid end to end, (m,); offset_x, offset_y, offset_z (mm) are added to the model's
+        displacement."""
+        shift = displacement_offset(nuisance or {})
+        parts = [
+            ((target.at(nodal) + shift - target.displacement) / scale).T.reshape(-1)
+            for target, nodal, scale in zip(
+                self.targets, history.displacement, self.scales, strict=True
+            )
+        ]
+        return np.concatenate(parts)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """(m, parameters) from d displacement (frames, nodes, 3, parameters)."""
+        count = slope.shape[-1]
+        parts = [
+            (target.at(nodal) / scale[:, None]).transpose(1, 0, 2).reshape(-1, count)
+            for target, nodal, scale in zip(self.targets, slope, self.scales, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        """(m, names): slope of the residual by offset_x, offset_y, offset_z (mm)."""
+        unknown = [name for name in names if name not in OFFSETS]
+        if unknown:
+            raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
+        columns = [
+            np.kron(np.diag(1.0 / scale), np.ones((len(target.displacement), 1)))
+            for target, scale in zip(self.targets, self.scales, strict=True)
+        ]
+        return np.concatenate(columns)[:, [OFFSETS.index(name) for name in names]]
+
+    def mean_absolute(
+        self, displacement: Array, nuisance: Mapping[str, float] | None = None
+    ) -> float:
+        """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""
+        shift = displacement_offset(nuisance or {})
+        total = [
+            np.abs(target.at(nodal) + shift - target.displacement).sum(axis=1)
+            for target, nodal in zip(self.targets, displacement, strict=True)
+        ]
+        return float(np.concatenate(total).mean())

@@ -1,0 +1,208 @@
+"""A bubble test with its data: what was measured, or computed, and what a fit compares with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ...data.fields import DisplacementField, read_fields
+from ...data.surfaces import DisplacementSurface, fit_surface
+from ...errors import InputError, SolverFailure
+from ...identification.comparison import Comparison, Nuisance
+from ...materials.forms.registry import form_named
+from ...materials.law import HypoelasticLaw
+from ...solvers.base import Solver
+from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from .findings import findings_of
+from .objective import OFFSETS, FieldObjective
+from .places import at_nodes, at_points, folded, mirrored
+from .sources import KnownSolution, PointFiles, in_section
+from .test import BubbleTest
+
+#: Over pressures and directions; relative to the largest measured displacement of each.
+OBJECTIVES = {
+    "e": "sum of relative RMS errors",
+    "mm": "sum of RMS errors, mm",
+}
+#: Comparisons of lower stages lead in; a bubble is the last to join.
+STAGE = 2
+#: mm and kPa; a pressure offset leaves the first pressure positive.
+MOST_SHIFT, MOST_PRESSURE, LEAST_SHARE = 20.0, 50.0, -0.9
+PRESSURE = "pressure_offset"
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedBubble:
+    """The test, what was measured (or computed) as read, and polynomial surfaces of it.
+
+    known : the law behind computed data. surfaces : for the match or the report.
+    """
+
+    test: BubbleTest
+    fields: tuple[DisplacementField, ...]
+    surfaces: tuple[DisplacementSurface, ...]
+    known: HypoelasticLaw | None
+
+    @property
+    def objective_is(self) -> str:
+        """What is minimised, in words."""
+        return OBJECTIVES[self.test.objective]
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        """None: a bubble is one specimen."""
+        return {}
+
+    def reach(self, masks: Masks) -> Reach:
+        """As the test's own: nothing of it is left out."""
+        return self.test.reach
+
+    @property
+    def dropped(self) -> int:
+        """Doubtful points that were left out."""
+        return sum(f.dropped for f in self.fields)
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+    ) -> tuple[Comparison, ...]:
+        """The one comparison: the whole field at every pressure.
+
+        Raises
+        ------
+        InputError : data that cannot be matched.
+        """
+        test, model = self.test, self.test.model()
+        # Blocks: one a direction and pressure.
+        weight = weighting.weight / (3 * len(test.pressures)) if weighting.relative else 1.0
+        fields = [folded(f) for f in self.fields] if test.symmetry == "quarter" else self.fields
+        if test.match_by == "surfaces":
+            targets = at_nodes(self.surfaces, model.mesh)
+        elif self.known is not None:
+            targets = at_nodes(fields, model.mesh)
+        else:
+            targets, _ = at_points(test, fields, model.mesh)
+        try:
+            objective = FieldObjective(
+                targets, "e" if weighting.relative else test.objective, weight
+            )
+        except InputError as error:
+            raise in_section(test.place, error) from None
+        nuisance = nuisance_of(test)
+        return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
+
+    @property
+    def outside(self) -> int:
+        """Measured points beyond the rim of the model, which are not matched."""
+        if self.test.match_by == "surfaces" or self.known is not None:
+            return 0
+        test = self.test
+        fields = [folded(f) for f in self.fields] if test.symmetry == "quarter" else self.fields
+        return at_points(test, fields, test.model().mesh)[1]
+
+    def findings(self, fitted: FittedTest) -> Findings:
+        """What the best fit means for this test."""
+        return findings_of(self, fitted)
+
+    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
+        """Write cuts, heights, moduli, surfaces.csv and bubble.vtu."""
+        from .figures import exhibit
+
+        return exhibit(self, fitted, findings, out)
+
+    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
+        """Every matched displacement component: pressure_kPa, x_mm, y_mm, direction, mm."""
+        from .tables import residual_table
+
+        return residual_table(self, fitted)
+
+
+def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
+    """The offsets that the test's section turns on."""
+    on: list[Nuisance] = []
+    if test.displacement_offset:
+        on += [Nuisance(name, -MOST_SHIFT, MOST_SHIFT, "mm", None, 1.0) for name in OFFSETS]
+    if test.pressure_offset:
+        least = LEAST_SHARE * 1e3 * min(test.increments)
+        on.append(Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3))
+    return tuple(on)
+
+
+def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBubble:
+    """Read or compute the data of a test.
+
+    Raises
+    ------
+    InputError : in the data. SolverFailure : the known solution cannot be run.
+    """
+    known = None
+    if isinstance(test.data, KnownSolution):
+        known = _known_law(test, test.data, law)
+        fields = _computed(test, test.data, known, make_solver())
+    else:
+        fields = _measured(test, test.data)
+    return PreparedBubble(test, fields, _surfaces(test, fields, known is not None), known)
+
+
+def _known_law(test: BubbleTest, data: KnownSolution, law: HypoelasticLaw) -> HypoelasticLaw:
+    field = "data.known_solution"
+    try:
+        form = form_named(data.form, {}, law.strain_range.tolist())
+        return HypoelasticLaw(data.beta, law.nu12, law.strain_range, law.thickness_change, form)
+    except InputError as error:
+        raise test.place.error(f"{field}.{error.field}", error.problem) from None
+
+
+def _surfaces(
+    test: BubbleTest, fields: Sequence[DisplacementField], computed: bool
+) -> tuple[DisplacementSurface, ...]:
+    """Surfaces of every field; where they are only reported, too few points leave them out."""
+    # A computed quarter is mirrored: surfaces are fitted to the full disk.
+    whole = [mirrored(f) if computed else f for f in fields]
+    if test.match_by == "points":
+        count = min(len(f.points) for f in whole)
+        if count < (test.match_degree + 1) ** 2:
+            return ()
+    try:
+        return tuple(fit_surface(f, test.match_degree) for f in whole)
+    except InputError as error:
+        problem = f"{error.field}: {error.problem}"
+        raise test.place.error("match.degree", problem) from None
+
+
+def _computed(
+    test: BubbleTest, data: KnownSolution, known: HypoelasticLaw, solver: Solver
+) -> tuple[DisplacementField, ...]:
+    """Displacements of the known solution by the solver that fits, on the data's own mesh."""
+    if data.symmetry == "quarter" and test.symmetry == "full":
+        problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
+        raise test.place.error("data.known_solution.symmetry", problem)
+    source = test.model(elements=data.elements, symmetry=data.symmetry, increments=data.increments)
+    try:
+        history = solver.run(source, known)
+    except SolverFailure as failure:
+        raise SolverFailure(
+            f"the known solution cannot be run: {failure.reason}",
+            failure.solver,
+            failure.exit_number,
+            failure.log_tail,
+            failure.scratch,
+        ) from None
+    return tuple(
+        DisplacementField(p, source.mesh.points[:, :2], u, 0)
+        for p, u in zip(test.pressures, np.asarray(history.displacement), strict=True)
+    )
+
+
+def _measured(test: BubbleTest, data: PointFiles) -> tuple[DisplacementField, ...]:
+    return read_fields(
+        data.files,
+        test.pressures,
+        columns=data.columns,
+        flag_column=data.flag_column,
+        comment=data.comment,
+        length_scale=data.length_scale,
+        format=data.format,
+    )

@@ -1,0 +1,85 @@
+"""[[bubble]] of a project, as it is written."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
+from ...sections import LengthUnit, Number, Positive, Section
+
+Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
+Symmetry = Literal["full", "quarter"]
+
+
+class KnownSolutionSection(Section):
+    """[bubble.data.known_solution]: data are computed from these coefficients."""
+
+    beta: list[Number]
+    form: str = "cubic"
+    elements: Elements | None = None
+    increments: list[Positive] | None = None
+    symmetry: Symmetry | None = None
+
+
+class ColumnsSection(Section):
+    """Names in the files."""
+
+    x: str = "x"
+    y: str = "y"
+    dx: str = "dx"
+    dy: str = "dy"
+    dz: str = "dz"
+
+
+class PointsSection(Section):
+    """[bubble.data.points]: files of measured points, one a pressure."""
+
+    files: list[str] | None = None
+    pattern: str | None = None
+    indices: list[int] | None = None
+    folder: str = ""
+    format: str | None = None
+    columns: ColumnsSection = ColumnsSection()
+    flag_column: str | None = None
+    comment: str = "#"
+    length_unit: LengthUnit | None = None
+
+
+class DataSection(Section):
+    """[bubble.data]: one of the two."""
+
+    known_solution: KnownSolutionSection | None = None
+    points: PointsSection | None = None
+
+
+class MatchSection(Section):
+    """Whether points or polynomial surfaces through them are matched."""
+
+    by: Literal["surfaces", "points"] = "points"
+    degree: Annotated[int, Field(ge=1, le=12)] = 4
+
+
+class NuisanceSection(Section):
+    """What a measurement may be off by, fitted beside the moduli."""
+
+    displacement_offset: bool = False
+    pressure_offset: bool = False
+
+
+class BubbleSection(Section):
+    """[[bubble]]: a clamped disk, inflated."""
+
+    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    weight: Positive = 1.0
+    radius: Positive
+    pressures: Annotated[list[Positive], Field(min_length=1)]
+    increments: list[Positive] | None = None
+    elements: Elements = 800
+    symmetry: Symmetry = "full"
+    generator: Literal["blocks", "gmsh"] = "blocks"
+    objective: Literal["e", "mm"] = "e"
+    match: MatchSection = MatchSection()
+    nuisance: NuisanceSection = NuisanceSection()
+    data: DataSection

@@ -1,0 +1,174 @@
+"""A bubble test as its section says, and the model of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from ...errors import InputError
+from ...materials.law import HypoelasticLaw
+from ...meshes.disk import disk_mesh
+from ...models.bubble import BubbleModel, default_increments
+from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
+from .section import BubbleSection, Symmetry
+from .sources import KnownSolution, PointFiles, data_source, merge_increments
+
+PART = "bubble"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BubbleTest:
+    """A clamped disk that is inflated. Lengths mm, pressures MPa.
+
+    `pressures` are reported and matched, `increments` are the load steps and contain them.
+    """
+
+    name: str
+    place: Place
+    weight: float
+    radius: float
+    elements: int
+    symmetry: Symmetry
+    generator: Literal["blocks", "gmsh"]
+    pressures: tuple[float, ...]
+    increments: tuple[float, ...]
+    data: KnownSolution | PointFiles
+    match_by: Literal["surfaces", "points"]
+    match_degree: int
+    objective: Literal["e", "mm"]
+    displacement_offset: bool
+    pressure_offset: bool
+    kind: str = "bubble"
+
+    @property
+    def thickness(self) -> float:
+        """Of the fabric, mm."""
+        return self.place.fabric.thickness
+
+    @property
+    def reach(self) -> Reach:
+        """Nothing: how far a bubble is strained is known only when its law is."""
+        return Reach()
+
+    @property
+    def reads_files(self) -> bool:
+        """Not where its data are computed."""
+        return isinstance(self.data, PointFiles)
+
+    def model(
+        self,
+        thickness: float | None = None,
+        elements: int | None = None,
+        symmetry: Symmetry | None = None,
+        increments: tuple[float, ...] | None = None,
+    ) -> BubbleModel:
+        """The test's model, or one of the same disk with another mesh or other increments.
+
+        Raises
+        ------
+        InputError : a mesh that cannot be had.
+        """
+        mesh = disk_mesh(
+            self.radius, elements or self.elements, symmetry or self.symmetry, self.generator
+        )
+        thick = self.thickness if thickness is None else thickness
+        return BubbleModel(mesh, thick, self.pressures, increments or self.increments)
+
+    def models(
+        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+    ) -> Mapping[str, BubbleModel]:
+        """The one model; edges of its quads, or its increments, divided by a factor.
+
+        Raises
+        ------
+        InputError : a mesh that cannot be had; increments to be joined.
+        """
+        own = self.model(thickness)
+        if factor == 1:
+            return {PART: own}
+        if what == "elements":
+            # From the count that the mesh has, not the one asked for: so that finer meshes divide
+            # its quads, as far as there is such a mesh.
+            whole = len(own.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
+            return {PART: self.model(thickness, elements=round(whole * factor**2))}
+        if factor != int(factor):
+            problem = "the bubble's steps are divided, never joined: use --coarser 0"
+            raise InputError(None, "increments", problem)
+        ends = (0.0, *self.increments)
+        parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise(ends)]
+        steps = tuple(float(p) for part in parts for p in part)
+        return {PART: self.model(thickness, increments=steps)}
+
+    def settings(self) -> Mapping[str, object]:
+        """Everything but names and places of files."""
+        names = (
+            "radius", "elements", "symmetry", "generator", "pressures", "increments", "match_by",
+            "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
+        )  # fmt: skip
+        said: dict[str, object] = {name: getattr(self, name) for name in names}
+        if isinstance(self.data, KnownSolution):
+            known = asdict(self.data)
+            said["known_solution"] = {**known, "beta": self.data.beta.tolist()}
+        return said
+
+    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
+        """Read the measured fields, or compute those of the known solution.
+
+        Raises
+        ------
+        InputError : in the data. SolverFailure : the known solution cannot be run.
+        """
+        from .prepared import prepare
+
+        return prepare(self, law, make_solver)
+
+
+def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
+    """The test of a section.
+
+    Raises
+    ------
+    InputError : naming the file and the dotted key.
+    """
+    scales = place.scales
+    pressures = _pressures(section, place)
+    increments = default_increments(pressures)
+    if section.increments is not None:
+        increments = merge_increments(place, "increments", section.increments, pressures)
+    radius = section.radius * scales.length
+    if place.fabric.thickness >= radius:
+        problem = (
+            f"expected more than the fabric's thickness {place.fabric.thickness:g} mm, got "
+            f"{radius:g} mm"
+        )
+        raise place.error("radius", problem)
+    return BubbleTest(
+        name=name,
+        place=place,
+        weight=section.weight,
+        radius=radius,
+        elements=section.elements,
+        symmetry=section.symmetry,
+        generator=section.generator,
+        pressures=pressures,
+        increments=increments,
+        data=data_source(section, place, pressures, increments),
+        match_by=section.match.by,
+        match_degree=section.match.degree,
+        objective=section.objective,
+        displacement_offset=section.nuisance.displacement_offset,
+        pressure_offset=section.nuisance.pressure_offset,
+    )
+
+
+def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...]:
+    given = section.pressures
+    for i in range(1, len(given)):
+        if given[i] <= given[i - 1]:
+            problem = f"pressures must increase, got {given[i]:g} after {given[i - 1]:g}"
+            raise place.error(f"pressures[{i}]", problem)
+    return tuple(p * place.scales.pressure for p in given)

@@ -1,0 +1,127 @@
+"""Figures and VTU files of bent cylinders."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...data.bending_scatter import scatter
+from ...reports import (
+    BendLine,
+    BendPanel,
+    BendReadings,
+    plot_bending,
+    plot_bending_cases,
+    plot_gas,
+)
+from ..base import Output, Shown
+from .beam import draw_beam, write_beam
+from .test import CylinderTest
+
+if TYPE_CHECKING:
+    from .outcome import CylinderOutcome
+
+FIGURES, BEAMS = "figures", "beams"
+
+
+def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+    """Loads, gas and beam of every test, and all loads together; each with its caption."""
+    tests = tests_of(outcome)
+    cards = list(dict.fromkeys(run.card for run in outcome.runs))
+    ranks = {card: rank for rank, card in enumerate(cards)}
+    names = file_names([test.name for test in tests])
+    panels, figures = {}, []
+    for test in tests:
+        ended = [i for i in outcome.bent if outcome.runs[i].test is test]
+        panels[test.name] = _panel(test, outcome, ended, ranks)
+        if not ended:
+            continue
+        stem = f"{FIGURES}/{names[test.name]}"
+        plot_bending(out.path(f"{stem}-load.png"), panels[test.name])
+        plot_gas(out.path(f"{stem}-gas.png"), panels[test.name])
+        first, run = outcome.runs[ended[0]], outcome.bent[ended[0]]
+        drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
+        draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
+        figures += [
+            (out.name(f"{stem}-load.png"), f"{test.name}: load over deflection"),
+            (out.name(f"{stem}-beam.png"), f"{test.name}: the bent beam, card {first.card}"),
+            (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
+        ]
+    if sum(bool(panel.lines) for panel in panels.values()) > 1:
+        rows = _rows(tests)
+        columns = max(map(len, rows))
+        laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
+        plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
+        caption = "Load over deflection, all tests"
+        figures.insert(0, (out.name(f"{FIGURES}/all-loads.png"), caption))
+    return figures
+
+
+def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+    """The last frame of every run for ParaView; files and what they are."""
+    tests = file_names([test.name for test in tests_of(outcome)])
+    cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))
+    files = []
+    for i, bent in outcome.bent.items():
+        run = outcome.runs[i]
+        name = f"{BEAMS}/{tests[run.test.name]}-{cards[run.card]}.vtu"
+        write_beam(run.model, bent, out.path(name))
+        files.append((out.name(name), f"the beam at {bent.deflection[-1]:g} mm, for ParaView"))
+    return files
+
+
+def tests_of(outcome: CylinderOutcome) -> list[CylinderTest]:
+    """The tests of the runs, each once."""
+    return list({id(run.test): run.test for run in outcome.runs}.values())
+
+
+def file_names(names: Sequence[str]) -> dict[str, str]:
+    """A name for files for each, all different."""
+    files: dict[str, str] = {}
+    for number, name in enumerate(names, start=1):
+        plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
+        taken = plain.casefold() in (other.casefold() for other in files.values())
+        files[name] = f"{plain}-{number}" if taken else plain
+    return files
+
+
+def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
+    return [BendPanel("")] * (columns - len(row))
+
+
+def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
+    """A row a diameter where there are several of them with several pressures."""
+    rows: dict[float, list[CylinderTest]] = {}
+    for test in tests:
+        rows.setdefault(round(test.diameter, 6), []).append(test)
+    if len(rows) > 1 and max(map(len, rows.values())) > 1:
+        return list(rows.values())
+    flat = list(tests)
+    return [flat[i : i + 3] for i in range(0, len(flat), 3)]
+
+
+def _panel(
+    test: CylinderTest, outcome: CylinderOutcome, ended: Sequence[int], ranks: Mapping[str, int]
+) -> BendPanel:
+    lines = []
+    for i in ended:
+        run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
+        rms = None if m.error is None else m.error.rms
+        curves = run.deflection, run.load, run.pressure, run.volume
+        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms))
+    measured = None
+    if test.measured:
+        s = scatter(test.measured)
+        # Where a repetition has ended the mean of the others jumps.
+        whole = s.count == len(test.measured)
+        readings = [(c.deflection, c.load) for c in test.measured]
+        measured = BendReadings(
+            readings,
+            s.deflection,
+            np.where(whole, s.mean, np.nan),
+            np.where(whole, s.deviation, np.nan),
+        )
+    return BendPanel(test.name, lines, measured)

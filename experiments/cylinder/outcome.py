@@ -1,0 +1,117 @@
+"""What the runs of cylinders with cards say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import pandas as pd
+
+from ..base import Exhibit, Output, PredictedRun
+from .measures import BendingMeasures, Point, bending_measures
+from .record import BendingRun, run_of
+from .tables import columns_of, curve_of, terminal_table
+from .test import CylinderTest
+
+FINISHED = "finished"
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderOutcome:
+    """Runs of cylinders with cards, in the order given, and what they say."""
+
+    runs: Sequence[PredictedRun]
+
+    @cached_property
+    def bent(self) -> Mapping[int, BendingRun]:
+        """The runs that did not fail, by number."""
+        found = {i: run_of(run.record) for i, run in enumerate(self.runs)}
+        return {i: run for i, run in found.items() if run is not None}
+
+    @cached_property
+    def measures(self) -> Mapping[int, BendingMeasures]:
+        """Their numbers."""
+        return {
+            i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
+            for i, run in self.bent.items()
+        }
+
+    def ended(self, number: int) -> str:
+        """How a run ended: "finished", how far it came, or why it failed."""
+        record = self.runs[number].record
+        if record.failure:
+            return f"failed: {record.failure}"
+        if not record.early:
+            return FINISHED
+        whole, reached = self.runs[number].test.deflections[-1], self.bent[number].deflection[-1]
+        return f"stopped at {reached:g} of {whole:g} mm: {record.early}"
+
+    def error(self, number: int) -> float | None:
+        """RMS of model less reading over the largest load read; None where there is none."""
+        measures = self.measures.get(number)
+        return None if measures is None or measures.error is None else measures.error.relative
+
+    def numbers(self, number: int) -> Mapping[str, Any]:
+        """Of a run that did not fail, for result.json."""
+        m = self.measures[number]
+        names = ("warp", "fill")
+        return {
+            "reached_mm": m.reached,
+            "stiffness_N_per_mm": m.stiffness,
+            "buckling": {"is": m.buckling_is, **_point(m.buckling)},
+            "knee": _point(m.knee),
+            "limit_point": _point(m.limit),
+            "wrinkle_onset": _point(m.wrinkles),
+            "load_N": dict(m.loads),
+            "inflation_strain": {
+                "body": dict(zip(names, m.body_strain, strict=True)),
+                "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
+            },
+            "straight_before_buckling": None
+            if m.straightness is None
+            else {"r_squared": m.straightness[0], "largest_deviation": m.straightness[1]},
+            "pressure_rise_kPa": m.pressure_rise,
+            "error": None if m.error is None else asdict(m.error),
+        }
+
+    def columns(self, number: int) -> Mapping[str, object]:
+        """A row of the table of runs."""
+        places = self.runs[number].test.reading.places
+        return columns_of(self.measures.get(number), tuple(places))
+
+    def curve(self, number: int) -> pd.DataFrame:
+        """Frame by frame: deflection, load, gauge pressure, volume, wrinkled share."""
+        return curve_of(self.bent.get(number))
+
+    def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
+        """What a cylinder is, for result.json."""
+        return {
+            "diameter_mm": test.diameter,
+            "pressure_kPa": 1e3 * test.pressure,
+            "length_mm": test.length,
+            "seam_width_mm": test.seam_width,
+            "element_size_mm": test.size,
+            "symmetry": test.symmetry,
+            "supports": asdict(test.supports),
+            "collar": asdict(test.collar),
+            "places_mm": dict(test.reading.places),
+            "slope_over_mm": test.reading.slope_over,
+            "repetitions": len(test.measured),
+        }
+
+    def lines(self) -> Sequence[str]:
+        """A table for the terminal."""
+        ended = [self.ended(i) for i in range(len(self.runs))]
+        return terminal_table(self.runs, self.measures, ended)
+
+    def show(self, out: Output) -> Exhibit:
+        """Write figures, tables and beams."""
+        from .page import exhibit
+
+        return exhibit(self, out)
+
+
+def _point(point: Point | None) -> dict[str, float | None]:
+    return {"deflection_mm": point[0] if point else None, "load_N": point[1] if point else None}

@@ -1,0 +1,181 @@
+"""A cylinder in bending as its section says, and the model of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from ...data.bending import BendingCurve
+from ...errors import InputError
+from ...models.bending import DEFLECTION, FRAMES, LENGTH, SEAM_WIDTH, inflated_cylinder
+from ...models.bodies import Collar, RigidSupports, usual_collar
+from ...models.cylinder import CylinderModel
+from ...models.gas import Gas
+from ...models.reading import CurveReading, curve_reading
+from ..base import Place, Reach, Refined
+from .measured import read_measured
+from .section import CylinderSection
+
+#: The one part of the test.
+PART = "cylinder"
+#: mm of an element, unless the file says otherwise.
+SIZE = 25.0
+#: Keys of the section, where a model calls them otherwise.
+KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CylinderTest:
+    """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
+
+    deflections : frames of the bending. measured : repetitions, empty where there are none.
+    """
+
+    name: str
+    place: Place
+    diameter: float
+    pressure: float
+    length: float
+    seam_width: float
+    size: float
+    symmetry: Literal["quarter", "full"]
+    cap_warp: Literal["x", "y"]
+    supports: RigidSupports
+    collar: Collar
+    deflections: tuple[float, ...]
+    gas: Gas
+    reading: CurveReading
+    measured: tuple[BendingCurve, ...] = ()
+    kind: str = "cylinder"
+    #: Nothing of it is fitted.
+    weight: float = 1.0
+
+    @property
+    def reach(self) -> Reach:
+        """Nothing: its strains are known only when a card is."""
+        return Reach()
+
+    def model(self, thickness: float | None = None) -> CylinderModel:
+        """The test with a fabric of this thickness (mm), else of the project's.
+
+        Raises
+        ------
+        InputError : sizes that make no mesh or bodies that do not fit around it.
+        """
+        return inflated_cylinder(
+            self.diameter,
+            self.pressure,
+            self.place.fabric.thickness if thickness is None else thickness,
+            self.size,
+            self.length,
+            self.seam_width,
+            self.supports,
+            self.collar,
+            self.deflections,
+            self.symmetry,
+            self.cap_warp,
+            self.gas,
+            self.reading,
+        )
+
+    def models(
+        self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
+    ) -> Mapping[str, CylinderModel]:
+        """The one model; edges, or every increment of pressure and deflection, divided.
+
+        Raises
+        ------
+        InputError : a mesh that cannot be had; increments to be joined.
+        """
+        if what == "elements":
+            return {PART: replace(self, size=self.size / factor).model(thickness)}
+        if factor != int(factor):
+            problem = "the cylinder's steps are divided, never joined: use --coarser 0"
+            raise InputError(None, "increments", problem)
+        model, parts = self.model(thickness), int(factor)
+        inflation, increments = (_divided(s, parts) for s in (model.inflation, model.increments))
+        return {PART: replace(model, inflation=inflation, increments=increments)}
+
+    def settings(self) -> Mapping[str, object]:
+        """Everything but names, measurements and where the curve is read."""
+        names = (
+            "diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
+            "deflections",
+        )  # fmt: skip
+        bodies = {name: asdict(getattr(self, name)) for name in ("supports", "collar", "gas")}
+        return {**{name: getattr(self, name) for name in names}, **bodies}
+
+
+def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
+    """The test of a section; a cylinder that makes no model is found here, before anything runs.
+
+    Raises
+    ------
+    InputError : naming the file and the dotted key, or a measured file and line.
+    """
+    scales = place.scales
+
+    def length(value: float | None, default: float) -> float:
+        return default if value is None else float(value * scales.length)
+
+    diameter = section.diameter * scales.length
+    places = section.places
+    try:
+        test = CylinderTest(
+            name=name,
+            place=place,
+            diameter=diameter,
+            pressure=section.pressure * scales.pressure,
+            length=length(section.length, LENGTH),
+            seam_width=length(section.seam_width, SEAM_WIDTH),
+            size=length(section.element_size, SIZE),
+            symmetry=section.symmetry,
+            cap_warp=section.cap_warp,
+            supports=RigidSupports(
+                length(section.span, RigidSupports().span),
+                length(section.support_diameter, RigidSupports().diameter),
+            ),
+            collar=_collar(section, diameter, scales.length),
+            deflections=_deflections(section, scales.length),
+            gas=_gas(section, scales.pressure),
+            reading=curve_reading(
+                diameter,
+                None if places is None else [p * scales.length for p in places],
+                section.slope_over and section.slope_over * scales.length,
+            ),
+        )
+        test.model()
+    except InputError as error:
+        raise place.error(KEYS.get(error.field, error.field), error.problem) from None
+    return replace(test, measured=read_measured(section.measured, place))
+
+
+def _collar(section: CylinderSection, diameter: float, scale: float) -> Collar:
+    if section.collar is None:
+        return usual_collar(diameter)
+    given = section.collar.model_dump(exclude_none=True)
+    return Collar(**{key: value * scale for key, value in given.items()})
+
+
+def _gas(section: CylinderSection, scale: float) -> Gas:
+    given = section.gas.model_dump(exclude_none=True)
+    if "ambient" in given:
+        given["ambient"] *= scale
+    return Gas(**given)
+
+
+def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
+    """Those listed, else equal steps."""
+    if section.deflections is not None:
+        return tuple(d * scale for d in section.deflections)
+    end = DEFLECTION if section.deflection is None else section.deflection * scale
+    return tuple(np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist())
+
+
+def _divided(ends: Sequence[float], parts: int) -> list[float]:
+    steps = [np.linspace(a, b, parts + 1)[1:] for a, b in pairwise((0.0, *ends))]
+    return [float(value) for part in steps for value in part]

@@ -1,0 +1,77 @@
+"""What a reader of a result should know: strains beyond a range, equilibria that no test shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.card import MaterialCard, thickness_difference
+from ..solvers.base import History
+from .base import RunRecord
+
+Array = NDArray[np.float64]
+
+#: Strain components by name, in the order (eps1, eps2, gamma12).
+STRAINS = ("warp", "fill", "shear")
+#: A strain this far beyond an end, relative, is no rounding.
+BEYOND = 1 + 1e-6
+UNSTABLE = "the equilibrium at the last load is unstable: no test could be held there"
+
+
+def strains_of(history: History) -> Array:
+    """(3,) largest warp, fill and (either way) shear strain of an analysis."""
+    shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
+    return np.array([history.strain_max[0], history.strain_max[1], shear])
+
+
+def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
+    """Three values by the name of their strain component."""
+    return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
+
+
+def beyond_card(reached: Array, card: MaterialCard) -> list[str]:
+    """Where strains (3,) leave the range that a card is valid for."""
+    return [
+        f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there"
+        for name, s, end in zip(STRAINS, reached, card.law.strain_range, strict=True)
+        if s > end * BEYOND
+    ]
+
+
+def other_thickness(card: MaterialCard, thickness: float) -> list[str]:
+    """That a card that was run is of another thickness than the fabric's (mm), where it is."""
+    words = thickness_difference(card, thickness)
+    return [] if words is None else [f"{words}; it was run with the card's thickness"]
+
+
+def beyond_range(reached: Array, ends: Array, where: str = "") -> list[str]:
+    """Where strains (3,) of a fitted test leave the range that its law was given.
+
+    where : " in the ... test", where there are several.
+    """
+    return [
+        f"{name} strain reached {s:.3f}{where}, beyond law.strain_range {end:.4g}: the modulus was "
+        "held at its end value there; a wider range would let it vary"
+        for name, s, end in zip(STRAINS, reached, ends, strict=True)
+        if s > end * BEYOND
+    ]
+
+
+def notes_of(history: History, card: MaterialCard) -> list[str]:
+    """Everything to know of an analysis with a card."""
+    return _notes(history.remarks, strains_of(history), history.stable, card)
+
+
+def notes_of_record(record: RunRecord, card: MaterialCard) -> list[str]:
+    """The same of a run that is stored; nothing of one that failed, but its failure."""
+    reached = np.zeros(3) if record.strain is None else record.strain
+    return _notes(record.remarks, reached, record.stable, card)
+
+
+def _notes(
+    remarks: Sequence[str], reached: Array, stable: bool | None, card: MaterialCard
+) -> list[str]:
+    unstable = [UNSTABLE] if stable is False else []
+    return [*remarks, *beyond_card(reached, card), *unstable]

@@ -1,0 +1,74 @@
+"""Kinds of test by name: the folders beside this file, and those of other distributions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from ..errors import InputError, PlugInFailure
+from ..plugins import Group, PlugIn, names_with, plug_in_named, plug_ins
+from .base import Kind
+
+GROUP: Group = "bubblefit.tests"
+#: What a plug-in's kind must have to be one.
+NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", "simulate")
+
+log = logging.getLogger(__name__)
+
+
+def kinds() -> Mapping[str, Kind]:
+    """Every kind by name: ours, those that are fitted first, then those of plug-ins.
+
+    Plug-ins that do not work are logged and left out.
+    """
+    ours = sorted((kind_named(name) for name in _folders()), key=lambda k: (not k.fitted, k.name))
+    known = {kind.name: kind for kind in ours}
+    for plug_in in plug_ins(GROUP):
+        try:
+            if plug_in.name not in known:
+                known[plug_in.name] = kind_named(plug_in.name)
+        except PlugInFailure as error:
+            _warn(str(error))
+    return known
+
+
+def kind_named(name: str) -> Kind:
+    """The kind of this name; no other is imported.
+
+    Raises
+    ------
+    InputError : there is none. PlugInFailure : a plug-in that does not work.
+    """
+    if name in _folders():
+        kind: Kind = import_module(f".{name}", __package__).KIND
+        return kind
+    plug_in = plug_in_named(GROUP, name)
+    if plug_in is None:
+        known = ", ".join(names_with(GROUP, _folders()))
+        raise InputError(None, "kind", f"{name!r} is not one of: {known}")
+    return _of(plug_in)
+
+
+def _of(plug_in: PlugIn) -> Kind:
+    kind: Kind = plug_in.load("kind of test", NEEDED)
+    if kind.name != plug_in.name:
+        raise plug_in.failure(f"calls its kind of test {kind.name!r}; both must have one name")
+    return kind
+
+
+@cache
+def _folders() -> tuple[str, ...]:
+    """Folders of this package: each holds a `KIND` of that name."""
+    return tuple(
+        module.name for module in iter_modules([str(Path(__file__).parent)]) if module.ispkg
+    )
+
+
+@cache
+def _warn(text: str) -> None:
+    """Once a line: kinds are asked for many times."""
+    log.warning("%s", text)

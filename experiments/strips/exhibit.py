@@ -1,0 +1,55 @@
+"""What a test of strips puts on the page of a fit, and the files that it writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...reports import plot_loads
+from ...writing import replacing
+from ..base import Exhibit, FittedTest, Output, Shown
+from .figures import draw_bias, draw_moduli, draw_orders, load_panels
+from .prepared import FittedStrip
+from .tables import load_table, misfit_table
+from .test import StripsTest
+
+MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
+
+
+def exhibit(
+    test: StripsTest, strips: Sequence[FittedStrip], fitted: FittedTest, out: Output
+) -> Exhibit:
+    """Write loads.csv, bias.vtu and the pictures; what the page says of them."""
+    with replacing(out.path("loads.csv")) as path:
+        load_table(strips).to_csv(path, index=False)
+    figures = [_loads(strips, out)]
+    files = [(out.name("loads.csv"), "load curves of the best fit")]
+    for strip in strips:
+        if strip.direction == "bias":
+            picture, vtu = out.path("bias.png"), out.path("bias.vtu")
+            draw_bias(strip.model, strip.history, picture, vtu)
+            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
+            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
+    draw_moduli(strips, fitted, out.path("failure.png"))
+    caption = "Tangent moduli up to the strains at the end of each strip"
+    figures.append((out.name("failure.png"), caption))
+    if draw_orders([s.strip for s in strips], out.path("orders.png")):
+        caption = "Error of load polynomials by order, and with a specimen left out"
+        figures.append((out.name("orders.png"), caption))
+    return Exhibit(
+        facts=[("matched", MATCHED[test.match_by])],
+        figures=figures,
+        tables=[misfit_table(strips)],
+        files=files,
+    )
+
+
+def _loads(strips: Sequence[FittedStrip], out: Output) -> Shown:
+    """Load curves against what was measured."""
+    models = {
+        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
+    }
+    panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
+    plot_loads(out.path("loads.png"), panels)
+    return out.name("loads.png"), "Load over gauge elongation: measured and modelled"

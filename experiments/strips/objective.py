@@ -1,0 +1,98 @@
+"""Residuals of a strip test (Eqs 3.4-3.6): one block, whose norm is the RMS error of the load."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from ...errors import InputError
+from ...solvers.base import History
+
+Array = NDArray[np.float64]
+
+
+class LoadObjective:
+    """(model - measured) / (scale sqrt(n)) at n elongations of the gauge.
+
+    Parameters
+    ----------
+    increments : (frames,) mm, elongations that the model reports.
+    elongation, load : (n,) mm, N: what was measured, inside the increments. The model's load is
+        interpolated by a cubic spline from the origin through its increments.
+    scale : N: 1 for errors in N (Eq. 3.7), the largest load for relative errors.
+    weight : of the block in e.
+    least_noise : N, to reckon with where the data are exact.
+
+    Raises
+    ------
+    InputError : nothing measured, or measured outside the increments.
+    """
+
+    unit = "N"
+
+    def __init__(
+        self,
+        increments: ArrayLike,
+        elongation: ArrayLike,
+        load: ArrayLike,
+        scale: float = 1.0,
+        weight: float = 1.0,
+        least_noise: float = 0.0,
+    ) -> None:
+        knots = np.concatenate([[0.0], np.asarray(increments, float)])
+        self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
+        if not len(self.load):
+            raise InputError(None, "load curve", "holds no point to match")
+        beyond = (self.elongation < 0) | (self.elongation > knots[-1] * (1 + 1e-9))
+        if beyond.any():
+            problem = f"expected elongations from 0 to {knots[-1]:g} mm, got "
+            raise InputError(None, "load curve", f"{problem}{self.elongation[beyond][0]:g}")
+        # Interpolation is linear in the loads; the first knot is the unloaded strip.
+        self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
+        self.sizes = (len(self.load),)
+        self.weight, self.least_noise = weight, least_noise
+        self._unit = scale * np.sqrt(len(self.load)) / weight
+
+    @property
+    def scale(self) -> Array:
+        """(n,): newtons in one unit of each residual."""
+        return np.full(len(self.load), self._unit)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Everything measured that the residual depends on."""
+        return self.elongation, self.load
+
+    def shifted(self, here: History, there: History) -> LoadObjective:
+        """The objective of a model that carries `here` where this one carries `there`."""
+        other = copy.copy(self)
+        other.load = self.load - self.sample @ (here.load - there.load)
+        return other
+
+    def modelled(self, history: History) -> Array:
+        """The model's load at the measured elongations, (n,) N."""
+        return np.asarray(self.sample @ history.load)
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """The block, (n,); a strip knows of no nuisance."""
+        return np.asarray((self.modelled(history) - self.load) / self._unit)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """(n, parameters) from the history's load slope."""
+        if history.load_slope is None:
+            raise InputError(None, "history", "the solver gives no derivatives of the load")
+        return np.asarray(self.sample @ history.load_slope / self._unit)
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        """(n, 0): there is none."""
+        if names:
+            raise InputError(None, "nuisance", f"a load curve knows no {', '.join(names)}")
+        return np.empty((len(self.load), 0))
+
+    def rms(self, history: History) -> float:
+        """RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
+        return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))

@@ -1,0 +1,87 @@
+"""One [[strips]] of a project, in the file's own units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, TypeAdapter
+
+from ...sections import LoadUnit, Positive, Section
+
+Weight = Annotated[float, Field(ge=0, le=1e6)]
+FileNames = Annotated[list[str], Field(min_length=1)]
+Match = Literal["polynomial", "points"]
+Unit = Literal["N", "relative"]
+
+
+class GaugeSection(Section):
+    """[strips.warp] and so on: the virtual strain gauge at rest and at the end."""
+
+    gauge_length: Positive | None = None
+    final_length: Positive | None = None
+
+
+class ColumnsSection(Section):
+    """[strips.data.columns]: what the files call them."""
+
+    elongation: str | None = None
+    load: str | None = None
+    specimen: str | None = None
+    direction: str | None = None
+
+
+class FilesSection(Section):
+    """Files that do not name their direction, by direction."""
+
+    warp: FileNames | None = None
+    fill: FileNames | None = None
+    bias: FileNames | None = None
+
+
+def _files(given: Any) -> Any:
+    # Either form is checked here and not as a union: complaints then name the key, not the form.
+    if isinstance(given, dict):
+        return FilesSection.model_validate(given)
+    return given if given is None else TypeAdapter(FileNames).validate_python(given, strict=True)
+
+
+class CurvesSection(Section):
+    """[strips.data]: load curves, as polynomials or as measured."""
+
+    polynomials: str | None = None
+    files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
+    folder: str = ""
+    format: str | None = None
+    columns: ColumnsSection = ColumnsSection()
+    load_unit: LoadUnit | None = None
+    length_unit: Literal["mm", "cm", "m"] | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str = "#"
+    order: Annotated[int, Field(ge=1, le=10)] = 4
+    through_origin: bool = True
+
+
+class WeightsSection(Section):
+    """[strips.weights]: of each direction's error in the objective."""
+
+    warp: Weight = 1.0
+    fill: Weight = 1.0
+    bias: Weight = 1.0
+
+
+class StripsSection(Section):
+    """[[strips]]: cut strips pulled along warp, fill and across the yarns, as one test."""
+
+    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    width: Positive | None = None
+    grip_distance: Positive | None = None
+    bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    increments: Annotated[int, Field(ge=1, le=10000)] = 100
+    warp: GaugeSection | None = None
+    fill: GaugeSection | None = None
+    bias: GaugeSection | None = None
+    data: CurvesSection
+    match: Match = "polynomial"
+    objective: Unit = "N"
+    weight: Weight = 1.0
+    weights: WeightsSection = WeightsSection()

@@ -1,0 +1,109 @@
+"""One direction of a test of strips: what was measured, and the gauge it was measured with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...data.curves import LoadCurve
+from ...data.load_polynomials import LoadPolynomial, fit_load_polynomial
+from ...data.regions import strain_regions
+
+Array = NDArray[np.float64]
+
+#: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
+#: load cell is of accuracy class 0.5 %.
+LOAD_CELL = 0.005
+PLACES = 200  # at which a polynomial is asked for its regions
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """One direction. Lengths mm, loads N.
+
+    Parameters
+    ----------
+    direction : warp, fill or bias.
+    gauge_length, final_length : of the virtual strain gauge, at rest and at the end.
+    polynomial : the load curve, given or fitted to the curves; None where a forward analysis does
+        without data.
+    curves : the specimens' points, empty where only the polynomial is given.
+    scatter : standard deviation of the points about the polynomial; None where not known.
+    through_origin : whether a polynomial through the points starts in the origin.
+    """
+
+    direction: str
+    gauge_length: float
+    final_length: float
+    polynomial: LoadPolynomial | None = None
+    curves: tuple[LoadCurve, ...] = ()
+    scatter: float | None = None
+    through_origin: bool = True
+
+    @property
+    def elongation(self) -> float:
+        """Of the gauge at the end, mm."""
+        return self.final_length - self.gauge_length
+
+    @property
+    def strain(self) -> float:
+        """Logarithmic strain of the gauge at the end."""
+        return float(np.log(self.final_length / self.gauge_length))
+
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Elongation and load of all specimens up to the end of the model, by elongation."""
+        elongation, load, _ = self._inside
+        return elongation, load
+
+    @property
+    def specimen_of(self) -> NDArray[np.intp]:
+        """Number of the specimen of each of the `points`."""
+        return self._inside[2]
+
+    @property
+    def beyond(self) -> int:
+        """Number of measured points that are not among the `points`."""
+        return sum(len(c.load) for c in self.curves) - len(self.points[0])
+
+    def noise(self, largest: float) -> float:
+        """Least noise of a load to reckon with, N; `largest` is the largest load measured."""
+        return LOAD_CELL * largest if self.scatter is None else self.scatter
+
+    def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
+        """Two shares of the gauge's strain between which three lines follow the load curve best.
+
+        mask : of the points, which the curve is to follow; all unless given.
+
+        Raises
+        ------
+        InputError : the points matched settle no polynomial.
+        """
+        polynomial = self.polynomial
+        if polynomial is None:
+            return None
+        if mask is not None and self.curves:
+            elongation, load = self.points
+            order = polynomial.order
+            polynomial = fit_load_polynomial(
+                elongation[mask], load[mask], order, self.through_origin
+            )
+        u = np.linspace(0.0, self.elongation, PLACES)[1:]
+        strain = np.log1p(u / self.gauge_length)
+        first, second = strain_regions(strain, polynomial(u))
+        return float(first / strain[-1]), float(second / strain[-1])
+
+    @cached_property
+    def _inside(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        if not self.curves:
+            return np.empty(0), np.empty(0), np.empty(0, np.intp)
+        elongation = np.concatenate([c.elongation for c in self.curves])
+        load = np.concatenate([c.load for c in self.curves])
+        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
+        end = self.elongation * (1 + 1e-9)
+        order = np.argsort(elongation, kind="stable")
+        order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
+        return elongation[order], load[order], whose[order].astype(np.intp)

@@ -1,0 +1,1 @@
+"""A fit as a whole: project, settings, output folder, result; and predictions with its card."""

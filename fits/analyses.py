@@ -1,0 +1,72 @@
+"""Analyses one after the other on the solver of a project: counted, and told of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import History, Solver
+from ..solvers.registry import usable_solver
+from .project import Project
+
+
+@dataclass(frozen=True)
+class Step:
+    """How far a series of analyses is.
+
+    part : what is run. analysis : which of how many, from 1. done : increments of it so far.
+    """
+
+    part: str
+    analysis: int
+    analyses: int
+    done: float
+    increments: int
+
+
+Progress = Callable[[Step], None]
+
+
+class Analyses:
+    """A series of analyses.
+
+    Parameters
+    ----------
+    project : whose solver runs them. progress : is told how far they are; `total` is what it is
+        told of how many there will be.
+
+    Raises
+    ------
+    InputError, SolverFailure : the solver cannot be used.
+    """
+
+    def __init__(self, project: Project, progress: Progress | None = None) -> None:
+        name = project.fit.solver
+        options = project.solver_options.get(name, {})
+        self.solver: Solver = usable_solver(name, options, project.path)
+        self.total = self.count = 0
+        self._progress = progress
+
+    def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
+        """The next analysis; `part` and `increments` (0: not known) are for the progress.
+
+        Raises
+        ------
+        SolverFailure : it does not end well.
+        """
+        self.count += 1
+        tell, count = self._progress, self.count
+        if tell is None:
+            return self.solver.run(model, law)
+
+        def say(done: float) -> None:
+            tell(Step(part, count, self.total, done, increments))
+
+        say(0.0)
+        self.solver.progress = lambda increment: say(increment.time)
+        try:
+            return self.solver.run(model, law)
+        finally:
+            self.solver.progress = None

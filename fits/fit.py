@@ -1,0 +1,113 @@
+"""A fit: every start of the chosen tests, the best of them once more, and what it means."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from ..errors import NoFeasibleStart
+from ..experiments.base import FittableTest
+from .best import best_fit
+from .processes import run_starts
+from .project import Project, cores
+from .result import Fit
+from .running_files import HISTORY, STARTS, RunningFiles
+from .setup import FitSetup, fingerprints, prepare_fit
+from .start import EvaluationRecord, StartRecord
+from .store import Store
+
+Record = EvaluationRecord | StartRecord
+#: Is told of every analysis and every start as it ends, and of time passing (None).
+Progress = Callable[[Record | None], None]
+
+
+def fit(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    method: str | None = None,
+    jobs: int | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit the law of a project to its tests, from random feasible starts.
+
+    Parameters
+    ----------
+    tests : names of tests, or a kind of test; every test that can be fitted unless given.
+    starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
+        cores unless the project says otherwise.
+    out : folder in which every analysis and start is written as it ends, so that an interrupted
+        fit can be gone on with (`resume`); nothing is written without it.
+    overwrite : replace what the folder holds.
+    progress : is told of every record; None now and then while nothing ends. An interrupt
+        (Ctrl-C) leaves the folder ready for `resume`.
+
+    Returns
+    -------
+    The result: card, moduli and residuals as tables, `report(folder)` for the page.
+
+    Raises
+    ------
+    InputError : in the project or its data, or nothing to go on with. OutputError : the folder is
+        used or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is
+        not there, or the best fit does not run again.
+    """
+    begun = time.perf_counter()
+    project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs)
+    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    setup = prepare_fit(project, chosen)
+    problem = setup.problem()
+    files = None
+    done: dict[int, StartRecord] = {}
+    if out is not None:
+        store = Store(Path(out))
+        store.begin(fingerprints(setup, problem), resume, overwrite, (STARTS, HISTORY))
+        unknowns, scales = problem.unknowns, project.scales
+        columns = [f"{label}_{scales.modulus_unit}" for label in unknowns.labels]
+        scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
+        files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
+        done = files.begin(resume)
+    records = _records(setup, files, done, progress or _nobody)
+    if all(r.objective is None for r in records):
+        raise NoFeasibleStart(f"{project.path}: no feasible start: {records[0].status}")
+    best = best_fit(problem, records, project.fit.tolerance)
+    return Fit(setup, problem, best, time.perf_counter() - begun)
+
+
+def _records(
+    setup: FitSetup,
+    files: RunningFiles | None,
+    done: dict[int, StartRecord],
+    progress: Progress,
+) -> list[StartRecord]:
+    """Every start: those that are finished already, and the others side by side."""
+    fit = setup.project.fit
+    ended = {n: r for n, r in done.items() if n < fit.starts}
+    for already in ended.values():
+        progress(already)
+    missing = [n for n in range(fit.starts) if n not in ended]
+    jobs = fit.jobs or cores()
+    try:
+        for record in run_starts(setup.problem, setup.options, fit.seed, missing, jobs):
+            if record is not None and files is not None:
+                files.add(record)
+            if isinstance(record, StartRecord):
+                ended[record.number] = record
+            progress(record)
+    finally:
+        if files is not None:
+            files.close()
+    if files is not None:
+        files.finish()
+    return [ended[n] for n in sorted(ended)]
+
+
+def _nobody(record: Any) -> None:
+    """Nobody wants to know."""

@@ -1,0 +1,156 @@
+"""What result.json says of a fit."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..experiments.notes import UNSTABLE, beyond_range, by_strain, strains_of
+from ..identification.assessment import pinned_by
+
+if TYPE_CHECKING:
+    from .result import Fit
+
+PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
+#: Beyond, a test says nothing about a modulus (1 sigma, relative).
+NOTHING = 1.0
+#: What all tests together are called among the tests.
+TOGETHER = "all together"
+
+
+def versions() -> dict[str, str]:
+    """Of what computes, by name."""
+    of = {name: importlib.metadata.version(name) for name in PACKAGES}
+    return {"bubblefit": __version__, "python": platform.python_version(), **of}
+
+
+def result_of(fit: Fit) -> dict[str, Any]:
+    """Everything that a fit found, in plain values.
+
+    With one test its numbers also stand at the top, beside those of the fit.
+    """
+    project, best, law = fit.project, fit.best, fit.law
+    records, sure = best.records, best.certainty
+    result: dict[str, Any] = {
+        "command": fit.command,
+        "title": project.title,
+        "solver": project.fit.solver,
+        "method": project.fit.method,
+        "objective": fit.objective,
+        "objective_is": fit.setup.objective_is,
+        "moduli": law.form.name,
+        "beta": {
+            "unit": project.scales.modulus_unit,
+            "labels": list(law.form.labels),
+            "values": (law.beta / project.scales.modulus).tolist(),
+        },
+        **law.form.to_card(),
+        "nu12": law.nu12,
+        "strain_reached": by_strain(best.reached),
+        "valid_strain": by_strain(best.valid),
+        "seed": project.fit.seed,
+        "starts": [
+            {
+                "start": r.number,
+                "seed": list(r.seed),
+                "objective": r.objective,
+                "status": r.status,
+                "analyses": r.analyses,
+                "external_runs": r.external_runs,
+            }
+            for r in records
+        ],
+        "analyses": sum(r.analyses for r in records),
+        "external_runs": sum(r.external_runs for r in records),
+        "warnings": [],
+        "wall_s": fit.wall_s,
+        "versions": versions(),
+    }
+    if sure is not None:
+        result["uncertainty"] = {
+            "noise": sure.noise,
+            "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
+            "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+        }
+    result["tests"] = {name: f.numbers for name, f in fit.findings.items()}
+    if len(fit.findings) == 1:
+        result |= next(iter(fit.findings.values())).numbers
+    else:
+        result |= _together(fit)
+    result["warnings"] = warnings_of(fit, result.get("pinned", {}))
+    return result
+
+
+def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
+    """1 sigma of each modulus from each test alone and from all; empty where it is not known.
+
+    From all together as they are weighted in the fit: the very uncertainty that it reports.
+    """
+    point, sure = fit.best.differentiated, fit.best.certainty
+    if point is None or sure is None or len(fit.setup.tests) < 2:
+        return {}
+    leading = fit.problem.surrogate or fit.problem
+    names = [c.name for c in fit.problem.comparisons]
+    numbers = {
+        name: [names.index(c.name) for c in fitted.comparisons]
+        for name, fitted in fit.tests.items()
+    }
+    sigma = partial(pinned_by, leading, point, fit.law, fit.best.valid)
+    alone = {name: sigma(own) for name, own in numbers.items()}
+    return {**alone, TOGETHER: dict(sure.sigma)}
+
+
+def _together(fit: Fit) -> dict[str, Any]:
+    """What a fit of several tests says beside what each test says."""
+    norms = fit.problem.blocks.norms(fit.best.point.residual)
+    block = np.concatenate(
+        [np.full(len(c.objective.sizes), k) for k, c in enumerate(fit.problem.comparisons)]
+    )
+    names = [c.name for c in fit.problem.comparisons]
+    errors = {}
+    for test, fitted in fit.tests.items():
+        mine = np.isin(block, [names.index(c.name) for c in fitted.comparisons])
+        errors[test] = float(norms[mine].sum() / fit.project.tests[test].weight)
+    return {
+        "mean_relative_error": errors,
+        "weights": {name: fit.project.tests[name].weight for name in fit.tests},
+        "pinned": {
+            source: {
+                name: {
+                    "least": float(s.min()),
+                    "median": float(np.median(s)),
+                    "largest": float(s.max()),
+                }
+                for name, s in sigmas.items()
+            }
+            for source, sigmas in pinned(fit).items()
+        },
+    }
+
+
+def warnings_of(fit: Fit, pins: dict[str, Any]) -> list[str]:
+    """What a reader must know before using the numbers: one place for page, terminal and json."""
+    best, several = fit.best, len(fit.problem.comparisons) > 1
+    words = list(best.certainty.undetermined) if best.certainty is not None else []
+    if not best.point.stable:
+        words.append(UNSTABLE)
+    ends = np.asarray(fit.law.strain_range)
+    for comparison, history in zip(fit.problem.comparisons, best.point.histories, strict=True):
+        where = f" in {comparison.name}" if several else ""
+        words += beyond_range(strains_of(history), ends, where)
+        words += [f"{comparison.name}: {r}" if several else r for r in history.remarks]
+    for name, findings in fit.findings.items():
+        words += [f"{name}: {w}" if len(fit.findings) > 1 else w for w in findings.warnings]
+    words += [
+        f"{source} alone does not determine {name} (1 sigma above {100 * NOTHING:.0f} % everywhere)"
+        for source, sigmas in pins.items()
+        if source != TOGETHER
+        for name, s in sigmas.items()
+        if s["least"] > NOTHING
+    ]
+    return words

@@ -1,0 +1,219 @@
+"""The folder of a finished fit: card, tables, figures, report.html, and last result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.card import write_card
+from ..materials.forms.base import COMPONENTS
+from ..materials.law import HypoelasticLaw
+from ..reports import (
+    Report,
+    StartRow,
+    Table,
+    percent,
+    plot_moduli,
+    plot_optima,
+    plot_pinned,
+    write_report,
+)
+from ..writing import replacing
+from .numbers import NOTHING, pinned
+from .store import RESULT, Store
+
+if TYPE_CHECKING:
+    from .result import Fit
+
+Array = NDArray[np.float64]
+
+CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
+#: Strains at which curves are drawn.
+SMOOTH = 121
+FILES = (
+    (RESULT, "all numbers of this page, for programs"),
+    (CARD, "the material card"),
+    (MODULI, "tangent moduli along their strains"),
+    (RESIDUALS, "every matched value beside the model's"),
+    ("history.csv", "one row an analysis"),
+)
+
+
+def write_fit(fit: Fit, folder: Path) -> Path:
+    """Write everything; raises OutputError."""
+    store = Store(folder)
+    (folder / RESULT).unlink(missing_ok=True)
+    write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
+    for name, table in ((MODULI, fit.moduli()), (RESIDUALS, fit.residuals())):
+        with replacing(folder / name) as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+    page = write_report(folder, _page(fit, folder))
+    store.finish(fit.result)
+    return page
+
+
+def _page(fit: Fit, folder: Path) -> Report:
+    result, project, best = fit.result, fit.project, fit.best
+    exhibits = {
+        t.test.name: t.show(
+            fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
+        )
+        for t in fit.setup.tests
+    }
+    shown = list(exhibits.values())
+    runs = result["external_runs"]
+    external = [(f"of them by {project.fit.solver}", runs)] if runs else []
+    pins = pinned(fit)
+    own = [
+        (label if len(shown) == 1 else f"{name}: {label}", value)
+        for name, exhibit in exhibits.items()
+        for label, value in exhibit.facts
+    ]
+    files = [*FILES, *(f for exhibit in shown for f in exhibit.files)]
+    return Report(
+        title=project.title,
+        summary=_summary(fit),
+        facts=[
+            (f"objective: {fit.setup.objective_is}", fit.objective),
+            ("method", f"{project.fit.method} on {project.fit.solver}"),
+            ("form of the moduli", fit.law.form.name),
+            ("starts", f"{len(best.ranked)} feasible of {len(best.records)}"),
+            ("analyses", result["analyses"]),
+            *external,
+            ("wall time, s", result["wall_s"]),
+            ("Poisson's ratio nu12 (fixed)", fit.law.nu12),
+            ("thickness", f"{project.fabric.thickness:g} mm, {project.fabric.thickness_change}"),
+            *own,
+        ],
+        coefficients=_coefficients(fit),
+        unit=project.scales.modulus_unit,
+        moduli_error=result.get("moduli_error", {}),
+        strain_reached=result["strain_reached"],
+        valid_strain=result["valid_strain"],
+        warnings=result["warnings"],
+        figures=[
+            _optima(fit, folder),
+            _moduli(fit, folder),
+            *_pinned(fit, folder, pins),
+            *(f for exhibit in shown for f in exhibit.figures),
+        ],
+        tables=[
+            *_determined(fit),
+            *_pinned_table(pins),
+            *(t for exhibit in shown for t in exhibit.tables),
+        ],
+        starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in best.records],
+        files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
+        versions=result["versions"],
+    )
+
+
+def _summary(fit: Fit) -> str:
+    said = "; ".join(
+        f"{name}: {f.summary}" if len(fit.findings) > 1 else f.summary
+        for name, f in fit.findings.items()
+    )
+    return f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {said}."
+
+
+def _coefficients(fit: Fit) -> list[tuple[str, float, float, float]]:
+    """Name, value, lower and upper bound of everything that was fitted of the law."""
+    form, unknowns, scale = fit.law.form, fit.problem.unknowns, fit.project.scales.modulus
+    rows = zip(form.free, *unknowns.box, strict=True)
+    return [
+        (form.labels[i], float(fit.law.beta[i] / scale), float(low / scale), float(high / scale))
+        for i, low, high in rows
+    ]
+
+
+def _optima(fit: Fit, folder: Path) -> tuple[str, str]:
+    values = [np.nan if r.objective is None else r.objective for r in fit.best.records]
+    plot_optima(folder / "optima.png", values)
+    return "optima.png", f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
+
+
+def _moduli(fit: Fit, folder: Path) -> tuple[str, str]:
+    """The moduli over the strains that they are fitted to, as far as the card is valid."""
+    strains = _strains(fit)
+    known = next((t.known for t in fit.setup.tests if t.known is not None), None)
+    curves = np.array([modulus_curves(law, strains) for law in fit.laws])
+    sigma, sure = None, fit.best.certainty
+    if sure is not None:
+        sigma = curves[0] * np.array(
+            [
+                np.interp(x, sure.strain[name], sure.sigma[name])
+                for name, x in zip(COMPONENTS, strains, strict=True)
+            ]
+        )
+    plot_moduli(
+        folder / "moduli.png",
+        strains,
+        curves,
+        None if known is None else modulus_curves(known, strains),
+        sigma=None if known is not None else sigma,
+    )
+    words = "" if known is not None or sigma is None else ", with one standard deviation"
+    return "moduli.png", f"Tangent moduli of the best fits over the strains reached{words}"
+
+
+def _strains(fit: Fit, count: int = SMOOTH) -> Array:
+    return np.array([np.linspace(0.0, fit.best.valid[c], count) for c in COMPONENTS.values()])
+
+
+def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
+    """(3, k) E1, E2, G12 in MPa at strains (3, k)."""
+    return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
+
+
+def _pinned(fit: Fit, folder: Path, pins: dict[str, dict[str, Array]]) -> list[tuple[str, str]]:
+    if not pins:
+        return []
+    sigma = {
+        source: 100 * np.array([sigmas[name] for name in COMPONENTS])
+        for source, sigmas in pins.items()
+    }
+    count = next(iter(sigma.values())).shape[1]
+    plot_pinned(folder / "pinned.png", _strains(fit, count), sigma)
+    return [("pinned.png", "What each test pins down: one standard deviation of the moduli")]
+
+
+def sigma_words(value: float) -> str:
+    """A relative uncertainty as percent, as long as it says anything."""
+    return percent(value) if value < 10 * NOTHING else "unknown"
+
+
+def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
+    rows: list[list[object]] = [
+        [source, name, sigma_words(float(np.median(s))), sigma_words(float(s.max()))]
+        for source, sigmas in pins.items()
+        for name, s in sigmas.items()
+    ]
+    note = (
+        "white noise of every test, its misfit or its scatter, whichever is larger; before the "
+        "tests every modulus is taken to be known to 1000 %"
+    )
+    header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
+    return [Table("What each test pins down", header, rows, note)] if rows else []
+
+
+def _determined(fit: Fit) -> Sequence[Table]:
+    """What the data determine, modulus by modulus; nothing where it is not known."""
+    sure = fit.best.certainty
+    if sure is None:
+        return []
+    rows: list[list[object]] = [
+        [name, percent(float(np.median(s))), percent(float(s.max()))]
+        for name, s in sure.sigma.items()
+    ]
+    units = {c.name: c.objective.unit for c in fit.problem.comparisons}
+    noise = ", ".join(f"{value:.2g} {units[name]} ({name})" for name, value in sure.noise.items())
+    note = (
+        f"white noise of {noise} on everything matched: neighbouring values err together, so this "
+        "flatters; single coefficients are far less certain than the moduli they make"
+    )
+    header = ["modulus", "median 1 sigma", "largest 1 sigma"]
+    return [Table("What the data determine", header, rows, note)]

@@ -1,0 +1,82 @@
+"""The folder of predictions: tables, figures, report.html, and last result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..experiments.base import Exhibit, Output
+from ..reports import Report, Table, percent, write_report
+from ..writing import replacing
+from .store import RESULT, Store
+
+if TYPE_CHECKING:
+    from .prediction_result import Predictions
+
+RUNS_TABLE = "runs.csv"
+
+
+def write_predictions(predictions: Predictions, folder: Path) -> Path:
+    """Write everything; raises OutputError."""
+    (folder / RESULT).unlink(missing_ok=True)
+    several = len(predictions.outcomes) > 1
+    exhibits = {
+        kind: outcome.show(Output(folder, f"{kind}/" if several else ""))
+        for kind, (outcome, _) in predictions.outcomes.items()
+    }
+    with replacing(folder / RUNS_TABLE) as path:
+        predictions.runs().to_csv(path, index=False)
+    page = write_report(folder, _page(predictions, exhibits))
+    Store(folder).finish(predictions.result)
+    return page
+
+
+def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
+    each, result = predictions.each, predictions.result
+    ended = [predictions.ended(i) for i in range(len(each))]
+    finished = sum(not (run.record.failure or run.record.early) for run in each)
+    summary = f"{finished} of {len(each)} runs finished."
+    noted = sum(bool(run.notes) for run in each)
+    if noted:
+        summary += f" {noted} have notes."
+    if predictions.worst is not None:
+        summary += f" Largest error against measured values: {percent(predictions.worst)}."
+    return Report(
+        title=predictions.project.title,
+        summary=summary,
+        facts=[
+            ("tests", len(result["tests"])),
+            ("cards", len(result["cards"])),
+            ("solver", result["solver"]),
+            ("wall time, s", float(result["wall_s"])),
+            ("seconds of all runs", float(sum(run.record.seconds for run in each))),
+            *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
+        ],
+        warnings=[
+            f"{run.test.name} with {run.card}: {how}"
+            for run, how in zip(each, ended, strict=True)
+            if run.record.failure or run.record.early
+        ],
+        figures=[figure for exhibit in exhibits.values() for figure in exhibit.figures],
+        tables=[
+            *(table for exhibit in exhibits.values() for table in exhibit.tables),
+            *_notes(predictions),
+        ],
+        files=[
+            (RUNS_TABLE, "the table of runs with all its columns"),
+            (RESULT, "all numbers of this page, for programs"),
+            *(file for exhibit in exhibits.values() for file in exhibit.files),
+        ],
+        versions=result["versions"],
+    )
+
+
+def _notes(predictions: Predictions) -> list[Table]:
+    rows: list[list[object]] = [
+        [run.test.name, run.card, note] for run in predictions.each for note in run.notes
+    ]
+    if not rows:
+        return []
+    what = "What a reader of the numbers above should know of each run."
+    return [Table("Notes", ["test", "card", "note"], rows, what, text=(1, 2))]

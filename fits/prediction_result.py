@@ -1,0 +1,177 @@
+"""Predictions: tests that are not fitted, each with every card, and what they say of the cards."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..experiments.base import Predicted, PredictedOutcome, PredictedRun
+from ..experiments.registry import kind_named
+from .numbers import versions
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .project import Project
+
+#: Notes that say the same of so many runs are each told on the terminal.
+FEW = 3
+#: What differs between notes that say the same: a number, or several in a row.
+NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
+
+
+def predicted_kind(name: str) -> Predicted:
+    """What a kind of test offers whose tests are predicted."""
+    kind = kind_named(name).predicted
+    assert kind is not None
+    return kind
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """Every chosen test with every chosen card.
+
+    each : the runs, test by test, card by card; they keep this order in every table.
+    wall_s : seconds that all of it took.
+    """
+
+    project: Project
+    each: tuple[PredictedRun, ...]
+    wall_s: float
+
+    @cached_property
+    def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
+        """What the runs of each kind of test say, and their numbers among all runs."""
+        numbers: dict[str, list[int]] = {}
+        for i, run in enumerate(self.each):
+            numbers.setdefault(run.test.kind, []).append(i)
+        outcomes = {}
+        for name, own in numbers.items():
+            outcome = predicted_kind(name).outcome([self.each[i] for i in own])
+            outcomes[name] = outcome, tuple(own)
+        return outcomes
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values, as result.json has it."""
+        tests: dict[str, Any] = {}
+        for outcome, numbers in self.outcomes.values():
+            for i in numbers:
+                test = self.each[i].test
+                tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
+        return {
+            "command": "predict",
+            "title": self.project.title,
+            "solver": self.project.fit.solver,
+            "tests": tests,
+            "cards": list(dict.fromkeys(run.card for run in self.each)),
+            "runs": [self._numbers(i) for i in range(len(self.each))],
+            "worst_relative_error": self.worst,
+            "wall_s": self.wall_s,
+            "versions": versions(),
+        }
+
+    @property
+    def worst(self) -> float | None:
+        """Largest RMS error over the largest value measured; None where nothing is compared."""
+        errors = [self.error(i) for i in range(len(self.each))]
+        return max((e for e in errors if e is not None), default=None)
+
+    def ended(self, number: int) -> str:
+        """How a run ended: "finished", how far it came, or why it failed."""
+        outcome, own = self._own(number)
+        return outcome.ended(own)
+
+    def error(self, number: int) -> float | None:
+        """RMS of model less measured over the largest value measured, of a run."""
+        outcome, own = self._own(number)
+        return outcome.error(own)
+
+    def silent(self) -> list[int]:
+        """Numbers of the runs of measured tests that gave nothing to compare."""
+        measured = [
+            i for i, run in enumerate(self.each) if predicted_kind(run.test.kind).measured(run.test)
+        ]
+        return [i for i in measured if self.error(i) is None]
+
+    def runs(self) -> pd.DataFrame:
+        """A row a run: test, card, numbers with their units, how it ended, notes, seconds."""
+        import pandas as pd
+
+        rows = []
+        for i, run in enumerate(self.each):
+            outcome, own = self._own(i)
+            tail = {
+                "ended": self.ended(i),
+                "notes": "; ".join(run.notes),
+                "seconds": run.record.seconds,
+            }
+            rows.append({"test": run.test.name, "card": run.card, **outcome.columns(own), **tail})
+        columns = list(dict.fromkeys(name for row in rows for name in row))
+        last = [name for name in columns if name not in tail]
+        return pd.DataFrame(rows, columns=[*last, *tail])
+
+    def curves(self) -> pd.DataFrame:
+        """Every run frame by frame, with its test and card."""
+        import pandas as pd
+
+        curves = []
+        for i, run in enumerate(self.each):
+            outcome, own = self._own(i)
+            curve = outcome.curve(own)
+            curve.insert(0, "card", run.card)
+            curve.insert(0, "test", run.test.name)
+            curves.append(curve)
+        return pd.concat(curves, ignore_index=True)
+
+    def lines(self) -> list[str]:
+        """For the terminal: a table of each kind of test, then the notes.
+
+        Notes that many runs share but for their numbers are one line; the page has each.
+        """
+        lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
+        alike: dict[str, list[str]] = {}
+        for run in self.each:
+            for note in run.notes:
+                words = f"{run.test.name} with {run.card}: {note}"
+                alike.setdefault(NUMBERS.sub("#", note), []).append(words)
+        for notes in alike.values():
+            if len(notes) <= FEW:
+                lines += [f"note: {words}" for words in notes]
+            else:
+                lines.append(f"note, {len(notes)} times (report.html has each), as {notes[0]}")
+        return lines
+
+    def report(self, folder: Path | str) -> Path:
+        """Write tables, figures, files, report.html and last result.json; the page's path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from .prediction_page import write_predictions
+
+        return write_predictions(self, Path(folder))
+
+    def _own(self, number: int) -> tuple[PredictedOutcome, int]:
+        """The outcome that a run belongs to, and its number there."""
+        outcome, numbers = self.outcomes[self.each[number].test.kind]
+        return outcome, numbers.index(number)
+
+    def _numbers(self, number: int) -> dict[str, Any]:
+        run = self.each[number]
+        outcome, own = self._own(number)
+        head: dict[str, Any] = {
+            "test": run.test.name,
+            "card": run.card,
+            "ended": self.ended(number),
+            "seconds": run.record.seconds,
+        }
+        if run.record.failure:
+            return head
+        tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
+        return {**head, **outcome.numbers(own), **tail}

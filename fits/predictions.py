@@ -1,0 +1,210 @@
+"""Run tests that are not fitted with material cards, side by side, and go on where it was left."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, SolverFailure
+from ..experiments.base import Predicted, PredictedRun, RunRecord, Test
+from ..experiments.notes import notes_of_record, other_thickness
+from ..experiments.records import record_of
+from ..experiments.registry import kind_named
+from ..materials.card import MaterialCard
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import Solver
+from ..solvers.registry import solver_named, usable_solver
+from .cards import Cards, chosen_cards
+from .content import digest_of
+from .prediction_result import Predictions, predicted_kind
+from .processes import Task, run_tasks
+from .project import Project, cores
+from .run_records import RunRecords
+
+
+@dataclass(frozen=True)
+class RunEvent:
+    """A run that ended: `done` of `total`; None: they are about to begin.
+
+    again : it was in the folder, from an earlier time.
+    """
+
+    run: PredictedRun | None
+    done: int
+    total: int
+    again: bool = False
+
+
+#: Is told of every run as it ends, and of time passing (None).
+Progress = Callable[[RunEvent | None], None]
+
+
+def predict(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    cards: Cards = None,
+    *,
+    jobs: int | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Predictions:
+    """Run every chosen test that is predicted with every chosen card.
+
+    Parameters
+    ----------
+    tests : names of tests, or a kind of test; every test that is not fitted unless given.
+    cards : by name; or names of the project's cards and files of others. The project's unless
+        given; where it has none, the one that its fit left in the usual folder.
+    jobs : processes; as the project says unless given, else all cores.
+    out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
+        nothing is written without it.
+    overwrite : replace what the folder holds.
+    progress : is told of every run that ended; None now and then while none does. An interrupt
+        (Ctrl-C) leaves the folder ready for `resume`.
+
+    Returns
+    -------
+    The runs as tables, and `report(folder)` for the page.
+
+    Raises
+    ------
+    InputError : a test or card that there is not, a test that makes no model with a card's
+        thickness, or nothing to go on with. OutputError : the folder is used or cannot be written.
+    SolverFailure : the solver is not there, or no run ended well.
+    """
+    begun = time.perf_counter()
+    pairs = _pairs(project, predicted_tests(project, tests), chosen_cards(project, cards))
+    solver = _usable(project)
+    records = None
+    if out is not None:
+        records = RunRecords(Path(out))
+        records.begin(resume, overwrite)
+    runs = _run(project, pairs, solver, records, jobs, progress or _nobody)
+    if all(run.record.failure for run in runs):
+        failure = f"no run ended well: {runs[0].record.failure}"
+        raise SolverFailure(failure, project.fit.solver)
+    return Predictions(project, tuple(runs), time.perf_counter() - begun)
+
+
+def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """The tests that `predict` runs: by name or by kind, all unless named.
+
+    Raises
+    ------
+    InputError : a name that is none; none of them is of a kind that is predicted.
+    """
+    chosen = project.chosen(tests, fitted=False)
+    able = [test for test in chosen if kind_named(test.kind).predicted is not None]
+    if not able:
+        problem = f"no card is judged on these tests: {', '.join(test.name for test in chosen)}"
+        raise InputError(project.path, "", problem)
+    return able
+
+
+def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """Of the tests that `predict` would run, those with something measured to compare with."""
+    chosen = predicted_tests(project, tests)
+    return [test for test in chosen if predicted_kind(test.kind).measured(test)]
+
+
+def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
+    """One test with one card; a run that does not end well is a record of its failure."""
+    begun = time.perf_counter()
+    try:
+        outcome: Any = solver.run(model, card.law)
+    except SolverFailure as failure:
+        outcome = failure
+    return record_of(kind, model, outcome, time.perf_counter() - begun)
+
+
+def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
+    """A mark of everything that a run's result depends on, by content."""
+    material = (law.pieces, law.nu12, law.thickness_change)
+    return digest_of(kind.depends_on(model), material, solver.identity)
+
+
+def _pairs(
+    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard]
+) -> list[PredictedRun]:
+    """Test by test, card by card, nothing run yet."""
+    pairs = []
+    for test in tests:
+        models: dict[float, Mapping[str, Any]] = {}
+        for name, card in cards.items():
+            try:
+                if card.thickness not in models:
+                    models[card.thickness] = test.models(card.thickness)
+            except InputError as error:
+                where = f"{test.name!r} with card {name!r}, {error.field}"
+                raise InputError(project.path, where, error.problem) from None
+            (model,) = models[card.thickness].values()
+            pairs.append(PredictedRun(test, name, card, model, RunRecord(0.0, "was not run")))
+    return pairs
+
+
+def _usable(project: Project) -> Solver:
+    """The project's solver; what is wrong with it shows here, in one line."""
+    name = project.fit.solver
+    return usable_solver(name, project.solver_options.get(name, {}), project.path)
+
+
+def _run(
+    project: Project,
+    pairs: Sequence[PredictedRun],
+    solver: Solver,
+    records: RunRecords | None,
+    jobs: int | None,
+    progress: Progress,
+) -> list[PredictedRun]:
+    """Every pair with its record: those that the folder holds, and the others side by side."""
+    kinds = [predicted_kind(pair.test.kind) for pair in pairs]
+    marks = [mark_of(k, p.model, p.material.law, solver) for k, p in zip(kinds, pairs, strict=True)]
+    ended: dict[int, PredictedRun] = {}
+
+    def end(number: int, record: RunRecord, again: bool) -> None:
+        pair = pairs[number]
+        card = pair.material
+        thick = other_thickness(card, project.fabric.thickness)
+        notes = [*notes_of_record(record, card), *thick]
+        ended[number] = replace(pair, record=record, notes=notes)
+        progress(RunEvent(ended[number], len(ended), len(pairs), again))
+
+    progress(RunEvent(None, 0, len(pairs)))
+    for number, mark in enumerate(marks):
+        record = None if records is None else records.read(mark)
+        if record is not None:
+            end(number, record, True)
+    missing = [number for number in range(len(pairs)) if number not in ended]
+    prepare = functools.partial(_runner, project, pairs)
+    some = jobs or project.fit.jobs or cores()
+    told: Iterable[Any] = run_tasks(prepare, missing, some, "runs") if missing else ()
+    for item in told:
+        if item is None:
+            progress(None)
+            continue
+        number, record = item
+        if records is not None:
+            records.write(marks[number], record)
+        end(number, record, False)
+    return [ended[number] for number in range(len(pairs))]
+
+
+def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
+    name = project.fit.solver
+    solver = solver_named(name, **project.solver_options.get(name, {}))
+
+    def run(number: int, tell: Callable[[Any], None]) -> tuple[int, RunRecord]:
+        pair = pairs[number]
+        return number, run_card(predicted_kind(pair.test.kind), solver, pair.model, pair.material)
+
+    return run
+
+
+def _nobody(event: RunEvent | None) -> None:
+    """Nobody wants to know."""

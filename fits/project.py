@@ -1,0 +1,212 @@
+"""A project: one fabric, its tests, its law, and how it is fitted; read from a TOML file."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..experiments.base import Fabric, Place, Scales, Test
+from ..experiments.registry import kinds
+from ..materials.forms.registry import form_settings
+from ..sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS
+from ..solvers.overrides import overridden
+from ..solvers.registry import solver_settings
+from .cards import NamedCard, read_cards
+from .file import ProjectFile, parse
+from .schema import FitSection, LawSection
+
+#: Data folders: of all tests, or by the name of a test.
+Folders = Path | Mapping[str, Path]
+
+
+NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Project:
+    """Everything that a project file says, in mm, N and MPa where it is not a section.
+
+    Parameters
+    ----------
+    path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
+    law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
+        of a solver, what it is made with.
+
+    Raises
+    ------
+    InputError : settings that contradict each other (also after `with_fit`).
+    """
+
+    path: Path
+    fabric: Fabric
+    scales: Scales
+    tests: Mapping[str, Test]
+    law: LawSection
+    fit: FitSection
+    cards: Mapping[str, NamedCard]
+    solver_options: Mapping[str, Mapping[str, Any]]
+
+    def __post_init__(self) -> None:
+        if self.fit.method == "lm" and self.fit.constraints == "boolean":
+            problem = "boolean flags have no slope: use 'margin' with method 'lm', or 'slsqp'"
+            raise InputError(self.path, "fit.constraints", problem + " or 'cobyla'")
+
+    @property
+    def title(self) -> str:
+        """The fabric's name, else that of the folder."""
+        return self.fabric.name or self.path.parent.resolve().name
+
+    def with_fit(self, **changes: Any) -> Project:
+        """The project with other settings of its fit; None leaves a setting as it is."""
+        given = {key: value for key, value in changes.items() if value is not None}
+        return replace(self, fit=self.fit.model_copy(update=given))
+
+    def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
+        """The project with another form of the moduli.
+
+        settings : of the form; those that the project has for it stay unless they are given.
+
+        Raises
+        ------
+        InputError : no such form, or a setting that it does not know.
+        """
+        known, own = form_settings(form), self.law.model_extra or {}
+        said = self.law.model_dump(exclude=set(own), exclude_unset=True)
+        kept = {key: value for key, value in own.items() if key in known}
+        law = LawSection.model_validate({**said, **kept, **(settings or {}), "form": form})
+        return replace(self, law=law)
+
+    def with_solver(
+        self, name: str | None, options: Mapping[str, Any], settings: Sequence[str] = ()
+    ) -> Project:
+        """The project with another solver, or with more options for the one that it has.
+
+        Parameters
+        ----------
+        options : by name; None leaves an option as it is. settings : each "KEY=VALUE", as in
+            [solver.NAME].
+
+        Raises
+        ------
+        InputError : an option that means nothing to the solver that runs.
+        """
+        solver = name or self.fit.solver
+        changed = overridden(solver, self.solver_options.get(solver, {}), options, settings)
+        chosen = replace(self, solver_options={**self.solver_options, solver: changed})
+        return chosen.with_fit(solver=name)
+
+    def chosen(
+        self, which: str | Sequence[str] | None, fitted: bool | None = None
+    ) -> tuple[Test, ...]:
+        """Tests by name or by kind, in the project's order; all of them where none is named.
+
+        fitted : only those that a fit can match, or only those that are predicted.
+
+        Raises
+        ------
+        InputError : a name that is none, or nothing to choose from.
+        """
+        known = kinds()
+        names = None if which is None else [which] if isinstance(which, str) else list(which)
+        able = [t for t in self.tests.values() if fitted in (None, known[t.kind].fitted)]
+        for name in names or ():
+            if name not in self.tests and name not in known:
+                problem = f"there is no test {name!r}; the project has: {', '.join(self.tests)}"
+                raise InputError(self.path, "--test", problem)
+        tests = tuple(t for t in able if names is None or t.name in names or t.kind in names)
+        if not tests:
+            kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
+            of = "" if names is None else f" among {', '.join(names)}"
+            what = " or ".join(
+                f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)
+            )
+            problem = f"the project has no test{kind}{of}; add {what}"
+            raise InputError(self.path, "", problem)
+        return tests
+
+
+def read_project(path: Path | str, data: Folders | None = None, need_data: bool = True) -> Project:
+    """Read a project file (TOML).
+
+    Parameters
+    ----------
+    path : the file.
+    data : where measured files lie, instead of what the sections say: one folder for all tests, or
+        one by the name of a test.
+    need_data : whether measured files must be there (a forward analysis does without).
+
+    Raises
+    ------
+    InputError : one line naming the file and the dotted key: TOML syntax, missing or unknown
+        keys, wrong units, values out of order, missing data.
+    """
+    path = Path(path)
+    file = parse(path)
+    units = file.units
+    fabric = Fabric(
+        file.fabric.name,
+        file.fabric.thickness * LENGTH_UNITS[units.length],
+        file.fabric.thickness_change,
+    )
+    scales = Scales(
+        MODULUS_UNITS[units.modulus],
+        PRESSURE_UNITS[units.pressure],
+        LENGTH_UNITS[units.length],
+        units.modulus,
+        units.pressure,
+        units.length,
+    )
+    place = Place(path, "", fabric, scales, None, need_data)
+    return Project(
+        path=path,
+        fabric=fabric,
+        scales=scales,
+        tests=_tests(file, place, data),
+        law=file.law,
+        fit=file.fit,
+        cards=read_cards(place, file.card),
+        solver_options=solver_settings(path, file.solver),
+    )
+
+
+def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, Test]:
+    tests: dict[str, Test] = {}
+    names = [name for kind in kinds() for name in _names(kind, file.tests(kind))]
+    if isinstance(data, Mapping):
+        for name in data:
+            if name not in names:
+                problem = f"there is no test {name!r}; the project has: {', '.join(names)}"
+                raise InputError(place.path, "--data", problem)
+    for name, kind in kinds().items():
+        sections = file.tests(name)
+        for i, (section, own) in enumerate(zip(sections, _names(name, sections), strict=True)):
+            folder = data.get(own) if isinstance(data, Mapping) else data
+            here = replace(place, at=f"{name}[{i}]", data_folder=folder)
+            if own in tests:
+                raise here.error("name", f"{own!r} is there twice; give one of them another name")
+            tests[own] = kind.read(section, here, own)
+            if isinstance(data, Mapping) and folder is not None and not tests[own].reads_files:
+                raise here.error("data", NO_FILES)
+    if isinstance(data, Path) and not any(t.reads_files for t in tests.values()):
+        at = next((f"{k}[0].data" for k in kinds() if file.tests(k)), "data")
+        raise InputError(place.path, at, NO_FILES)
+    return tests
+
+
+def _names(kind: str, sections: Sequence[Any]) -> list[str]:
+    """A test without a name is called by its kind, with a number where there are several."""
+    alone = len(sections) == 1
+    return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
+
+
+@functools.cache
+def cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

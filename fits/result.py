@@ -1,0 +1,195 @@
+"""The result of a fit: card, tables, numbers, and the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..experiments.base import Findings, FittedTest, Output, PreparedTest
+from ..identification.problem import FitProblem
+from ..materials.card import MaterialCard
+from ..materials.forms.base import COMPONENTS
+from ..materials.law import HypoelasticLaw
+from .best import BestFit
+from .project import Project
+from .setup import FitSetup
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Laws of the best starts that are drawn together.
+BEST = 5
+#: Strains at which `Fit.moduli` lists the moduli.
+PLACES = 61
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What a fit found.
+
+    Parameters
+    ----------
+    setup : project, law without coefficients, tests with their data.
+    best : the best of the starts, run once more from the unloaded state. wall_s : seconds.
+    """
+
+    setup: FitSetup
+    problem: FitProblem
+    best: BestFit
+    wall_s: float
+
+    @property
+    def project(self) -> Project:
+        """The project as it was fitted, options of the call included."""
+        return self.setup.project
+
+    @property
+    def objective(self) -> float:
+        """What is left of the objective (`FitSetup.objective_is`) at the best fit."""
+        return self.best.objective
+
+    @property
+    def law(self) -> HypoelasticLaw:
+        """The best law, over the whole strain range that it was fitted with."""
+        return self.best.law
+
+    @property
+    def command(self) -> str:
+        """The kind of the tests where there is one, else "fit": for result.json and the card."""
+        kinds = {t.test.kind for t in self.setup.tests}
+        return kinds.pop() if len(kinds) == 1 else "fit"
+
+    @cached_property
+    def card(self) -> MaterialCard:
+        """The material card; valid for the strains that the tests reached."""
+        quality = ", ".join(
+            f"{name}: {f.quality}" if len(self.findings) > 1 else f.quality
+            for name, f in self.findings.items()
+        )
+        source = (
+            f"bubblefit {__version__} {self.command}, {self.project.path.name}, objective "
+            f"{self.objective:.4g}, {quality}"
+        )
+        law = replace(self.law, strain_range=self.best.valid)
+        return MaterialCard(law, self.project.fabric.thickness, self.project.title, source)
+
+    @cached_property
+    def tests(self) -> dict[str, FittedTest]:
+        """Every test in the light of the fit, by name."""
+        return {t.test.name: self._fitted(t) for t in self.setup.tests}
+
+    @cached_property
+    def findings(self) -> dict[str, Findings]:
+        """What the fit means for every test, by name."""
+        return {t.test.name: t.findings(self.tests[t.test.name]) for t in self.setup.tests}
+
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values: what result.json holds."""
+        from .numbers import result_of
+
+        return result_of(self)
+
+    def moduli(self) -> pd.DataFrame:
+        """E1, E2 and G12 (MPa) along their strains, with one standard deviation.
+
+        Columns modulus, strain, MPa, sigma_relative (NaN where it is not known).
+        """
+        import pandas as pd
+
+        sure, rows = self.best.certainty, []
+        for name, component in COMPONENTS.items():
+            strain = np.linspace(0.0, self.best.valid[component], PLACES)
+            sigma = np.full(PLACES, np.nan)
+            if sure is not None:
+                sigma = np.interp(strain, sure.strain[name], sure.sigma[name])
+            rows.append(
+                pd.DataFrame(
+                    {
+                        "modulus": name,
+                        "strain": strain,
+                        "MPa": self.law.modulus(name, strain),
+                        "sigma_relative": sigma,
+                    }
+                )
+            )
+        return pd.concat(rows, ignore_index=True)
+
+    def residuals(self) -> pd.DataFrame:
+        """Every matched value of every test: test, part, where, measured, modelled, difference."""
+        import pandas as pd
+
+        frames = []
+        for prepared in self.setup.tests:
+            name = prepared.test.name
+            table = prepared.residuals(self.tests[name])
+            table.insert(0, "test", name)
+            frames.append(table)
+        return pd.concat(frames, ignore_index=True)
+
+    def starts(self) -> pd.DataFrame:
+        """How every start ended: start, objective, status, analyses, external_runs, seconds."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                {
+                    "start": r.number,
+                    "objective": np.nan if r.objective is None else r.objective,
+                    "status": r.status,
+                    "analyses": r.analyses,
+                    "external_runs": r.external_runs,
+                    "seconds": r.wall_s,
+                }
+                for r in self.best.records
+            ]
+        )
+
+    @property
+    def laws(self) -> list[HypoelasticLaw]:
+        """The laws of the best starts, best first."""
+        unknowns = self.problem.unknowns
+        return [
+            self.law.with_beta(unknowns.beta(np.array(r.unknowns))) for r in self.best.ranked[:BEST]
+        ]
+
+    def report(self, folder: Path | str) -> Path:
+        """Write the card, tables, figures, report.html and, last, result.json into a folder.
+
+        Returns
+        -------
+        The page.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from .page import write_fit
+
+        return write_fit(self, Path(folder))
+
+    def output(self, folder: Path, test: str) -> Output:
+        """Where a test writes: with its name before every file's where there are several."""
+        return Output.of(folder, test, len(self.setup.tests) > 1)
+
+    def _fitted(self, prepared: PreparedTest) -> FittedTest:
+        best = self.best
+        own = {c.name for c in self.setup.own(prepared)}
+        names = [c.name for c in self.problem.comparisons]
+        mine = [k for k, name in enumerate(names) if name in own]
+        unknowns, y = self.problem.unknowns, best.point.unknowns
+        return FittedTest(
+            self.setup.own(prepared),
+            tuple(best.point.histories[k] for k in mine),
+            {n: v for k in mine for n, v in unknowns.nuisance_values(names[k], y).items()},
+            self.law,
+            self.laws,
+            best.reached,
+            best.valid,
+            best.certainty,
+        )

@@ -1,0 +1,122 @@
+"""Running files of a fit: history.csv, a row an analysis; starts.jsonl, a line a start."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import io
+import json
+import os
+from collections.abc import Iterable, Sequence
+from io import FileIO
+from typing import Any
+
+from ..errors import InputError
+from ..writing import telling
+from .start import EvaluationRecord, StartRecord
+from .store import Store
+
+STARTS, HISTORY = "starts.jsonl", "history.csv"
+
+
+class RunningFiles:
+    """The running files of a fit in its store.
+
+    Parameters
+    ----------
+    columns : names of the unknowns' values after the columns that every history has; coefficients
+        are divided by `scale` (MPa per unit of the file) and carry their unit in the name.
+    """
+
+    def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:
+        self.store, self.columns, self.scale = store, tuple(columns), tuple(scale)
+        self._rows: FileIO | None = None
+        self._starts: FileIO | None = None
+
+    def begin(self, resume: bool) -> dict[int, StartRecord]:
+        """Open the files; the starts that are finished already (none unless going on).
+
+        Raises
+        ------
+        InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
+        """
+        done = self._finished() if resume else {}
+        rows = [r for r in self._read() if r[:1] and r[0] in map(str, done)] if resume else []
+        lines = [json.dumps(record.to_json()) + "\n" for record in done.values()]
+        self.store.write(STARTS, "".join(lines))
+        header = ["start", "analysis", "solver", "objective", "status", *self.columns]
+        self.store.write(HISTORY, _table([header, *rows]))
+        with telling(self.store.path):
+            # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
+            self._starts = open(self.store.path / STARTS, "ab", buffering=0)
+            self._rows = open(self.store.path / HISTORY, "ab", buffering=0)
+        return done
+
+    def add(self, record: EvaluationRecord | StartRecord) -> None:
+        """Append to history.csv or starts.jsonl and hand it to the system at once.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        assert self._rows is not None and self._starts is not None
+        with telling(self.store.path):
+            if isinstance(record, StartRecord):
+                _append(self._starts, json.dumps(record.to_json()) + "\n")
+                os.fsync(self._starts.fileno())
+                return
+            values = (*record.coefficients, *record.nuisance)
+            numbers = [repr(v / s) for v, s in zip(values, self.scale, strict=True)]
+            value = "" if record.objective is None else repr(record.objective)
+            row = [record.start, record.analysis, record.solver, value, record.status, *numbers]
+            _append(self._rows, _table([row]))
+
+    def finish(self) -> None:
+        """Close the files and put history.csv in order of start and analysis."""
+        self.close()
+        rows = self._read()
+        body = sorted(rows[1:], key=lambda r: (int(r[0]), int(r[1])))
+        self.store.write(HISTORY, _table([rows[0], *body]))
+
+    def close(self) -> None:
+        """Close the files (harmless when they are not open)."""
+        for stream in (self._rows, self._starts):
+            if stream is not None:
+                stream.close()
+        self._rows = self._starts = None
+
+    def _finished(self) -> dict[int, StartRecord]:
+        path = self.store.path / STARTS
+        done: dict[int, StartRecord] = {}
+        # A crash can leave bytes that are no text where the last line should be.
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        lines = text.splitlines()
+        for i, line in enumerate(lines):
+            try:
+                record = StartRecord.from_json(json.loads(line))
+            except (ValueError, KeyError, TypeError, IndexError):
+                if i == len(lines) - 1:
+                    break  # cut off by a kill: that start is run again
+                problem = "is damaged; use --overwrite"
+                raise InputError(path, f"line {i + 1}", problem) from None
+            done[record.number] = record
+        return done
+
+    def _read(self) -> list[list[str]]:
+        path = self.store.path / HISTORY
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
+        return [row for row in csv.reader(io.StringIO(whole)) if row]
+
+
+def _append(stream: FileIO, text: str) -> None:
+    content = text.encode()
+    if stream.write(content) != len(content):
+        # The rest would not fit; a last line without its end is left out when it is read.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _table(rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,114 @@
+"""From a project and its tests to a fit: what is prepared once, and what every process builds."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
+from ..identification.comparison import Comparison
+from ..identification.methods import FitOptions
+from ..identification.problem import FitProblem
+from ..identification.unknowns import LawBounds, Unknowns
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import DifferentiatingSolver, Solver
+from ..solvers.registry import solver_named, usable_solver
+from .content import digest_of
+from .law import bounds_of, law_of
+from .project import Project
+
+#: Leads the fit where the solver that counts gives no derivatives.
+SURROGATE = "membrane"
+#: Most analyses of one start, unless the file says otherwise.
+MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
+#: Where a project names its solver.
+SOLVER_KEY = "fit.solver"
+
+
+@dataclass(frozen=True, eq=False)
+class FitSetup:
+    """A fit ready to run, without anything of a solver: what worker processes are given.
+
+    Parameters
+    ----------
+    law : everything but the coefficients. tests : with their data.
+    """
+
+    project: Project
+    law: HypoelasticLaw
+    bounds: LawBounds
+    tests: tuple[PreparedTest, ...]
+
+    @property
+    def weightings(self) -> tuple[Weighting, ...]:
+        """One a test: alone it has its own objective, among others its relative errors count."""
+        several = len(self.tests) > 1
+        return tuple(Weighting(several, t.test.weight if several else 1.0) for t in self.tests)
+
+    @property
+    def objective_is(self) -> str:
+        """What the fit minimises, in words."""
+        if len(self.tests) > 1:
+            return "weighted sum of the tests' mean relative RMS errors"
+        return self.tests[0].objective_is
+
+    def problem(self, masks: Masks | None = None) -> FitProblem:
+        """The fit, built anew; `masks`: which measured points it matches, by comparison."""
+        comparisons = [
+            comparison
+            for test, weighting in zip(self.tests, self.weightings, strict=True)
+            for comparison in test.comparisons(self.make_solver, weighting, masks)
+        ]
+        law, ends = self.law, self.law.strain_range.tolist()
+        unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
+        problem = FitProblem(tuple(comparisons), self.law, unknowns)
+        if not isinstance(problem.solver, DifferentiatingSolver):
+            problem.surrogate = problem.with_solvers([solver_named(SURROGATE) for _ in comparisons])
+        return problem
+
+    def make_solver(self) -> Solver:
+        """A new solver as the project names it."""
+        name = self.project.fit.solver
+        return solver_named(name, **self.project.solver_options.get(name, {}))
+
+    def own(self, test: PreparedTest) -> tuple[Comparison, ...]:
+        """The comparisons of one test with its own objective."""
+        return test.comparisons(self.make_solver, Weighting())
+
+    @property
+    def options(self) -> FitOptions:
+        """How each start is fitted."""
+        fit = self.project.fit
+        most = fit.max_analyses or MOST_ANALYSES[fit.method]
+        return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, most)
+
+
+def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
+    """Read or compute the data of the tests, and check everything that a fit needs.
+
+    Raises
+    ------
+    InputError : in the project or its data. SolverFailure : the solver is not there, or a known
+        solution cannot be run.
+    """
+    fit = project.fit
+    options = project.solver_options.get(fit.solver, {})
+    # Once here, in one line, rather than as the failure of every analysis.
+    usable_solver(fit.solver, options, project.path, SOLVER_KEY)
+    law = law_of(project, [test.reach for test in tests])
+    bounds = bounds_of(project, law.form)
+    make = functools.partial(solver_named, fit.solver, **options)
+    return FitSetup(project, law, bounds, tuple(test.prepare(law, make) for test in tests))
+
+
+def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
+    """Digests of everything that a start's result depends on, by what they are of."""
+    fit = setup.project.fit
+    return {
+        "law": digest_of(setup.law, setup.bounds),
+        "fit settings": digest_of(fit.model_dump(exclude={"starts", "solver", "jobs"})),
+        "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
+        "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
+        "solver": digest_of(fit.solver, problem.solver.identity),
+    }

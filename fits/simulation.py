@@ -1,0 +1,120 @@
+"""Forward analyses: what cards do in the tests of a project, or one card in one test."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import SolverFailure
+from ..experiments.base import CardRun, Output, Simulation, Test
+from ..experiments.notes import other_thickness
+from ..experiments.registry import kinds
+from ..materials.card import MaterialCard
+from ..solvers.base import History
+from ..solvers.registry import usable_solver
+from ..writing import write_text
+from .analyses import Analyses, Progress
+from .project import Project
+
+
+def simulate(
+    test: Test, card: MaterialCard, solver: str = "membrane", **options: Any
+) -> dict[str, History]:
+    """Run one test with a card, of the card's thickness; histories by part of the test.
+
+    Parameters
+    ----------
+    solver, options : its name, and what it is made with.
+
+    Raises
+    ------
+    InputError : no such solver, or an option it does not know.
+    SolverFailure : an analysis does not end well.
+    """
+    runs = usable_solver(solver, options)
+    models = test.models(card.thickness)
+    return {part: runs.run(model, card.law) for part, model in models.items()}
+
+
+def simulate_cards(
+    project: Project,
+    tests: Sequence[Test],
+    cards: Mapping[str, MaterialCard],
+    folder: Path,
+    within_range: bool = False,
+    progress: Progress | None = None,
+    command: str = "simulate test",
+) -> Simulation:
+    """Run tests with cards, write what their kinds write, and result.json.
+
+    Parameters
+    ----------
+    cards : by name; the thickness of each counts, not the fabric's. folder : where files go.
+    within_range : show curves only to where a card's valid range ends. command : for the result.
+
+    Returns
+    -------
+    The numbers of result.json (of a single test at the top level), and lines for a terminal.
+
+    Raises
+    ------
+    SolverFailure : nothing at all ended well. InputError, OutputError.
+    """
+    analyses = Analyses(project, progress)
+    models = {
+        (test.name, name): test.models(card.thickness)
+        for test in tests
+        for name, card in cards.items()
+    }
+    analyses.total = sum(map(len, models.values()))
+    outcomes: dict[tuple[str, str], dict[str, CardRun]] = {}
+    for (of, name), parts in models.items():
+        outcomes[of, name] = {
+            part: CardRun(model, _outcome(analyses, f"{name}, {part}", model, cards[name]))
+            for part, model in parts.items()
+        }
+    every = [run.outcome for parts in outcomes.values() for run in parts.values()]
+    failures = [outcome for outcome in every if isinstance(outcome, SolverFailure)]
+    if len(failures) == len(every):
+        raise failures[0]
+    told: dict[str, Simulation] = {}
+    for test in tests:
+        of_test = {
+            (name, part): run for name in cards for part, run in outcomes[test.name, name].items()
+        }
+        out = Output.of(folder, test.name, len(tests) > 1)
+        kind = kinds()[test.kind]
+        told[test.name] = kind.simulate(test, cards, of_test, out, within_range)
+    notes = [
+        f"{name}: {words}"
+        for name, card in cards.items()
+        for words in other_thickness(card, project.fabric.thickness)
+    ]
+    result = {
+        "command": command,
+        "project": str(project.path),
+        "solver": analyses.solver.name,
+        "notes": notes,
+        "tests": {name: one.numbers for name, one in told.items()},
+        **(told[tests[0].name].numbers if len(tests) == 1 else {}),
+    }
+    write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")
+    return Simulation(result, _lines(told, notes))
+
+
+def _outcome(
+    analyses: Analyses, part: str, model: Any, card: MaterialCard
+) -> History | SolverFailure:
+    try:
+        return analyses.run(part, model, card.law, 0)
+    except SolverFailure as failure:
+        return failure
+
+
+def _lines(told: Mapping[str, Simulation], notes: Sequence[str]) -> list[str]:
+    several = len(told) > 1
+    lines = [f"{name}: {line}" if several else line for name, one in told.items()
+             for line in one.lines]  # fmt: skip
+    return [*lines, *(f"note: {words}" for words in notes)]

@@ -1,0 +1,112 @@
+"""The output folder of a fit or of a series of predictions: whose it is, and going on with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, OutputError
+from ..writing import telling, write_text
+
+RUN, RESULT = "run.json", "result.json"
+#: What run.json must hold of a folder that an older version wrote: it can be replaced only.
+PARTS = "parts"
+
+
+def usual_folder(project: Path) -> Path:
+    """out/NAME below the current folder, after the project's folder and file."""
+    name = project.resolve().parent.name
+    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+
+
+class Store:
+    """A folder that holds one fit, or one series of predictions.
+
+    run.json says whose it is; result.json is written last and taken away first, so that where it
+    is, everything is complete. What is written in between (`records`, names below the folder) is
+    known to whoever writes it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def used(self) -> bool:
+        """Whether the folder holds anything of a fit or of predictions."""
+        return (self.path / RUN).exists() or (self.path / RESULT).exists()
+
+    def begin(
+        self,
+        parts: Mapping[str, str],
+        resume: bool,
+        overwrite: bool,
+        records: Sequence[str] = (),
+    ) -> bool:
+        """Make the folder ready; whether there is something to go on with.
+
+        Parameters
+        ----------
+        parts : what has to be the same for going on, each part (project, data, solver, version) as
+            a digest by its name; empty where every record carries a digest of its own.
+        records : files below the folder that go when the folder is not gone on with.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written, or is used and neither `resume` nor `overwrite`
+            is given.
+        InputError : `resume`, but there is nothing to go on with, it is something else (named), or
+            it is not readable.
+        """
+        if self.used and not (resume or overwrite):
+            raise OutputError(
+                f"{self.path}: already holds results; go on with --resume, replace them with "
+                "--overwrite, or name another folder with --out"
+            )
+        if resume and not self.used:
+            problem = "holds nothing to go on with; leave --resume out, or name another with --out"
+            raise InputError(self.path, "", problem)
+        if resume:
+            self._check(parts)
+        with telling(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            (self.path / RESULT).unlink(missing_ok=True)
+            if not resume:
+                for name in records:
+                    (self.path / name).unlink(missing_ok=True)
+        if not resume:
+            self.write(RUN, json.dumps({PARTS: dict(parts)}, indent=1) + "\n")
+        return resume
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file whole or not at all.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        write_text(self.path / name, text)
+
+    def finish(self, result: Mapping[str, Any]) -> None:
+        """Write result.json, after everything else.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        self.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
+
+    def _check(self, parts: Mapping[str, str]) -> None:
+        path = self.path / RUN
+        try:
+            before = json.loads(path.read_text(encoding="utf-8"))[PARTS]
+            other = [name for name in {**before, **parts} if before.get(name) != parts.get(name)]
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(path, "", "is missing or damaged; use --overwrite") from None
+        if other:
+            problem = (
+                f"this folder's results are of another {' and '.join(sorted(other))}; go on with "
+                "the same, or use --overwrite"
+            )
+            raise InputError(path, PARTS, problem)

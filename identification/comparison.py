@@ -1,0 +1,182 @@
+"""One comparison of a fit: a model, who runs it, and what it should show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SolverFailure
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import DifferentiatingSolver, History, Solver
+from .nuisance import Nuisance
+
+Array = NDArray[np.float64]
+
+#: Largest predicted change of displacement, relative, for a warm start.
+NEAR = 0.02
+
+
+class Objective(Protocol):
+    """Residual blocks of one comparison.
+
+    sizes : length of each block, together m; scale (m,): `unit`s in one unit of each residual;
+    least_noise in `unit`s, to reckon with where the data are exact; data: all that was measured.
+    """
+
+    @property
+    def sizes(self) -> tuple[int, ...]: ...
+
+    @property
+    def unit(self) -> str: ...
+
+    @property
+    def least_noise(self) -> float: ...
+
+    @property
+    def scale(self) -> Array: ...
+
+    @property
+    def data(self) -> tuple[Array, ...]: ...
+
+    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
+        """(m,) at nuisance values by name, in their units; it asks for those it knows."""
+        ...
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """(m, parameters) from the solver's slope of the displacements."""
+        ...
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        """(m, names): slope of the residual by the nuisance that only the objective knows of."""
+        ...
+
+    def shifted(self, here: History, there: History) -> Objective:
+        """The objective of a model that shows `here` where this one shows `there`."""
+        ...
+
+
+@dataclass(eq=False)
+class Comparison:
+    """A model that should show what was measured.
+
+    Parameters
+    ----------
+    name : of its test ("bubble 1", "strips 1: warp"), for messages and reports; one of its own.
+    model : what its solver runs.
+    solver : its own, so that what the solver prepares for the model is kept.
+    objective : what the model should show.
+    nuisance : unknowns of this comparison alone.
+    stage : those of lower stages lead into a fit of several (see `approach`).
+    contracts : the sheet is free to contract under tension, so that the law has to be positive
+        definite there.
+    """
+
+    name: str
+    model: Any
+    solver: Solver
+    objective: Objective
+    nuisance: tuple[Nuisance, ...] = ()
+    stage: int = 0
+    contracts: bool = False
+    _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
+
+    def by(self, solver: Solver) -> Comparison:
+        """The same comparison run by another solver."""
+        return replace(self, solver=solver, _last=None)
+
+    def forget(self) -> None:
+        """No warm start from here on, until something was differentiated."""
+        self._last = None
+
+    def run(
+        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
+    ) -> History:
+        """Run without derivatives.
+
+        Parameters
+        ----------
+        free : entries of the law's beta that vary between runs.
+        nuisance : values by name, in their units.
+        warm : start each increment from the last differentiated solution and its slope.
+
+        Raises
+        ------
+        SolverFailure : it did not end well.
+        """
+        values = self._solver_values(nuisance)
+        if isinstance(self.solver, DifferentiatingSolver):
+            guess = self._guess(_point(law, free, values)) if warm else None
+            return self.solver.run(self.model, law, guess=guess, **values)
+        model = self.model
+        for name, value in values.items():
+            if value != 0.0:
+                model = getattr(model, f"with_{name}")(value)
+        return self.solver.run(model, law)
+
+    def differentiate(
+        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
+    ) -> tuple[History, Array]:
+        """Run with derivatives, and remember the way for a warm start; arguments as for `run`.
+
+        Returns
+        -------
+        History, and the slope of the residual (m, free + nuisance): by the entries of beta, then
+        by the nuisance of this comparison in their units.
+
+        Raises
+        ------
+        SolverFailure : it did not end well, or the solver does not differentiate.
+        """
+        if not isinstance(self.solver, DifferentiatingSolver):
+            raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
+        values = self._solver_values(nuisance)
+        point = _point(law, free, values)
+        history, slope = self.solver.run_with_sensitivity(
+            self.model,
+            law,
+            [*(f"beta_{i}" for i in free), *values],
+            guess=self._guess(point) if warm else None,
+            **values,
+        )
+        if history.path is not None and history.path_slope is not None:
+            self._last = (point, history.path, history.path_slope)
+        return history, self._chain(self.objective.jacobian(history, slope), len(free))
+
+    def _solver_values(self, nuisance: Mapping[str, float]) -> dict[str, Any]:
+        """What the solver knows of, by its names and in its units."""
+        return {
+            n.solver_parameter: n.scale * nuisance[n.name]
+            for n in self.nuisance
+            if n.solver_parameter is not None
+        }
+
+    def _chain(self, by_solver: Array, free: int) -> Array:
+        """Columns in the order of the unknowns, from those in the order of the solver's names."""
+        own = [n.name for n in self.nuisance if n.solver_parameter is None]
+        by_objective = iter(self.objective.nuisance_columns(own).T if own else ())
+        rest = iter(by_solver.T[free:])
+        columns = [
+            next(by_objective) if n.solver_parameter is None else n.scale * next(rest)
+            for n in self.nuisance
+        ]
+        return np.column_stack([by_solver[:, :free], *columns])
+
+    def _guess(self, point: Array) -> Array | None:
+        if self._last is None:
+            return None
+        before, path, slope = self._last
+        change = slope @ (point - before)
+        # A far guess can lead to another equilibrium branch (a soft membrane may fold), on which
+        # a fit then settles; only near by is the warm start both safe and worth something.
+        if np.abs(change).max() > NEAR * np.abs(path).max():
+            return None
+        return np.asarray(path + change)
+
+
+def _point(law: HypoelasticLaw, free: Sequence[int], values: Mapping[str, float]) -> Array:
+    """The parameters that vary, in the order in which the solver differentiates by them."""
+    return np.concatenate([law.beta[list(free)], list(values.values())])

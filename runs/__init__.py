@@ -1,1 +1,0 @@
-"""Evaluations as units of work: history, output folder, resume, processes."""

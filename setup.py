@@ -1,0 +1,23 @@
+"""The repository root is the package `bubblefit`: which of its folders are packages of it."""
+
+from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
+
+#: Folders of the repository that are not part of what is installed.
+APART = ("tests", "benchmarks", "examples", "docs", "build", "out")
+
+
+class Modules(build_py):
+    """This file is a module beside the package's own, and not one of them."""
+
+    def find_package_modules(self, package, package_dir):
+        """(package, module, path) of what is installed."""
+        every = super().find_package_modules(package, package_dir)
+        return [module for module in every if (package, module[1]) != ("bubblefit", "setup")]
+
+
+INSIDE = [name for name in find_packages(".") if name.split(".")[0] not in APART]
+setup(
+    packages=["bubblefit", *(f"bubblefit.{name}" for name in INSIDE)],
+    cmdclass={"build_py": Modules},
+)

@@ -1,0 +1,85 @@
+"""Supports and collar as solids whose nodes are all prescribed: contact needs faces to meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.bodies import Collar, RigidSupports
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+
+#: mm that a body reaches over a plane of symmetry, and that it is thick.
+OVER, THICK = 20.0, 10.0
+#: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
+#: top; elements around and across of a support, around of a collar, and along its fillet.
+SUPPORT_ARC, COLLAR_ARC = (165.0, 15.0), (60.0, -9.0)
+SUPPORT_COUNTS, COLLAR_COUNT, FILLET_COUNT = (24, 6), 12, 4
+#: Degrees that the fillet turns, short of a face across the axis.
+FILLET_TURN = 75.0
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """points (n, 3) mm; elements (m, 8), numbered from 0: the last four nodes are the face that
+    meets the cylinder (S2)."""
+
+    points: Array
+    elements: Numbers
+
+
+def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
+    """The upper part of the support at z = span / 2, its crest at height `top` (mm).
+
+    radius : mm, of the cylinder that lies on it.
+    """
+    r = 0.5 * supports.diameter
+
+    def place(turn: Array, x: Array, face: int) -> Array:
+        at = r - THICK * (1 - face)
+        y, z = top - r + at * np.sin(turn), 0.5 * supports.span + at * np.cos(turn)
+        return np.stack([x, y, z], axis=-1)
+
+    around = np.radians(np.linspace(*SUPPORT_ARC, SUPPORT_COUNTS[0] + 1))
+    across = np.linspace(-OVER, 1.3 * radius, SUPPORT_COUNTS[1] + 1)
+    return _body(around, across, place)
+
+
+def collar_body(collar: Collar, crown: float) -> RigidBody:
+    """The upper part of the collar on the side x, z >= 0, its inside at height `crown` (mm)."""
+    radius, half = 0.5 * collar.inner_diameter, 0.5 * collar.length
+    straight = np.linspace(-OVER, half - collar.fillet, 6)
+    turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
+    along = np.concatenate([straight, half - collar.fillet * (1 - np.sin(turn))])
+    flare = np.concatenate([np.zeros(6), collar.fillet * (1 - np.cos(turn))])
+
+    def place(angle: Array, row: Array, face: int) -> Array:
+        number = row.astype(int)
+        # Behind the fillet the faces draw together, so that no solid turns inside out.
+        behind = np.where(along > half - collar.fillet, 0.3, 1.0)
+        edge = half - collar.fillet
+        z = along if face else edge + behind * (along - edge)
+        r = radius + flare + (0.0 if face else THICK + 5.0)
+        y = crown - radius + r[number] * np.cos(angle)
+        return np.stack([r[number] * np.sin(angle), y, z[number]], axis=-1)
+
+    around = np.radians(np.linspace(*COLLAR_ARC, COLLAR_COUNT + 1))
+    return _body(around, np.arange(len(along), dtype=float), place)
+
+
+def _body(u: Array, v: Array, place: Callable[[Array, Array, int], Array]) -> RigidBody:
+    """One layer of solids over a grid; `place(u, v, face)`: 0 behind, 1 the face in contact."""
+    grid = np.meshgrid(u, v, indexing="ij")
+    points = np.concatenate([place(*grid, face).reshape(-1, 3) for face in (0, 1)])
+    nodes = np.arange(len(u) * len(v)).reshape(len(u), len(v))
+    corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
+    quads = np.stack(corners, axis=-1).reshape(-1, 4)
+    behind, front = points[quads[0]], points[quads[0] + nodes.size]
+    normal = np.cross(behind[1] - behind[0], behind[3] - behind[0])
+    if normal @ (front[0] - behind[0]) < 0:
+        quads = quads[:, ::-1]
+    return RigidBody(points, np.concatenate([quads, quads + nodes.size], axis=1))

@@ -1,0 +1,77 @@
+"""The folder of a comparison of forms: comparison.csv, laws.png, curves, report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SolverFailure
+from ..experiments.base import CardRun, Output, Shown
+from ..experiments.registry import kind_named
+from ..fits.store import RESULT, Store
+from ..reports import LawRow, Report, Table, plot_laws, write_report
+from ..writing import replacing
+from .law_words import conclusion, noise, table_of
+
+if TYPE_CHECKING:
+    from ..experiments.base import PreparedTest
+    from .laws import LawComparison
+
+COMPARISON = "comparison.csv"
+
+
+def write_comparison(comparison: LawComparison, folder: Path) -> Path:
+    """Write everything; raises OutputError."""
+    result, table = comparison.result, table_of(comparison)
+    with replacing(folder / COMPARISON) as path:
+        table.to_csv(path, index=False, float_format="%.9g")
+    first = comparison.forms[0]
+    rows = [
+        LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out())
+        for f in comparison.forms
+    ]
+    total = sum(noise(first).values())
+    plot_laws(folder / "laws.png", rows, total, result["objective_is"])
+    page = Report(
+        title=f"{comparison.project.title}: forms of the moduli",
+        summary="; ".join(conclusion(result)),
+        facts=[("error", result["objective_is"]), ("the data's own noise", total)],
+        figures=[
+            ("laws.png", "Error of the fit, and at specimens left out of it"),
+            *(f for test in first.fit.setup.tests for f in _side_by_side(comparison, test, folder)),
+        ],
+        tables=[
+            Table(
+                "Errors",
+                list(table.columns),
+                table.to_numpy(dtype=object).tolist(),
+                "fitted: to all points; left out: at what the fits of the folds were not given",
+            )
+        ],
+        files=[(COMPARISON, "the table"), (RESULT, "all numbers, for programs")],
+    )
+    written = write_report(folder, page)
+    Store(folder).finish(result)
+    return written
+
+
+def _side_by_side(comparison: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:
+    """What a kind of test draws of several cards: here those of the forms."""
+    several = len(comparison.forms[0].fit.setup.tests) > 1
+    own = test.test
+    cards = {f.name: f.fit.card for f in comparison.forms}
+    runs = {
+        (f.name, part): CardRun(model, _outcome(f.fit.setup.make_solver(), model, f.fit.law))
+        for f in comparison.forms
+        for part, model in own.models().items()
+    }
+    out = Output(folder, f"{own.name}-" if several else "")
+    return kind_named(own.kind).simulate(own, cards, runs, out).figures
+
+
+def _outcome(solver: Any, model: Any, law: Any) -> Any:
+    try:
+        return solver.run(model, law)
+    except SolverFailure as failure:
+        return failure

@@ -1,0 +1,118 @@
+"""What a comparison of forms says: result.json, a table, lines for the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from ..fits.best import noise_of
+from .laws import AS_GOOD
+
+if TYPE_CHECKING:
+    from .laws import FormFit, LawComparison
+
+
+def result_of(comparison: LawComparison) -> dict[str, Any]:
+    """Errors form by form, and the simplest form that is as good as the best."""
+    forms, first = comparison.forms, comparison.forms[0]
+    whole = [f for f in forms if math.isfinite(f.validated)]
+    best = min(whole, key=lambda f: f.validated, default=None)
+    simplest = None
+    if best is not None:
+        limit = (1 + AS_GOOD) * best.validated
+        simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
+    return {
+        "command": "compare",
+        "title": comparison.project.title,
+        "tests": [test.test.name for test in first.fit.setup.tests],
+        "objective_is": first.fit.setup.objective_is,
+        "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
+                  if c.name in first.compared},
+        "fold_starts": comparison.fold_starts,
+        "forms": [_form(f) for f in forms],
+        "noise": sum(noise(first).values()),
+        "noise_by_part": noise(first),
+        "least_cross_validated": best.name if best else None,
+        "simplest_as_good": simplest.name if simplest else None,
+        "as_good_within": AS_GOOD,
+    }  # fmt: skip
+
+
+def _form(form: FormFit) -> dict[str, Any]:
+    return {
+        "form": form.name,
+        **form.fit.law.form.to_card(),
+        "coefficients": form.coefficients,
+        "objective": form.fit.objective,
+        "fitted": form.fitted,
+        "rms": form.rms,
+        "cross_validated": _number(form.validated),
+        "cross_validated_by_part": {
+            name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
+        },
+        "folds": [_number(value) for value in form.left_out()],
+        "starts_objective": [r.objective for r in form.fit.best.ranked],
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def noise(form: FormFit) -> dict[str, float]:
+    """What the data's own noise adds to the objective, by comparison: no form can do better."""
+    every = noise_of(form.fit.problem)
+    return {name: every[name] for name in form.compared}
+
+
+def table_of(comparison: LawComparison) -> pd.DataFrame:
+    """A row a form: errors of the fit and at what was left out, in all and by comparison."""
+    rows = []
+    for form in comparison.forms:
+        units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
+        fitted = {f"rms {name}, {units[name]}": e for name, e in form.rms.items()}
+        left = {
+            f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
+            for name in form.compared
+        }
+        rows.append(
+            {
+                "moduli": form.name,
+                "coefficients": form.coefficients,
+                "fitted": form.fitted,
+                "cross_validated": form.validated,
+                **fitted,
+                **left,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def lines_of(result: Mapping[str, Any]) -> list[str]:
+    """A table for the terminal."""
+    lines = [
+        f"error: {result['objective_is']}",
+        f"{'moduli':<12}{'coefficients':>13}{'fitted':>12}{'cross-validated':>18}",
+    ]
+    for form in result["forms"]:
+        error = form["cross_validated"]
+        validated = "a fold failed" if error is None else f"{error:.4g}"
+        lines.append(
+            f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
+        )
+    lines.append(f"the data's own noise: {result['noise']:.4g}")
+    return [*lines, *conclusion(result)]
+
+
+def conclusion(result: Mapping[str, Any]) -> list[str]:
+    """Which form is best, and which is the simplest that is as good."""
+    if result["simplest_as_good"] is None:
+        return []
+    return [
+        f"least at specimens left out: {result['least_cross_validated']}; simplest within "
+        f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
+    ]

@@ -1,0 +1,267 @@
+"""Which form of the moduli do the tests support? Fits of several forms, cross-validated."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from ..experiments.base import FittableTest
+from ..fits.fit import Record, fit
+from ..fits.project import Project, cores
+from ..fits.result import Fit
+from ..fits.setup import FitSetup, fingerprints, prepare_fit
+from ..fits.store import Store
+from ..materials.forms.registry import form_names, form_settings
+from .folds import FoldError, errors, part_of_objective, specimens_of, validate
+
+#: Of the smallest cross-validated error: a simpler form within it is as good.
+AS_GOOD = 0.05
+#: Starts of the fit of a form, and of the fit of a fold, unless said otherwise.
+STARTS, FOLD_STARTS = 5, 2
+FOLDS = 5
+#: Of a spline, where neither the project nor the caller says how many.
+KNOTS = 6
+VALIDATION = "validation.json"
+
+#: Told the name of each form as its turn comes, then the records of its starts and folds; None
+#: now and then.
+Progress = Callable[[str | Record | FoldError | None], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FormFit:
+    """One form of the moduli: its best fit, and its errors in the folds.
+
+    name : as it was asked for. compared : the comparisons whose points can be left out.
+    """
+
+    name: str
+    fit: Fit
+    folds: tuple[FoldError, ...]
+    compared: tuple[str, ...]
+
+    @property
+    def coefficients(self) -> int:
+        """How many are fitted."""
+        return self.fit.problem.unknowns.size
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Error of the fit to all points, by comparison, in its unit."""
+        return errors(self._judged, self._residual)
+
+    @property
+    def fitted(self) -> float:
+        """What those comparisons leave of the objective in the fit to all points."""
+        return part_of_objective(self._judged, self._residual)
+
+    def left_out(self, comparison: str | None = None) -> list[float]:
+        """Error of each fold at the points left out, NaN where it failed.
+
+        Their part of the objective, or the root mean square of one comparison in its unit.
+        """
+        if comparison is not None:
+            return [fold.rms.get(comparison, math.nan) for fold in self.folds]
+        return [math.nan if fold.value is None else fold.value for fold in self.folds]
+
+    @property
+    def validated(self) -> float:
+        """Mean of the folds' errors, NaN where any of them failed."""
+        return float(np.mean(self.left_out()))
+
+    @property
+    def _numbers(self) -> list[int]:
+        whole = self.fit.problem.comparisons
+        return [k for k, c in enumerate(whole) if c.name in self.compared]
+
+    @property
+    def _judged(self) -> Any:
+        return self.fit.problem.part(self._numbers)
+
+    @property
+    def _residual(self) -> np.ndarray:
+        rows = [self.fit.problem.rows(k) for k in self._numbers]
+        return np.concatenate([self.fit.best.point.residual[part] for part in rows])
+
+
+def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
+    """The project with each of the forms asked for, by name; with all forms unless any is.
+
+    names : of forms; "spline:8" is a spline of eight knots for each modulus.
+
+    Raises
+    ------
+    InputError : no such form, or bounds that do not go with every form.
+    """
+    bounds = project.law.bounds
+    if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
+        problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
+        raise InputError(project.path, "law.bounds", problem)
+    own = project.law.model_extra or {}
+    chosen: dict[str, Project] = {}
+    for asked in names or form_names():
+        form, _, knots = asked.partition(":")
+        settings: dict[str, Any] = {}
+        if form not in form_names():
+            problem = f"there is no form {form!r}; there are: {', '.join(form_names())}"
+            raise InputError(None, "--form", problem)
+        if knots and (not knots.isdecimal() or "knots" not in form_settings(form)):
+            problem = f"expected a form, or one with its number of knots (spline:8), got {asked!r}"
+            raise InputError(None, "--form", problem)
+        if knots:
+            settings = {"knots": int(knots)}
+        elif "knots" in form_settings(form) and "knots" not in own:
+            asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
+        chosen[asked] = project.with_law(form, settings)
+    return chosen
+
+
+@dataclass(frozen=True, eq=False)
+class LawComparison:
+    """Forms of the moduli side by side, in the order in which they were asked for."""
+
+    forms: tuple[FormFit, ...]
+    fold_starts: int
+
+    @property
+    def project(self) -> Project:
+        """The project, with the first of the forms."""
+        return self.forms[0].fit.project
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values: what result.json holds."""
+        from .law_words import result_of
+
+        return result_of(self)
+
+    def report(self, folder: Path | str) -> Path:
+        """Write comparison.csv, figures, report.html and, last, result.json; the page's path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from .law_page import write_comparison
+
+        return write_comparison(self, Path(folder))
+
+
+def compare_laws(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    forms: Sequence[str] = (),
+    *,
+    folds: int = FOLDS,
+    starts: int = STARTS,
+    fold_starts: int = FOLD_STARTS,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> LawComparison:
+    """Fit every form to the tests, then without some specimens, and judge it at those.
+
+    Tests whose specimens are not known stay whole in every fold.
+
+    Parameters
+    ----------
+    tests : by name or kind; every test that can be fitted unless given.
+    forms : as for `candidates`.
+    folds : at most; fold_starts : random starts of the fit of each.
+    starts : random starts of the fit of each form.
+    out : folder with a folder for each form, in which everything is written as it ends.
+
+    Raises
+    ------
+    InputError : in the project or its data, no test with specimens, nothing to go on with.
+    OutputError, NoFeasibleStart, SolverFailure : as `fit`.
+    """
+    tell = progress or (lambda event: None)
+    # All of them first: a mistake in the project shows before the first fit.
+    projects = candidates(project.with_fit(starts=starts), forms)
+    chosen = project.chosen(tests, fitted=True)
+    setups = {name: prepare_fit(own, _fittable(chosen)) for name, own in projects.items()}
+    compared = tuple(specimens_of(next(iter(setups.values()))))
+    if not compared:
+        problem = (
+            "no test has specimens that a fit could do without: strips need measured points and "
+            'match = "points"'
+        )
+        raise InputError(project.path, "", problem)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        parts = {"version": __version__, "folds": str(folds), "fold starts": str(fold_starts)}
+        Store(folder).begin(parts, resume, overwrite)
+    done = []
+    for name, own in projects.items():
+        tell(name)
+        place = None if folder is None else folder / plain(name)
+        found = fit(
+            own,
+            [test.name for test in chosen],
+            out=place,
+            resume=resume and place is not None and Store(place).used,
+            overwrite=overwrite,
+            progress=tell,
+        )
+        if place is not None:
+            found.report(place)
+        errors = _validated(setups[name], found, folds, fold_starts, place, tell)
+        done.append(FormFit(name, found, errors, compared))
+    return LawComparison(tuple(done), fold_starts)
+
+
+def plain(name: str) -> str:
+    """A form's name as that of a folder."""
+    return name.replace(":", "-")
+
+
+def _fittable(tests: Sequence[Any]) -> Sequence[FittableTest]:
+    return tests
+
+
+def _validated(
+    setup: FitSetup,
+    found: Fit,
+    folds: int,
+    starts: int,
+    folder: Path | None,
+    tell: Progress,
+) -> tuple[FoldError, ...]:
+    """Errors of the folds, as they were written where they are of this fit."""
+    parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
+    mark = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    known = None if folder is None else _written(folder / VALIDATION, mark)
+    if known is not None:
+        return known
+    ended: dict[int, FoldError] = {}
+    for event in validate(setup, folds, starts, setup.project.fit.jobs or cores()):
+        if event is not None:
+            ended[event.fold] = event
+        tell(event)
+    errors = tuple(ended[fold] for fold in sorted(ended))
+    if folder is not None:
+        content = {"of": mark, "folds": [fold.to_json() for fold in errors]}
+        Store(folder).write(VALIDATION, json.dumps(content, indent=1) + "\n")
+    return errors
+
+
+def _written(path: Path, mark: str) -> tuple[FoldError, ...] | None:
+    """What an interrupted run has validated already; None when it is not of this fit."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["of"] != mark:
+            return None
+        return tuple(FoldError(**fold) for fold in content["folds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,173 @@
+"""What every study is: one card on the tests of a project, one analysis after the other."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..experiments.base import Refined, Studied, Test
+from ..experiments.notes import notes_of
+from ..experiments.registry import kinds
+from ..fits.analyses import Analyses, Progress
+from ..fits.cards import chosen_cards
+from ..fits.project import Project
+from ..materials.card import MaterialCard, thickness_difference
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import History, Solver
+from ..writing import replacing, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One model of a test, and what its kind looks at. name : unique among those of a study."""
+
+    name: str
+    model: Any
+    studied: Studied
+
+    @property
+    def increments(self) -> int:
+        """Of the load, over the whole analysis."""
+        return len(self.studied.steps(self.model))
+
+
+class Series:
+    """Analyses with one card: those of a study.
+
+    Parameters
+    ----------
+    project : whose tests are run. card : with which material. progress : is told how far they are.
+        `total` : how many analyses there will be, for the progress.
+
+    Raises
+    ------
+    InputError, SolverFailure : the solver of the project cannot be used.
+    """
+
+    def __init__(
+        self, project: Project, card: MaterialCard, progress: Progress | None = None
+    ) -> None:
+        self.card, self._analyses = card, Analyses(project, progress)
+
+    @property
+    def total(self) -> int:
+        """How many analyses there will be."""
+        return self._analyses.total
+
+    @total.setter
+    def total(self, total: int) -> None:
+        self._analyses.total = total
+
+    @property
+    def solver(self) -> Solver:
+        """What runs them."""
+        return self._analyses.solver
+
+    def run(self, part: Part, law: HypoelasticLaw) -> History:
+        """The next analysis; raises SolverFailure."""
+        return self._analyses.run(part.name, part.model, law, part.increments)
+
+    def notes(self, history: History) -> list[str]:
+        """What a reader of a run's values should know."""
+        return notes_of(history, self.card)
+
+
+def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """The tests of a project that a study can run: those named, of a kind named, or all.
+
+    Raises
+    ------
+    InputError : a name that is none; no test that can be studied.
+    """
+    known = kinds()
+    able = [t for t in project.chosen(tests or None) if known[t.kind].studied is not None]
+    if not able:
+        raise InputError(project.path, "", "no study can run the tests of this project")
+    return able
+
+
+def parts_of(
+    project: Project,
+    tests: Sequence[Test],
+    thickness: float,
+    what: Refined = "elements",
+    factor: float = 1.0,
+) -> dict[str, Part]:
+    """Every model of the tests, with the thickness (mm) of a card; one refinement of it.
+
+    Raises
+    ------
+    InputError : a mesh or increments that cannot be had.
+    """
+    parts: dict[str, Part] = {}
+    for test in tests:
+        studied = kinds()[test.kind].studied
+        assert studied is not None
+        try:
+            models = test.models(thickness, what, factor)
+        except InputError as error:
+            if error.path is not None:
+                raise
+            field = f"refinement by {factor:g} (--levels, --coarser, --factor), {error.field}"
+            raise InputError(project.path, field, error.problem) from None
+        for part, model in models.items():
+            name = part_name(test, part, len(models), len(tests))
+            parts[name] = Part(name, model, studied)
+    return parts
+
+
+def part_name(test: Test, part: str, parts: int, tests: int) -> str:
+    """What a part is called: as its test where it is the only one, with it among several tests."""
+    if parts == 1:
+        return test.name
+    return part if tests == 1 else f"{test.name}: {part}"
+
+
+def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
+    """A card as it is given: itself, its file, or its name in the project.
+
+    Raises
+    ------
+    InputError : there is none, or it is no card.
+    """
+    if isinstance(card, MaterialCard):
+        return card
+    (chosen,) = chosen_cards(project, [card]).values()
+    return chosen
+
+
+def card_words(card: MaterialCard | Path | str) -> str:
+    """How a result names the card that it was given."""
+    return card.name if isinstance(card, MaterialCard) else str(card)
+
+
+def thickness_notes(project: Project, card: MaterialCard) -> list[str]:
+    """The card's thickness where it is not the fabric's: the card's counts."""
+    words = thickness_difference(card, project.fabric.thickness)
+    return [] if words is None else [f"{words}; it was run with the card's thickness"]
+
+
+def write_study(
+    folder: Path,
+    name: str,
+    table: pd.DataFrame,
+    draw: Callable[[Path], Any],
+    result: Mapping[str, Any],
+) -> None:
+    """Write the table NAME.csv, the figure NAME.png and, last, result.json.
+
+    Raises
+    ------
+    OutputError : the folder cannot be written.
+    """
+    with replacing(folder / f"{name}.csv") as path:
+        table.to_csv(path, index=False, lineterminator="\n")
+    draw(folder / f"{name}.png")
+    write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")

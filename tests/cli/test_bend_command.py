@@ -1,0 +1,392 @@
+"""`bubblefit bend` and `simulate bend` as a user runs them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.cli import progress
+from bubblefit.experiments.base import Exhibit
+from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.fits import prediction_page
+from bubblefit.fits.project import read_project
+from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers import registry
+
+from ..commands import in_process, one_line, result_in
+from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
+
+TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
+
+
+class Counted(Formula):
+    def run(self, *arguments, **named):
+        with open(os.environ[TOLD], "a") as stream:
+            stream.write(".")
+        return super().run(*arguments, **named)
+
+
+class Dying(Formula):
+    def run(self, *arguments, **named):
+        os._exit(9)
+
+
+@pytest.fixture(autouse=True)
+def formula(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The solver of these tests, by name; and the file that counts its runs."""
+    told = tmp_path_factory.mktemp("told") / "runs"
+    monkeypatch.setenv(TOLD, str(told))
+    monkeypatch.setitem(registry.SOLVERS, "formula", Counted)
+    monkeypatch.setitem(registry.SOLVERS, "dying", Dying)
+    return told
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without figures and page, which take the longest and are looked at elsewhere."""
+    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+    monkeypatch.setattr(prediction_page, "write_report", lambda folder, page: folder)
+
+
+def bend(*arguments, cwd: Path, code: int = 0, command=("bend",)):
+    """Run the command in this process and assert its exit code."""
+    return in_process(*command, *arguments, cwd=cwd, code=code)
+
+
+def measured(folder: Path, slope: float = 3.5) -> Path:
+    write_readings(folder / "made-up.csv", slope, noise=0.02)
+    return write_project(folder, 'measured.files = ["made-up.csv"]')
+
+
+# A whole study
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory):
+    folder = tmp_path_factory.mktemp("bend")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(registry.SOLVERS, "formula", Formula)
+        done = bend(measured(folder), "--out", "out", cwd=folder)
+    return folder / "out", done.stdout
+
+
+def test_the_files_of_a_study_agree(study) -> None:
+    out, text = study
+    result = result_in(out)
+    assert result["command"] == "predict" and result["solver"] == "formula"
+    keys = [(r["test"], r["card"]) for r in result["runs"]]
+    tests, cards = ("150 mm, 90 kPa", "high"), ("soft", "stiff")
+    assert keys == [(test, card) for test in tests for card in cards]
+    curves = pd.read_csv(out / "load_deflection.csv")
+    table = pd.read_csv(out / "runs.csv").set_index(["test", "card"])
+    assert list(table.index) == keys
+    for key, run in zip(keys, result["runs"], strict=True):
+        rows = curves[(curves["test"] == key[0]) & (curves["card"] == key[1])]
+        assert len(rows) == 25 and run["ended"] == "finished" and run["warnings"][0] == "made up"
+        d, load = rows["deflection_mm"].to_numpy(), rows["load_N"].to_numpy()
+        assert (d[0], d[-1], load[0]) == (0.0, 240.0, 0.0)
+        for place in (40, 100, 240):
+            expected = pytest.approx(np.interp(place, d, load))
+            assert run["load_N"][f"{place} mm"] == expected
+            assert table.loc[key, f"load_at_{place}_mm_N"] == expected
+        rise = rows["gauge_pressure_kPa"].iloc[-1] - rows["gauge_pressure_kPa"].iloc[0]
+        assert run["pressure_rise_kPa"] == pytest.approx(rise)
+        slope = np.polyfit(d[:3], load[:3], 1)[0]
+        assert table.loc[key, "stiffness_N_per_mm"] == pytest.approx(slope)
+        assert run["knee"]["load_N"] == pytest.approx(table.loc[key, "knee_N"])
+        amount = (rows["gauge_pressure_kPa"] + 101.0) * rows["volume_mm3"]
+        np.testing.assert_allclose(amount, amount.iloc[0])
+        stem = "-".join([*key[0].replace(",", "").split(), key[1]])
+        assert (out / "beams" / f"{stem}.vtu").exists()
+    assert text.count(" N/mm") == 1 and "written to out (open report.html)" in text
+    assert list(result["tests"]) == list(tests) and result["cards"] == list(cards)
+
+
+def test_errors_against_the_readings(study) -> None:
+    out, text = study
+    table = pd.read_csv(out / "runs.csv")
+    readings = pd.read_csv(out / "measured.csv")
+    assert set(readings["test"]) == {"150 mm, 90 kPa"} and readings["repetitions"].max() == 2
+    curves = pd.read_csv(out / "load_deflection.csv")
+    for card in ("soft", "stiff"):
+        own = curves[(curves["test"] == "150 mm, 90 kPa") & (curves["card"] == card)]
+        row = table[(table["test"] == "150 mm, 90 kPa") & (table["card"] == card)].iloc[0]
+        masses = np.arange(0.0, 30.1, 5.0)
+        load = np.tile(9.80665 * masses, 2)
+        way = np.concatenate([9.80665 * masses / 3.5 * s for s in (1.02, 0.98)])
+        off = np.interp(way, own["deflection_mm"], own["load_N"]) - load
+        assert row["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2)))
+        assert row["rms_relative"] == pytest.approx(row["rms_N"] / load.max())
+        assert row["compared"] == 14
+    assert table[table["test"] == "high"]["rms_N"].isna().all()
+    result = result_in(out)
+    assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
+    assert "error" in text.splitlines()[0]
+
+
+def test_the_page_and_the_pictures(study) -> None:
+    out, _ = study
+    page = (out / "report.html").read_text()
+    for word in ("Against measured loads", "150 mm, 90", "4 of 4 runs", "made up"):
+        assert word in page.replace("\u00a0", " "), word
+    for word in ("thesis", "Fig.", "Eq.", "Table 6"):
+        assert word not in page, word
+    names = [f"{case}-{kind}.png" for case in ("150-mm-90-kPa", "high")
+             for kind in ("load", "gas", "beam")]  # fmt: skip
+    for name in (*names, "all-loads.png"):
+        assert f'src="figures/{name}"' in page
+        assert (out / "figures" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_beam_for_paraview_is_whole_and_bent(study) -> None:
+    out, _ = study
+    beam = meshio.read(out / "beams" / "high-stiff.vtu")
+    assert beam.points[:, 0].min() == pytest.approx(-beam.points[:, 0].max())
+    assert beam.points[:, 2].min() == pytest.approx(-beam.points[:, 2].max())
+    u = beam.point_data["displacement"] - beam.point_data["inflated_displacement"]
+    middle = np.abs((beam.points - beam.point_data["displacement"])[:, 2]) < 1e-9
+    np.testing.assert_allclose(u[middle], np.tile([0, -240, 0], (middle.sum(), 1)), atol=1e-9)
+    strain = beam.cell_data["inflated_log_strain_1_2_12"][0]
+    assert strain[:, 1].max() == pytest.approx(np.log1p(0.14 * 75 / 0.81 / 150), rel=1e-3)
+
+
+# Which runs
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_tests_and_cards_are_picked(tmp_path: Path, formula: Path) -> None:
+    project = write_project(tmp_path)
+    write_card(MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.9), tmp_path / "mine.toml")
+    bend(project, "--out", "out", "--test", "high", "--card", "stiff", "--card", "mine.toml",
+         "--quiet", cwd=tmp_path)  # fmt: skip
+    runs = result_in(tmp_path / "out")["runs"]
+    assert [(r["test"], r["card"]) for r in runs] == [("high", "stiff"), ("high", "mine")]
+    assert formula.read_text() == ".."
+    other = "fitted for a thickness of 0.9 mm, this is 0.81 mm"
+    assert [any(other in note for note in r["warnings"]) for r in runs] == [False, True]
+    done = bend(project, "--test", "low", cwd=tmp_path, code=2)
+    one_line(done, "project.toml: --test: there is no test 'low'", "150 mm, 90 kPa, high")
+    done = bend(project, "--card", "none", cwd=tmp_path, code=2)
+    one_line(done, "--card", "soft, stiff")
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_finished_run_is_not_repeated(tmp_path: Path, formula: Path) -> None:
+    project = write_project(tmp_path)
+    bend(project, "--out", "out", "--jobs", 2, cwd=tmp_path)
+    before = result_in(tmp_path / "out")
+    kept = sorted((tmp_path / "out" / "runs").glob("*.npz"))
+    assert len(kept) == 4 and formula.read_text() == "...."
+    done = bend(project, "--out", "out", cwd=tmp_path, code=2)
+    one_line(done, "already holds results", "--resume", "--overwrite")
+    kept[0].unlink()
+    kept[1].write_bytes(kept[1].read_bytes()[:100])
+    bend(project, "--out", "out", "--resume", cwd=tmp_path)
+    assert formula.read_text() == "......"
+    after = result_in(tmp_path / "out")
+    for result in (before, after):
+        result.pop("wall_s")
+        for run in result["runs"]:
+            run.pop("seconds")
+    assert after == before
+    # A card that changed is another run; the others are the same.
+    write_project(tmp_path, soft=501.0)
+    bend(project, "--out", "out", "--resume", cwd=tmp_path)
+    assert formula.read_text() == "........"
+    bend(project, "--out", "out", "--overwrite", cwd=tmp_path)
+    assert formula.read_text() == "............"
+    one_line(bend(project, "--resume", "--overwrite", cwd=tmp_path, code=2), "not both")
+
+
+def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path) -> None:
+    done = bend(write_project(tmp_path, soft=FAILS), "--out", "failed", cwd=tmp_path)
+    runs = result_in(tmp_path / "failed")["runs"]
+    assert [r["ended"] for r in runs] == ["failed: made to fail", "finished"] * 2
+    assert "load_N" not in runs[0]
+    assert done.stdout.count("soft   failed: made to fail") == 2
+    page = (tmp_path / "failed" / "report.html").read_text()
+    assert "high with soft: failed: made to fail" in page
+    table = pd.read_csv(tmp_path / "failed" / "runs.csv")
+    assert table["ended"].tolist() == ["failed: made to fail", "finished"] * 2
+
+    done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
+    run = result_in(tmp_path / "stopped")["runs"][0]
+    assert (
+        run["ended"] == "stopped at 120 of 240 mm: the run stopped early: so asked"
+        and run["load_N"]["240 mm"] is None
+    )
+    assert "stopped at 120 of 240 mm" in done.stdout
+
+
+def test_when_nothing_ends_well_the_exit_code_is_4(tmp_path: Path) -> None:
+    project = write_project(tmp_path, soft=FAILS)
+    done = bend(project, "--out", "out", "--card", "soft", cwd=tmp_path, code=4)
+    one_line(done, "formula: no run ended well: made to fail")
+    assert not (tmp_path / "out" / "result.json").exists()
+
+
+def test_a_process_that_dies_is_noticed(tmp_path: Path) -> None:
+    project = write_project(tmp_path)
+    done = bend(project, "--out", "out", "--solver", "dying", cwd=tmp_path, code=4)
+    one_line(done, "a worker process died", "finished runs are kept", "--resume")
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("above", "code"), [(10.0, 0), (0.01, 1)])
+def test_fail_above(tmp_path: Path, above: float, code: int) -> None:
+    arguments = (measured(tmp_path), "--out", "out", "--fail-above", above)
+    done = bend(*arguments, "--test", "150 mm, 90 kPa", cwd=tmp_path, code=code)
+    assert ("above 0.01" in done.stderr) == bool(code)
+    # What was measured cannot be compared with a run that failed.
+    write_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=FAILS)
+    done = bend(*arguments, "--overwrite", cwd=tmp_path, code=1)
+    assert "--fail-above" in done.stderr
+
+
+def test_fail_above_needs_something_measured(tmp_path: Path) -> None:
+    project = write_project(tmp_path)
+    one_line(bend(project, "--fail-above", 0.1, cwd=tmp_path, code=2), "no test has measured loads")
+    one_line(bend(project, "--fail-above", -1, cwd=tmp_path, code=2), "expected 0 or more")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_json_is_all_that_is_printed(tmp_path: Path) -> None:
+    done = bend(write_project(tmp_path), "--out", "out", "--json", cwd=tmp_path)
+    assert json.loads(done.stdout) == result_in(tmp_path / "out")
+    assert done.stderr == ""
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_progress_is_a_plain_line_where_there_is_no_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "PLAIN_EVERY_S", 0.0)
+    done = bend(write_project(tmp_path), "--out", "out", "--jobs", 1, cwd=tmp_path)
+    lines = [line for line in done.stderr.splitlines() if line.startswith("4 of 4 runs")]
+    assert lines and "high with stiff: finished in" in lines[-1] and "0 s left" in lines[-1]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_beside_a_fit_its_card_is_taken_and_its_folder_left_alone(tmp_path: Path) -> None:
+    """A project with a bubble, too, which has been fitted."""
+    path = write_project(tmp_path)
+    text = path.read_text()
+    cards = text[text.index("[[card]]") : text.index("[fit]")]
+    bubble = "[[bubble]]\nradius = 100\npressures = [20]\n[bubble.data.known_solution]\n"
+    path.write_text(text.replace(cards, f"{bubble}beta = [0,0,0,20,0,0,0,150,0,0,0,500]\n"))
+    own = Path("out") / tmp_path.name
+    one_line(bend(path, cwd=tmp_path, code=2), "project.toml: card: ", f"{own}/material.toml")
+    law = HypoelasticLaw.linear(700.0, 150.0, 20.0)
+    write_card(MaterialCard(law, 0.81, "just fitted"), tmp_path / own / "material.toml")
+    (tmp_path / own / "result.json").write_text("{}")
+    bend(path, "--quiet", cwd=tmp_path)
+    runs = result_in(tmp_path / f"{own}-bend")["runs"]
+    assert [(r["test"], r["card"]) for r in runs] == [
+        ("150 mm, 90 kPa", "just fitted"), ("high", "just fitted")
+    ]  # fmt: skip
+    assert sorted(p.name for p in (tmp_path / own).iterdir()) == ["material.toml", "result.json"]
+
+
+def test_a_solver_that_is_not_there(tmp_path: Path) -> None:
+    done = bend(write_project(tmp_path), "--solver", "abacus", cwd=tmp_path, code=2)
+    one_line(done, "project.toml: fit.solver (or --solver)", "calculix")
+    done = bend(write_project(tmp_path), "--ccx", "x", cwd=tmp_path, code=2)
+    one_line(done, "--ccx", "means nothing to the solver 'formula'")
+
+
+# simulate bend, init
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Path:
+    path = tmp_path / "card.toml"
+    write_card(MaterialCard(HypoelasticLaw.linear(600.0, 300.0, 40.0), 0.81, "linear"), path)
+    return path
+
+
+def test_simulate_bend_on_the_membrane(tmp_path: Path, card: Path) -> None:
+    """Coarse and short: what is checked is that the command bends, not how well."""
+    short = ("--element-size", 30, "--deflection", 12, "--frames", 3, "--seam-width", 30)
+    bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured",
+         write_readings(tmp_path / "a.csv").rename(tmp_path / "b.csv"), cwd=tmp_path,
+         command=("simulate", "bend"), code=2)  # fmt: skip
+    (tmp_path / "b.csv").write_text("deflection (mm),load (kg)\n0,0\n5,2\n10,4\n")
+    bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured", "b.csv",
+         cwd=tmp_path, command=("simulate", "bend"))  # fmt: skip
+    out = tmp_path / "out" / "bend-150mm-140kPa"
+    result = result_in(out)
+    (run,) = result["runs"]
+    assert (result["command"], run["card"], run["ended"]) == ("predict", "linear", "finished")
+    curve = pd.read_csv(out / "load_deflection.csv")
+    assert (np.diff(curve["load_N"]) > 0).all() and len(curve) == 4
+    amount = (curve["gauge_pressure_kPa"] + 101.0) * curve["volume_mm3"]
+    np.testing.assert_allclose(amount, amount.iloc[0], rtol=1e-9)
+    # Closed form of a long tube: fill stress p r / t, warp half of it.
+    assert run["inflation_strain"]["body"]["fill"] == pytest.approx(0.042, abs=0.003)
+    assert run["error"]["compared"] == 3
+    assert (out / "figures" / "150-mm-140-kPa-beam.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--diameter", -1), ["--diameter", "greater than 0"]),
+        (("--diameter", 300), ["--collar", "inner_diameter"]),
+        (("--span", 2990), ["--span", "does not fit"]),
+        (("--seam-width", 500), ["--seam-width", "a quarter"]),
+        (("--frames", 0), ["--frames", "1"]),
+        (("--measured", "none.csv"), ["none.csv", "--measured"]),
+        (("--collar", 140, 100), ["--collar", "150 mm"]),
+        (("--card", "none.toml"), ["none.toml", "cannot be read"]),
+    ],
+)
+def test_mistakes_of_simulate_bend_name_the_option(
+    tmp_path: Path, card: Path, arguments: tuple, words: list[str]
+) -> None:
+    usual = ("--diameter", 150, "--pressure", 140, "--card", card)
+    done = bend(*usual, *arguments, cwd=tmp_path, command=("simulate", "bend"), code=2)
+    one_line(done, *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_init_writes_the_example(tmp_path: Path) -> None:
+    done = bend("mine", "--example", "bend", cwd=tmp_path, command=("init",))
+    assert "next: bubblefit bend mine/project.toml" in done.stdout
+    assert len(read_project(tmp_path / "mine" / "project.toml").tests) == 9
+
+
+# Interrupted
+
+
+@pytest.mark.slow
+def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
+    path = write_project(tmp_path)
+    text = path.read_text().replace('solver = "formula"', 'solver = "membrane"')
+    path.write_text(text.replace("frames = 24", "deflection = 8\nframes = 2"))
+    arguments = [sys.executable, "-m", "bubblefit.cli", "bend", path, "--out", "out", "--jobs", "1"]
+    running = subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    runs = tmp_path / "out" / "runs"
+    end = time.monotonic() + 240
+    while not list(runs.glob("[0-9a-f]*.npz")):
+        assert running.poll() is None and time.monotonic() < end
+        time.sleep(0.05)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 130 and "go on with --resume" in said, said
+    first = {p: p.stat().st_mtime_ns for p in runs.glob("[0-9a-f]*.npz")}
+    assert 1 <= len(first) < 4 and not (tmp_path / "out" / "result.json").exists()
+    done = subprocess.run([*arguments, "--resume"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert {p: p.stat().st_mtime_ns for p in first} == first
+    assert [r["ended"] for r in result_in(tmp_path / "out")["runs"]] == ["finished"] * 4

@@ -1,0 +1,401 @@
+"""The commands as a user runs them: subprocesses, exit codes, files, interruption, bad input."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from bubblefit.materials.card import read_card
+
+from ..commands import bubblefit
+from ..projects import small
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """An uninterrupted study of four starts: its folder and the terminal's output."""
+    folder = tmp_path_factory.mktemp("study")
+    done = bubblefit("bubble", small(folder), "--out", "out", "--starts", 4, cwd=folder)
+    return folder, done.stdout
+
+
+def test_a_study_writes_everything_it_promises(study):
+    folder, text = study
+    out = folder / "out"
+    result = json.loads((out / "result.json").read_text())
+    for key in (
+        "command", "solver", "method", "objective", "beta", "starts", "analyses",
+        "external_runs", "strain_reached", "wall_s", "versions", "moduli_error",
+    ):  # fmt: skip
+        assert key in result, key
+    assert result["beta"]["unit"] == "GPa" and len(result["beta"]["values"]) == 12
+    assert len(result["starts"]) == 4
+    assert all({"seed", "objective", "status", "analyses"} <= set(s) for s in result["starts"])
+    assert result["objective"] < 1e-6
+    assert max(result["moduli_error"].values()) < 1e-3
+    assert result["analyses"] == sum(s["analyses"] for s in result["starts"])
+    card = read_card(out / "material.toml")
+    assert card.law.beta / 1e3 == pytest.approx(result["beta"]["values"], rel=1e-12)
+    history = pd.read_csv(out / "history.csv")
+    assert len(history) == result["analyses"]
+    surfaces = pd.read_csv(out / "surfaces.csv")
+    assert len(surfaces) == 21 and surfaces["R2"].min() > 0.99
+    for name in ("optima.png", "moduli.png", "profiles.png", "heights.png", "report.html"):
+        assert (out / name).stat().st_size > 1000, name
+    assert (out / "bubble.vtu").read_bytes().startswith(b"<?xml")
+    assert "largest error of the moduli" in text
+    assert not list(out.glob("*.part")) and not list(out.glob(".*"))
+
+
+def test_jobs_and_repetition_change_nothing(study):
+    folder, _ = study
+    bubblefit("bubble", "project.toml", "--out", "one", "--starts", 4, "--jobs", 1, cwd=folder)
+    assert (folder / "one/history.csv").read_text() == (folder / "out/history.csv").read_text()
+
+
+def test_an_earlier_study_is_not_written_over(study):
+    folder, _ = study
+    before = (folder / "out" / "result.json").read_bytes()
+    done = bubblefit("bubble", "project.toml", "--out", "out", cwd=folder, code=2)
+    assert "--resume" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert (folder / "out" / "result.json").read_bytes() == before
+
+
+def test_resume_refuses_another_study(study):
+    folder, _ = study
+    arguments = ("bubble", "project.toml", "--out", "out", "--resume", "--seed", 7)
+    done = bubblefit(*arguments, cwd=folder, code=2)
+    assert "fit settings" in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_interrupted_and_resumed_ends_the_same(study, tmp_path, number):
+    folder, _ = study
+    arguments = ["bubble", str(folder / "project.toml"), "--out", "out", "--starts", "4"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "bubblefit.cli", *arguments],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    starts = tmp_path / "out" / "starts.jsonl"
+    deadline = time.monotonic() + 120
+    while not (starts.exists() and starts.read_text().count("\n")):
+        assert time.monotonic() < deadline and running.poll() is None
+        time.sleep(0.02)
+    os.kill(running.pid, number)
+    running.wait(timeout=30)
+    assert running.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
+    rows = (tmp_path / "out" / "history.csv").read_text().splitlines()
+    assert rows[0].startswith("start,analysis,solver,objective,status") and len(rows) > 3
+    assert not (tmp_path / "out" / "result.json").exists()
+    bubblefit(*arguments, "--resume", cwd=tmp_path)
+    assert (tmp_path / "out/history.csv").read_text() == (folder / "out/history.csv").read_text()
+    ours, theirs = (
+        json.loads((where / "out/result.json").read_text()) for where in (tmp_path, folder)
+    )
+    for key in ("objective", "beta", "starts", "analyses", "strain_reached", "moduli_error"):
+        assert ours[key] == theirs[key], key
+
+
+def test_more_starts_by_resuming(study, tmp_path):
+    folder, _ = study
+    project = folder / "project.toml"
+    bubblefit("bubble", project, "--out", "out", "--starts", 2, cwd=tmp_path)
+    bubblefit("bubble", project, "--out", "out", "--starts", 4, "--resume", cwd=tmp_path)
+    assert (tmp_path / "out/history.csv").read_text() == (folder / "out/history.csv").read_text()
+
+
+def test_json_on_stdout_and_fail_above(tmp_path):
+    project = small(tmp_path)
+    arguments = ("bubble", project, "--out", "out", "--starts", 1, "--json", "--overwrite")
+    done = bubblefit(*arguments, "--fail-above", 1e-3, cwd=tmp_path)
+    assert json.loads(done.stdout)["command"] == "bubble"
+    done = bubblefit(*arguments, "--fail-above", 1e-30, cwd=tmp_path, code=1)
+    assert "--fail-above" in done.stderr
+
+
+@pytest.mark.parametrize("method", ["slsqp", "cobyla"])
+def test_nlopt_methods_by_command(tmp_path, method):
+    project = small(tmp_path, ("tolerance = 1e-7", "tolerance = 1e-7\nmax_analyses = 60"))
+    bubblefit("bubble", project, "--out", "out", "--starts", 2, "--method", method, cwd=tmp_path)
+    result = json.loads((tmp_path / "out/result.json").read_text())
+    assert result["method"] == method
+    assert all(s["analyses"] <= 62 for s in result["starts"])
+
+
+def test_simulate_with_a_card(study, tmp_path):
+    folder, _ = study
+    card = folder / "out" / "material.toml"
+    done = bubblefit(
+        "simulate", "bubble", folder / "project.toml", "--card", card, "--out", "sim", cwd=tmp_path
+    )
+    assert re.search(r"300\.0 kPa\s+apex", done.stdout)
+    result = json.loads((tmp_path / "sim/result.json").read_text())
+    assert result["apex_mm"] == sorted(result["apex_mm"])
+    table = pd.read_csv(tmp_path / "sim/displacement.csv")
+    assert table["dz_mm"].max() == pytest.approx(max(result["apex_mm"]), rel=1e-6)
+
+
+def test_init_writes_a_project_that_runs(tmp_path):
+    bubblefit("init", "mine", cwd=tmp_path)
+    done = bubblefit("init", "mine", cwd=tmp_path, code=2)
+    assert "already there" in done.stderr
+    bubblefit("init", "measured", "--example", "measured", cwd=tmp_path)
+    done = bubblefit("bubble", "measured/test1-linear.toml", cwd=tmp_path, code=2)
+    assert "--data" in done.stderr
+    text = (tmp_path / "mine/project.toml").read_text()
+    (tmp_path / "mine/project.toml").write_text(text.replace("elements = 800", "elements = 48"))
+    bubblefit("bubble", "mine/project.toml", "--starts", 1, cwd=tmp_path)
+    assert (tmp_path / "out" / "mine" / "result.json").exists()
+
+
+BAD = [
+    (("radius = 100.0", "# radius"), "bubble[0].radius"),
+    (('pressure = "kPa"', 'pressure = "psi"'), "units.pressure"),
+    (("7.0e-3,     # G12", "7.0e-1,     # G12"), "beta_3"),
+    (("[22, 59,", "[59, 22,"), "bubble[0].pressures"),
+    (("-7.96788e-3, 7.10747e-1,", "-7.96788e-3,"), "12"),
+    (('solver = "membrane"', 'solver = "nastran"'), "solver"),
+    (("[fit]", "[fit]\nstrats = 4"), "strats"),
+    (("[fit]", "[fit"), "project.toml"),
+    (("thickness = 0.81", "thickness = 810.0"), "bubble[0].radius"),
+    (("radius = 100.0", "radius = 1e300"), "bubble[0].radius"),
+    (("elements = 48", "elements = 400000000"), "bubble[0].elements"),
+    (("[22, 59, 97, 132, 186, 251, 300]", "[]"), "bubble[0].pressures: expected at least 1"),
+    (("[0.13, 0.13, 0.13]", "[13, 13, 13]"), "law.strain_range[0]"),
+    (("-1.0e3,  -1.0e1,", "-1.0e300,  -1.0e1,"), "law.bounds.lower[4]"),
+    (('by = "points"', 'by = "surfaces"\ndegree = 12'), "bubble[0].match.degree"),
+]
+
+
+@pytest.mark.parametrize("change, words", BAD)
+def test_bad_projects_end_in_one_line(tmp_path, change, words):
+    project = small(tmp_path, change)
+    done = bubblefit("bubble", project, "--out", "out", cwd=tmp_path, code=2)
+    assert len(done.stderr.splitlines()) == 1 and words in done.stderr, done.stderr
+    assert "project.toml" in done.stderr, done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (("--fail-above", "nan"), "--fail-above"),
+        (("--data", "."), "known_solution"),
+        (("--solver", "nastran"), "--solver"),
+        (("--resume", "--overwrite"), "--overwrite"),
+    ],
+)
+def test_bad_options_end_in_one_line(tmp_path, options, words):
+    done = bubblefit("bubble", small(tmp_path), "--out", "out", *options, cwd=tmp_path, code=2)
+    assert len(done.stderr.splitlines()) == 1 and words in done.stderr, done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (r"beta = \[\n[^\n]*\n", "beta = [\n", "beta: expected 12 coefficients, got 11"),
+        ('unit = "GPa"', 'unit = "psi"', "unit: expected 'GPa', 'MPa' or 'Pa', got 'psi'"),
+        (r"thickness_mm[^\n]*\n", "", "thickness_mm: this key is missing"),
+        ("nu12 = ", "nu21 = ", "nu21: unknown key; did you mean 'nu12'"),
+    ],
+)
+def test_bad_cards_end_in_one_line(study, tmp_path, old, new, words):
+    folder, _ = study
+    text, count = re.subn(old, new, (folder / "out" / "material.toml").read_text(), count=1)
+    assert count == 1
+    (tmp_path / "card.toml").write_text(text)
+    done = bubblefit(
+        "simulate", "bubble", folder / "project.toml", "--card", "card.toml", "--out", "sim",
+        cwd=tmp_path, code=2,
+    )  # fmt: skip
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert f"card.toml: {words}" in done.stderr, done.stderr
+    assert not (tmp_path / "sim").exists()
+
+
+def test_bad_data_names_file_and_line(tmp_path):
+    bubblefit("init", "m", "--example", "measured", cwd=tmp_path)
+    grid = tmp_path / "data" / "grid"
+    grid.mkdir(parents=True)
+    rows = "x,y,dx,dy,dz,flag\n" + "\n".join(
+        f"{x},{y},{x / 100},{y / 100},{10 - x * x / 1e3},0"
+        for x in range(-90, 91, 15)
+        for y in range(-90, 91, 15)
+    )
+    for i in range(20):
+        (grid / f"test1_{i:02d}.csv").write_text(rows)
+    run = ("bubble", "m/test1-linear.toml", "--data", "data", "--out", "out")
+    for content, words in (
+        ("", "header"),
+        ("x,y,dx,dy,dz,flag\n", "only a header"),
+        (rows.replace("15,30,", "15,nan,", 1), "line"),
+        (rows.replace("dz", "w", 1), "column 'dz'"),
+        ("\x00\x01binary", "test1_07.csv"),
+    ):
+        (grid / "test1_07.csv").write_text(content)
+        done = bubblefit(*run, cwd=tmp_path, code=2)
+        assert "test1_07.csv" in done.stderr and words in done.stderr, done.stderr
+        assert len(done.stderr.splitlines()) == 1
+        assert not (tmp_path / "out").exists()
+    (grid / "test1_07.csv").write_text(rows)
+    # A wrong unit shows in where the points lie, columns named twice in the project.
+    text = (tmp_path / "m" / "test1-linear.toml").read_text()
+    for old, new, words in (
+        ('comment = "#"', 'comment = "#"\nlength_unit = "m"', "length unit"),
+        ("radius = 100.0", "radius = 100000.0", "length unit"),
+        ('dx = "dx"', 'dx = "dy"', "data.points.columns.dy"),
+    ):
+        assert old in text
+        (tmp_path / "m" / "test1-linear.toml").write_text(text.replace(old, new, 1))
+        done = bubblefit(*run, cwd=tmp_path, code=2)
+        assert "test1-linear.toml" in done.stderr and words in done.stderr, done.stderr
+        assert len(done.stderr.splitlines()) == 1
+        assert not (tmp_path / "out").exists()
+
+
+def test_no_feasible_start_is_exit_code_3(tmp_path):
+    # G12 between its bounds is negative at the end of the strain range whatever the draw.
+    project = small(tmp_path, ("7.0e-3,     # G12", "7.0e-3,  # G12"), (
+        "0.0,   1.0,   0.0, 7.0e-2", "0.0, 1e-9, -0.29, 7.1e-3"))  # fmt: skip
+    done = bubblefit("bubble", project, "--out", "out", "--starts", 1, cwd=tmp_path, code=3)
+    assert "feasible" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_a_solver_that_fails_is_exit_code_4(study, tmp_path):
+    folder, _ = study
+    text = (folder / "out" / "material.toml").read_text()
+    values = "\n".join(f"    {v}," for v in [0, 0, 0, -1e-3, 0, 0, 0, 0.1, 0, 0, 0, 0.1])
+    bad = re.sub(r"beta = \[.*?\]", f"beta = [\n{values}\n]", text, flags=re.S)
+    (tmp_path / "card.toml").write_text(bad)
+    done = bubblefit(
+        "simulate", "bubble", folder / "project.toml", "--card", "card.toml", "--out", "sim",
+        cwd=tmp_path, code=4,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "sim").exists()
+
+
+def test_output_that_cannot_be_written(tmp_path):
+    project = small(tmp_path)
+    (tmp_path / "file").write_text("kept")
+    done = bubblefit("bubble", project, "--out", "file/out", "--starts", 1, cwd=tmp_path, code=2)
+    assert "file" in done.stderr and len(done.stderr.splitlines()) == 1
+    done = bubblefit("bubble", project, "--out", "/proc/bubblefit", "--starts", 1, cwd=tmp_path,
+                     code=2)  # fmt: skip
+    assert len(done.stderr.splitlines()) == 1
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file size limits are tried on Linux")
+def test_a_disk_that_fills_up_leaves_no_half_result(tmp_path):
+    import resource
+
+    project = small(tmp_path)
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+
+    done = bubblefit("bubble", project, "--out", "out", "--starts", 3, cwd=tmp_path, code=2,
+                     preexec_fn=limited)  # fmt: skip
+    assert "cannot be written" in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "out" / "result.json").exists()
+    # What was written is whole, and the study goes on once there is room.
+    bubblefit("bubble", project, "--out", "out", "--starts", 3, "--resume", cwd=tmp_path)
+    assert (tmp_path / "out" / "result.json").exists()
+
+
+@pytest.fixture
+def mounted(tmp_path):
+    """A function that mounts a small file system (root needs one: permissions mean nothing)."""
+    place = tmp_path / "mounted"
+    place.mkdir()
+
+    def mount(options: str) -> Path:
+        command = ["mount", "-t", "tmpfs", "-o", options, "none", str(place)]
+        try:
+            subprocess.run(command, check=True, capture_output=True)
+        except (OSError, subprocess.CalledProcessError):
+            pytest.skip("not allowed to mount a file system here")
+        return place
+
+    yield mount
+    subprocess.run(["umount", str(place)], capture_output=True, check=False)
+
+
+def test_a_read_only_file_system(study, mounted):
+    folder, _ = study
+    project, card = folder / "project.toml", folder / "out" / "material.toml"
+    place = mounted("size=1m,ro")
+    for arguments in (
+        ("bubble", project, "--starts", 1, "--out", place / "out"),
+        ("simulate", "bubble", project, "--card", card, "--out", place / "out"),
+        ("init", place / "out"),
+    ):
+        done = bubblefit(*arguments, cwd=folder, code=2)
+        assert str(place) in done.stderr and "Read-only" in done.stderr, done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("kilobytes", [4, 24, 64])
+def test_a_full_disk_leaves_no_result_and_whole_files(study, mounted, kilobytes):
+    """Full while the study runs, while tables are written, while figures are drawn."""
+    folder, _ = study
+    project, card = folder / "project.toml", folder / "out" / "material.toml"
+    place = mounted(f"size={kilobytes}k")
+    for arguments in (
+        ("bubble", project, "--starts", 2, "--out", place / "out"),
+        ("simulate", "bubble", project, "--card", card, "--out", place / "out"),
+    ):
+        done = bubblefit(*arguments, cwd=folder, code=2)
+        assert "No space left" in done.stderr and len(done.stderr.splitlines()) == 1
+        left = list((place / "out").glob("*"))
+        assert "result.json" not in [f.name for f in left], left
+        assert not list((place / "out").glob(".*")) and not list((place / "out").glob("*.part"))
+        shutil.rmtree(place / "out")
+
+
+def test_init_on_a_full_disk_leaves_nothing(mounted):
+    place = mounted("size=4k")
+    done = bubblefit("init", place / "mine", cwd=place, code=2)
+    assert "No space left" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert not list((place / "mine").glob("*"))
+
+
+@pytest.mark.slow
+def test_the_example_recovers_the_known_solution_from_other_data(tmp_path):
+    """Finer mesh and other increments: the fit cannot be exact, and says how far off it is."""
+    project = small(
+        tmp_path,
+        ("# elements = 1800", "elements = 1800"),
+        ("# increments = [4,", "increments = [4,"),
+    )
+    text = project.read_text().replace("elements = 48", "elements = 800", 1)
+    project.write_text(text)
+    bubblefit("bubble", project, "--out", "out", "--starts", 2, cwd=tmp_path)
+    result = json.loads((tmp_path / "out/result.json").read_text())
+    assert 1e-6 < result["objective"] < 0.05
+    assert result["moduli_error"]["E1"] < 0.05 and result["moduli_error"]["E2"] < 0.05
+
+
+def test_help_is_quick_and_complete(tmp_path):
+    done = bubblefit("--help", cwd=tmp_path)
+    for name in ("bubble", "simulate", "init", "130"):
+        assert name in done.stdout
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "bubblefit.cli", "--help"],
+        capture_output=True, text=True, cwd=tmp_path, check=True,
+    )  # fmt: skip
+    for heavy in ("numba", "gmsh", "matplotlib", "nlopt"):
+        # The last column of the table; meshio.gmsh is a reader of files.
+        assert not re.search(rf"\|\s*{heavy}\b", done.stderr), heavy

@@ -1,0 +1,105 @@
+"""`bubblefit compare`: forms of the moduli, cross-validated."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.cli.main import main
+from click.testing import CliRunner
+
+PROJECT = """
+[fabric]
+name = "made"
+thickness = 0.8
+[law]
+strain_range = [0.14, 0.18, 0.1]
+[law.bounds]
+E1 = [0.02, 2.0]
+E2 = [0.02, 1.0]
+G12 = [0.005, 0.2]
+[[strips]]
+increments = 5
+match = "points"
+warp = { gauge_length = 20, final_length = 23 }
+fill = { gauge_length = 20, final_length = 24 }
+[strips.data]
+files = ["points.csv"]
+[fit]
+seed = 3
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """Three specimens a direction of a fabric whose E1 is linear in strain and E2 constant."""
+    random = np.random.default_rng(1)
+    lines = ["direction,specimen,elongation (mm),load (N)"]
+    for direction, end, e, slope in (("warp", 3.0, 300.0, 1500.0), ("fill", 4.0, 200.0, 0.0)):
+        for specimen in "abc":
+            u = np.linspace(0.2, end - 0.01, 12)
+            strain = np.log1p(u / 20)
+            # Cauchy stress times the width that nu12 = 0.24 leaves: near enough for a test.
+            load = 20 * (e * strain + slope * strain**2 / 2) + random.normal(0, 2, len(u))
+            lines += [
+                f"{direction},{specimen},{a:.4f},{b:.3f}" for a, b in zip(u, load, strict=True)
+            ]
+    (tmp_path / "points.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "project.toml").write_text(PROJECT)
+    return tmp_path / "project.toml"
+
+
+def test_the_form_behind_the_data_is_found(project: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    forms = ["--form", "constant", "--form", "linear", "--form", "cubic"]
+    arguments = ["compare", str(project), "--out", str(out), "--starts", "1", "--quiet", *forms]
+    done = CliRunner().invoke(main, [*arguments, "--json"])
+    assert done.exit_code == 0, done.output
+    result = json.loads((out / "result.json").read_text())
+    assert json.loads(done.stdout) == result
+    found = {f["form"]: f for f in result["forms"]}
+    assert [f["coefficients"] for f in result["forms"]] == [3, 6, 12]
+    # Nested forms: each fits at least as well; the noise of 2 N is all that is left.
+    fitted = [f["fitted"] for f in result["forms"]]
+    assert fitted[0] > fitted[1] > fitted[2] * 0.999
+    assert found["constant"]["cross_validated"] > 2 * found["linear"]["cross_validated"]
+    assert 3 < found["linear"]["cross_validated"] < 5
+    assert result["simplest_as_good"] == "linear"
+    assert len(found["linear"]["folds"]) == 3  # as many as specimens
+    rows = list(csv.DictReader((out / "comparison.csv").open()))
+    assert [r["moduli"] for r in rows] == ["constant", "linear", "cubic"]
+    for name in ("laws.png", "loads.png", "report.html", "linear/material.toml"):
+        assert (out / name).stat().st_size > 0
+    # A result is not written over; --resume takes every form as it is.
+    assert CliRunner().invoke(main, arguments).exit_code == 2
+    before = (out / "linear" / "starts.jsonl").read_text()
+    (out / "result.json").unlink()
+    again = CliRunner().invoke(main, [*arguments, "--resume"])
+    assert again.exit_code == 0, again.output
+    assert (out / "linear" / "starts.jsonl").read_text() == before
+    assert json.loads((out / "result.json").read_text()) == result
+
+
+@pytest.mark.parametrize(
+    "old, new, says",
+    [
+        ('files = ["points.csv"]', 'polynomials = "p.csv"', "strips[0].match"),
+        ("E1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.005, 0.2]",
+         "lower = [0.005, 0.02, 0.02]\nupper = [0.2, 1.0, 2.0]", "E1, E2, G12"),
+        ('match = "points"', 'match = "polynomial"', 'match = "points"'),
+        ('name = "made"', 'name = "made"\nwidth = 3', "fabric.width"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_compared_is_refused(
+    project: Path, tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    (tmp_path / "p.csv").write_text(
+        "direction,gauge_length_mm,final_length_mm,c1\nwarp,20,23,300\nfill,20,24,200\n"
+    )
+    project.write_text(project.read_text().replace(old, new))
+    done = CliRunner().invoke(main, ["compare", str(project), "--out", str(tmp_path / "o"),
+                                     "--form", "constant"])  # fmt: skip
+    assert done.exit_code == 2 and says in done.output and not (tmp_path / "o").exists()

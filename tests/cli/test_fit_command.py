@@ -1,0 +1,189 @@
+"""`bubblefit fit`: a bubble and strips of one fabric, fitted together."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..commands import bubblefit, one_line, result_in
+from ..commands import in_process as quick
+
+LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
+KNOWN = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1,  1.37830e1,  -9.31830e-1, 1.39437e-1,
+    -4.79622e2,  2.12650e2,  -2.02028e1,  8.06350e-1,
+]  # fmt: skip
+
+TOGETHER = f"""
+[fabric]
+name = "One law, a bubble and strips"
+thickness = 0.81
+[units]
+modulus = "GPa"
+pressure = "kPa"
+[law]
+form = "cubic"
+strain_range = [0.153, 0.232, 0.883]
+[law.bounds]
+E1 = [0.02, 3.0]
+E2 = [0.02, 2.0]
+G12 = [0.001, 0.6]
+[[bubble]]
+radius = 100.0
+pressures = [59, 132, 251]
+increments = [6, 22, 40, 59, 97, 132, 186, 251]
+elements = 384
+symmetry = "quarter"
+match = {{ by = "points" }}
+[bubble.data.known_solution]
+beta = {KNOWN}
+[[strips]]
+increments = 10
+match = "points"
+[strips.data]
+files = ["points.csv"]
+""" + "".join(
+    f"[strips.{d}]\ngauge_length = {a}\nfinal_length = {b}\n" for d, (a, b) in LENGTHS.items()
+)
+
+
+def write_points(path: Path, law: HypoelasticLaw) -> None:
+    """Points as a test machine lists them: what a law gives, at the ten increments."""
+    lines = ["direction,elongation_mm,load_N"]
+    for direction, lengths in LENGTHS.items():
+        model = (
+            bias_strip(*lengths, 0.81, increments=10)
+            if direction == "bias"
+            else straight_strip(direction, *lengths, 0.81, increments=10)
+        )
+        load = MembraneSolver(1e-10).run(model, law).load
+        rows = zip(model.elongations, load, strict=True)
+        lines += [f"{direction},{float(u)!r},{float(p)!r}" for u, p in rows]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def project_in(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = TOGETHER
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = folder / "together.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def together(tmp_path_factory):
+    """Bubble and strips of one law, fitted together from one start."""
+    folder = tmp_path_factory.mktemp("together")
+    law = HypoelasticLaw(1e3 * np.array(KNOWN), 0.24, [0.153, 0.232, 0.883])
+    write_points(folder / "points.csv", law)
+    options = ("--out", "out", "--starts", 1, "--jobs", 1)
+    done = bubblefit("fit", project_in(folder), *options, cwd=folder)
+    return folder, done.stdout
+
+
+def test_the_law_of_both_is_found(together):
+    folder, text = together
+    result = result_in(folder / "out")
+    assert result["command"] == "fit" and list(result["tests"]) == ["bubble", "strips"]
+    assert result["objective"] < 1e-6 and result["tests"]["strips"]["e_uniaxial_N"] < 1e-2
+    error = result["tests"]["bubble"]["moduli_error"]
+    # Over the strains of the corners of the grips, which no load curve shows much of.
+    assert error["E1"] < 1e-3 and error["E2"] < 1e-3 and error["G12"] < 1e-3, error
+    # All together as they are weighted in the fit: one uncertainty, said once. (That the best
+    # estimate from all is never worse than from some: tests/experiments/strips/test_certainty.py.)
+    for name in ("E1", "E2", "G12"):
+        both, bubble = (result["pinned"][s][name]["median"] for s in ("all together", "bubble"))
+        assert both <= bubble
+        assert both == result["uncertainty"]["median_relative_sigma"][name]
+    for source in ("bubble", "strips", "all together"):
+        assert f"1 sigma from {source}: E1" in text
+
+
+def test_the_files_agree(together):
+    out = together[0] / "out"
+    result = result_in(out)
+    weights, parts = result["weights"], result["mean_relative_error"]
+    total = sum(weights[k] * parts[k] for k in ("bubble", "strips"))
+    assert result["objective"] == pytest.approx(total, rel=1e-3, abs=1e-9)
+    history = pd.read_csv(out / "history.csv")
+    assert len(history) == result["analyses"]
+    alone = history["status"].str.contains(" alone: ")
+    assert 0 < alone.sum() < len(history)
+    assert history["objective"][alone].isna().all()
+    # Beneath the fit's tolerance warm and cold analyses differ by rounding.
+    assert history["objective"].min() == pytest.approx(result["objective"], rel=1e-3, abs=1e-9)
+    page = (out / "report.html").read_text()
+    figures = re.findall(r'src="([^"]+\.png)"', page)
+    assert set(figures) == {p.name for p in out.glob("*.png")}
+    own = {"strips-loads.png", "bubble-profiles.png", "bubble-heights.png", "strips-bias.png"}
+    assert {"pinned.png", *own} <= set(figures)
+    assert (out / "strips-bias.vtu").exists() and (out / "bubble-bubble.vtu").exists()
+    loads = pd.read_csv(out / "strips-loads.csv")
+    assert set(loads["direction"]) == set(LENGTHS)
+    residuals = pd.read_csv(out / "residuals.csv")
+    assert set(residuals["test"]) == {"bubble", "strips"}
+
+
+BAD = [
+    (("[[strips]]\n", "[[strips]]\nthickness = 0.9\n"), "strips[0].thickness"),
+    (("[[bubble]]\n", "[[bubble]]\nweight = 0\n"), "bubble[0].weight"),
+    (('files = ["points.csv"]', 'files = ["none.csv"]'), "none.csv"),
+    (("[fabric]", '[project]\nkind = "joint"\n[fabric]'), "From version 0.1"),
+    (("pressures = [59, 132, 251]", "pressures = []"), "bubble[0].pressures"),
+    (("[[strips]]\n", '[[strips]]\nname = "bubble"\n'), "strips[0].name"),
+]
+
+
+@pytest.mark.parametrize("change, words", BAD)
+def test_bad_projects_end_in_one_line(together, tmp_path, change, words):
+    shutil.copy(together[0] / "points.csv", tmp_path)
+    project = project_in(tmp_path, change)
+    one_line(quick("fit", project, "--out", "out", cwd=tmp_path, code=2), words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_fit_is_not_resumed(together, tmp_path):
+    folder, _ = together
+    shutil.copytree(folder / "out", tmp_path / "out")
+    shutil.copy(folder / "points.csv", tmp_path)
+    run = ("--out", "out", "--starts", 1, "--resume")
+    for change in (
+        ("[[bubble]]\n", "[[bubble]]\nweight = 2.0\n"),
+        ("gauge_length = 20.022", "gauge_length = 20.5"),
+        ("pressures = [59, 132, 251]", "pressures = [59, 186, 251]"),
+    ):
+        project = project_in(tmp_path, change)
+        one_line(quick("fit", project, *run, cwd=tmp_path, code=2), "--overwrite")
+    # --data NAME=DIR names another folder of load curves; a computed bubble has no files.
+    project = project_in(tmp_path)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "points.csv").rename(tmp_path / "other" / "points.csv")
+    one_line(quick("fit", project, *run, cwd=tmp_path, code=2), "points.csv")
+    bubblefit("fit", project, *run, "--data", "strips=other", cwd=tmp_path)
+    other = ("--data", "strips=other", "--data", "bubble=other")
+    one_line(quick("fit", project, *run, *other, cwd=tmp_path, code=2), "bubble[0].data")
+
+
+def test_only_some_of_the_tests(together, tmp_path):
+    """By name, or by kind: strips alone from the same file."""
+    folder, _ = together
+    options = ("--out", tmp_path / "one", "--starts", 1, "--jobs", 1, "--quiet")
+    bubblefit("fit", folder / "together.toml", "--test", "strips", *options, cwd=folder)
+    options = ("--out", tmp_path / "kind", "--starts", 1, "--jobs", 1, "--quiet")
+    bubblefit("uniaxial", folder / "together.toml", *options, cwd=folder)
+    one, kind = result_in(tmp_path / "one"), result_in(tmp_path / "kind")
+    assert one["beta"] == kind["beta"] and list(one["tests"]) == ["strips"]
+    assert one["e_uniaxial_N"] == kind["e_uniaxial_N"] < 1e-2
+    bad = quick("fit", folder / "together.toml", "--test", "none", cwd=tmp_path, code=2)
+    one_line(bad, "'none'", "bubble, strips")

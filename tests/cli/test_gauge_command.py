@@ -1,0 +1,329 @@
+"""`bubblefit gauge`: DIC frames of a strip in, a load curve that a project reads out."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.cli.main import main
+from bubblefit.fits.project import read_project
+from click.testing import CliRunner, Result
+
+LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
+GAUGE = ["--lower", *LOWER, "--upper", *UPPER]
+#: By x, y and z: the strip rises 0.02 mm a mm.
+LENGTH = float((40.122 - 20.1) * np.hypot(1, 0.02))
+STRETCHES = np.linspace(1.0, 1.165, 12)
+LOST = (4, 7)
+
+
+def write_frames(
+    folder: Path,
+    lost: tuple[int, ...] = (),
+    stretches: np.ndarray = STRETCHES,
+    header: str = "x,y,z,dx,dy,dz",
+    scale: float = 1.0,
+) -> list[Path]:
+    """Frames f0.csv ... of a 25 x 60 mm strip: stretched, turned about x, slipped in the grips."""
+    x, y = np.meshgrid(np.arange(0, 25.1), np.arange(0, 60.1))
+    points = np.column_stack([x.ravel(), y.ravel(), 0.02 * y.ravel() + 1.0])
+    turn = np.array([[1, 0, 0], [0, np.cos(0.1), -np.sin(0.1)], [0, np.sin(0.1), np.cos(0.1)]])
+    folder.mkdir(exist_ok=True)
+    files = []
+    for i, stretch in enumerate(stretches):
+        moved = (points * [0.95, stretch, stretch]) @ turn.T + [0.3, -2.0, 0.5]
+        table = np.column_stack([points, moved - points]) / scale
+        if i in lost:  # a hole where the upper end is
+            table[np.hypot(points[:, 0] - 12, points[:, 1] - 40) < 2, 3:] = np.nan
+        files.append(folder / f"f{i}.csv")
+        text = "\n".join(
+            ",".join("" if np.isnan(v) else repr(v) for v in r) for r in table.tolist()
+        )
+        files[-1].write_text(f"{header}\n{text}\n")
+    return files
+
+
+def load_at(time: np.ndarray) -> np.ndarray:
+    """N, linear in s: so interpolation between the machine's readings is exact."""
+    return 350.0 * np.asarray(time) + 5.0
+
+
+def machine_export(folder: Path, end: float = 6.0) -> Path:
+    """As MTS TestSuite writes it, at 10 Hz; 12 frames at 2 Hz end at 5.5 s."""
+    rows = [
+        f"{0.9 * t:.6f},{float(load_at(t)) / 1e3!r},{t!r}" for t in np.arange(0, end, 0.1).tolist()
+    ]
+    head = (
+        "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
+    )
+    path = folder / "machine.csv"
+    path.write_text(head + "\n".join(rows) + "\n")
+    return path
+
+
+def gauge(*arguments: object, code: int = 0) -> Result:
+    done = CliRunner().invoke(main, ["gauge", *map(str, arguments)])
+    assert done.exit_code == code, done.output + done.stderr
+    return done
+
+
+def refusal(*arguments: object) -> str:
+    """The one line of a refusal, without "bubblefit: "."""
+    done = gauge(*arguments, code=2)
+    assert done.stdout == ""
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("warning: ")]
+    (line,) = lines
+    return line.removeprefix("bubblefit: ")
+
+
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory) -> Path:
+    """A folder with frames/ (12, none lost) and machine.csv. Not to be written to."""
+    folder = tmp_path_factory.mktemp("strip")
+    write_frames(folder / "frames")
+    machine_export(folder)
+    return folder
+
+
+def read_curve(path: Path) -> pd.DataFrame:
+    return pd.read_csv(path, comment="#")
+
+
+PROJECT = """
+[fabric]
+thickness = 0.81
+[[strips]]
+{sections}
+[strips.data]
+{data}
+"""
+
+
+def test_from_pictures_to_a_project(tmp_path):
+    """A real command: lost frames and frames without a load are named and left out."""
+    write_frames(tmp_path / "frames", LOST)
+    machine_export(tmp_path, end=5.3)
+    pairing = "--loads machine.csv --frame-interval 0.5 --direction Warp".split()
+    command = [sys.executable, "-m", "bubblefit.cli", "gauge", "frames/f*.csv", *GAUGE, *pairing]
+    done = subprocess.run(
+        [*command, "--specimen", "W 1", "--out", "w1.csv"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "correlation lost in 2 of 12 frames (4, 7)" in done.stderr
+    assert "1 of 12 frames have no load at their time: 11" in done.stderr
+    for words in ("gauge length 20.026 mm; 12 frames, lost in 2", "correlation lost: f4.csv, f7.c"):
+        assert words in done.stdout
+    assert "left out, no load: f11.csv" in done.stdout
+    assert "[strips.warp] gauge_length = 20.026" in done.stdout
+    # All defaults but the gauge length: header, units, specimen and direction are found.
+    project = tmp_path / "project.toml"
+    sections = f"[strips.warp]\ngauge_length = {LENGTH!r}"
+    project.write_text(PROJECT.format(sections=sections, data='files = ["w1.csv"]'))
+    read = read_project(project).tests["strips"].strips
+    assert list(read) == ["warp"]
+    (curve,) = read["warp"].curves
+    kept = [i for i in range(11) if i not in LOST]
+    np.testing.assert_allclose(curve.elongation, LENGTH * (STRETCHES[kept] - 1), atol=1e-9)
+    np.testing.assert_allclose(curve.load, load_at(0.5 * np.array(kept)), rtol=1e-12)
+    assert curve.specimen == "W 1"
+    assert read["warp"].final_length == pytest.approx(LENGTH * STRETCHES[10])
+
+
+def test_without_loads_every_frame_has_a_row(tmp_path):
+    files = write_frames(tmp_path / "frames", LOST)
+    done = gauge(*files, *GAUGE, "--out", tmp_path / "gauge.csv", "--json")
+    result = json.loads(done.stdout)
+    assert result["lost"] == ["f4.csv", "f7.csv"] and result["frames"] == 12
+    assert result["gauge_length_mm"] == pytest.approx(LENGTH)
+    assert result["longest"]["file"] == "f11.csv"
+    assert result["longest"]["strain"] == pytest.approx(0.165)
+    assert result["longest"]["log_strain"] == pytest.approx(np.log(1.165))
+    assert len(result["warnings"]) == 1 and result["warnings"][0] in done.stderr
+    table = read_curve(tmp_path / "gauge.csv")
+    assert list(table) == ["frame", "file", "length_mm", "elongation_mm", "strain", "log_strain"]
+    assert table["frame"].tolist() == list(range(12))
+    assert np.flatnonzero(table["length_mm"].isna()).tolist() == list(LOST)
+    good = table.drop(index=list(LOST))
+    stretch = np.delete(STRETCHES, LOST)
+    np.testing.assert_allclose(good["length_mm"], LENGTH * stretch, rtol=1e-10)
+    np.testing.assert_allclose(good["elongation_mm"], LENGTH * (stretch - 1), atol=1e-9)
+    np.testing.assert_allclose(good["strain"], stretch - 1, atol=1e-10)
+    np.testing.assert_allclose(good["log_strain"], np.log(stretch), atol=1e-10)
+    about = (tmp_path / "gauge.csv").read_text().splitlines()[0]
+    assert about.startswith("# virtual strain gauge between (12.3, 20.1) and (12.3, 40.122) mm")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Load (kN)\n{}\n",
+        "picture;Kraft in kN\n{}\n",
+        "Load cell,30,kN\nTime,Extension,Load\n(s),(mm),(kN)\n{}\n",
+    ],
+)
+def test_one_load_a_frame(strip, tmp_path, text):
+    loads = np.linspace(0, 1.5, 12)
+    before = {"L": "", "p": "7;", "T": "0.1,0.2,"}[text[0] if text[5:9] != "cell" else "T"]
+    rows = "\n".join(f"{before}{load!r}" for load in loads.tolist())
+    machine = tmp_path / "loads.csv"
+    machine.write_text(text.format(rows.replace(".", ",") if ";" in text else rows))
+    out = tmp_path / "F-3.csv"
+    gauge(strip / "frames" / "f*.csv", *GAUGE, "--loads", machine, "--direction", "weft",
+          "--out", out)  # fmt: skip
+    table = read_curve(out)
+    np.testing.assert_allclose(table["load_N"], 1e3 * loads)
+    assert set(table["specimen"]) == {"F-3"} and set(table["direction"]) == {"fill"}
+    np.testing.assert_allclose(table["strain"], STRETCHES - 1, atol=1e-9)
+
+
+def test_times_from_a_file_on_another_clock(strip, tmp_path):
+    """The camera starts 0.25 s after the machine and counts milliseconds."""
+    times = tmp_path / "pictures.csv"
+    times.write_text("picture,time_ms\n" + "".join(f"{i},{400 * i}\n" for i in range(12)))
+    out = tmp_path / "w.csv"
+    pairing = ["--frame-times", times, "--time-offset", 0.25]
+    gauge(strip / "frames/f*.csv", *GAUGE, "--loads", strip / "machine.csv", *pairing,
+          "--direction", "warp", "--out", out)  # fmt: skip
+    expected = load_at(0.4 * np.arange(12) + 0.25)
+    np.testing.assert_allclose(read_curve(out)["load_N"], expected, rtol=1e-12)
+
+
+def test_named_columns_flags_and_metres(strip, tmp_path):
+    names = "X,Y,Z,U,V,W"
+    files = write_frames(tmp_path / "m", header=names, scale=1e3)
+    for file in files:
+        first, *rest = file.read_text().splitlines()
+        # The flagged row would put a point of no meaning beside the gauge.
+        flagged = "0.0123,0.0401,9,9,9,9,1"
+        file.write_text("\n".join([f"{first},mask", *(f"{line},0" for line in rest), flagged]))
+    columns = "x=X, y=Y,z=Z,dx=U,dy=V,dz=W"
+    gauge(*files, *GAUGE, "--columns", columns, "--flag-column", "mask", "--length-unit", "m",
+          "--out", tmp_path / "a.csv")  # fmt: skip
+    gauge(strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "b.csv")
+    a, b = read_curve(tmp_path / "a.csv"), read_curve(tmp_path / "b.csv")
+    np.testing.assert_allclose(a["length_mm"], b["length_mm"], rtol=1e-12)
+
+
+def test_several_specimens_by_direction(strip, tmp_path):
+    """Curves of the command beside exports that do not name their direction."""
+    for name, direction in (("w1", "warp"), ("w2", "warp"), ("b1", "bias")):
+        gauge(strip / "frames/f*.csv", *GAUGE, "--loads", strip / "machine.csv",
+              "--frame-interval", 0.5, "--direction", direction,
+              "--out", tmp_path / f"{name}.csv")  # fmt: skip
+    (tmp_path / "fill.csv").write_bytes((strip / "machine.csv").read_bytes())
+    data = 'files = { warp = ["w1.csv", "w2.csv"], fill = ["fill.csv"], bias = ["b1.csv"] }'
+    ends = "\n".join(f"[strips.{d}]\ngauge_length = 20.0" for d in ("warp", "fill", "bias"))
+    project = tmp_path / "project.toml"
+    project.write_text(PROJECT.format(sections=ends, data=data))
+    strips = read_project(project).tests["strips"].strips
+    assert {d: [c.specimen for c in s.curves] for d, s in strips.items()} == {
+        "warp": ["w1", "w2"],
+        "fill": ["fill"],
+        "bias": ["b1"],
+    }
+
+
+def test_nothing_is_written_over(strip, tmp_path):
+    out = tmp_path / "gauge.csv"
+    ask = [strip / "frames/f*.csv", *GAUGE, "--out", out]
+    gauge(*ask)
+    first = out.read_bytes()
+    assert "is already there; use --overwrite" in refusal(*ask)
+    changed = [*ask, "--upper", "12.3", "39", "--overwrite"]
+    # Refused after the frames are read: what was there stays.
+    refusal(*changed, "--loads", tmp_path / "none.csv", "--direction", "warp")
+    assert out.read_bytes() == first
+    gauge(*changed)
+    assert out.read_bytes() != first
+    assert [f.name for f in tmp_path.iterdir()] == ["gauge.csv"]
+
+
+def test_data_are_never_written_over(tmp_path):
+    files = write_frames(tmp_path / "frames", stretches=np.array([1.0, 1.1]))
+    before = files[0].read_bytes()
+    link = tmp_path / "link.csv"
+    link.symlink_to(files[0])
+    for out in (files[0], link):
+        message = refusal(*files, *GAUGE, "--out", out, "--overwrite")
+        assert "is one of the files to be read" in message
+    assert files[0].read_bytes() == before
+
+
+def test_a_folder_that_cannot_be_written(strip, tmp_path):
+    (tmp_path / "file").write_text("")
+    message = refusal(strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "file" / "gauge.csv")
+    assert "cannot be written" in message and "--out" in message
+
+
+LOADS = ["--loads", "{strip}/machine.csv", "--direction", "warp"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--loads", "{strip}/machine.csv"], "--direction: this option is missing"),
+        (["--loads", "{strip}/machine.csv", "--direction", "90"], "--direction: unknown direction"),
+        (["--direction", "warp"], "--direction: means nothing without --loads"),
+        (["--frame-interval", "1"], "--frame-interval: means nothing without --loads"),
+        ([*LOADS, "--time-offset", "1"], "--time-offset: means nothing without --frame-times or"),
+        ([*LOADS, "--frame-time-column", "t"], "--frame-time-column: means nothing without --fr"),
+        (
+            [*LOADS, "--frame-interval", "1", "--frame-times", "{tmp}/t.csv"],
+            "--frame-times, --frame-interval: give one of them, not both",
+        ),
+        ([*LOADS, "--frame-interval", "nan"], "--frame-interval: expected a finite number"),
+        ([*LOADS, "--frame-interval", "1", "--time-offset", "inf"], "--time-offset: expected a f"),
+        ([*LOADS, "--specimen", " "], "--specimen: expected a name on one line"),
+        ([*LOADS, "--specimen", "a\nb"], "--specimen: expected a name on one line"),
+        (LOADS, "machine.csv: expected one load for each of the 12 frames, got 60; --frame-times"),
+        ([*LOADS, "--load-column", "F"], "'F'; name them with --load-column; line 4, above"),
+        (
+            [*LOADS, "--frame-times", "{strip}/frames/f0.csv"],
+            "f0.csv: no header row with the columns one of time; name them with --frame-time-col",
+        ),
+        ([*LOADS, "--load-unit", "N"], "the file says 'kN', load_unit says 'N'"),
+        (["--loads", "{tmp}/none.csv", "--direction", "warp"], "none.csv: no such file"),
+        ([*LOADS, "--frame-times", "{tmp}/none.csv"], "none.csv: no such file"),
+        (
+            [*LOADS, "--frame-times", "{strip}/machine.csv"],
+            "machine.csv: expected one time for each of the 12 frames, got 60",
+        ),
+        ([*LOADS, "--frame-interval", "9"], "specimen 'out': only 1 of 12 frames"),
+        (["--columns", "x"], "--columns: expected such as x=X,y=Y"),
+        (["--columns", ""], "--columns: expected such as x=X,y=Y"),
+        (["--columns", "w=W"], "--columns: unknown quantity 'w'; expected x, y, z, dx, dy, dz"),
+        (["--columns", "x=dx"], "--columns: column 'dx' is named for x and for dx"),
+        (["--columns", "x=X"], "f0.csv: column 'X': this column is missing; the file has: x, y"),
+        (["--flag-column", "mask"], "f0.csv: column 'mask': this column is missing"),
+        (["--max-gap", "inf"], "--max-gap: expected a finite number"),
+        (["--lower", "nan", "2"], "lower: expected x and y in mm"),
+        (["--lower", *UPPER], "gauge: lower and upper are the same point"),
+        (["--lower", "-5", "20"], "lower end of the gauge at (-5, 20) mm: lost in every frame"),
+        (["--length-unit", "m"], "f0.csv: gauge: the ends are 20.02 mm apart, the points 1414 mm"),
+        (["{tmp}/none.csv"], "none.csv: no such file"),
+        (["{tmp}/no*.csv"], "FRAMES: no file matches"),
+        (["{strip}/frames"], "frames: FRAMES: is a folder, expected files; quote a pattern such"),
+        (["{strip}/frames/f3.csv"], "f3.csv: FRAMES: is given twice"),
+        (["{strip}/machine.csv"], "machine.csv"),
+    ],
+)
+def test_bad_input_is_one_line(strip, tmp_path, options, words):
+    given = [option.format(strip=strip, tmp=tmp_path) for option in options]
+    ask = [strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "out.csv", *given]
+    assert words in refusal(*ask)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_order_that_looks_unmeant_is_said(tmp_path):
+    files = sorted(map(str, write_frames(tmp_path / "frames")))
+    done = gauge(*files, *GAUGE, "--out", tmp_path / "out.csv", "--json")
+    assert "f10.csv before f2.csv" in done.stderr
+    assert "f10.csv before f2.csv" in json.loads(done.stdout)["warnings"][0]

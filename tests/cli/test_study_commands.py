@@ -1,0 +1,223 @@
+"""`bubblefit study` as a user runs it: files, lines, levels that fail, bad input."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.cli.main import main
+from bubblefit.errors import SolverFailure
+from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from click.testing import CliRunner
+
+from ..places import EXAMPLES
+
+# GPa; Table 4.2, and moduli whose E1 is negative at the strains in a fine bias strip's corners.
+TABLE_4_2 = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1, -9.31830e-1,
+    1.39437e-1, -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+FALLING = [0, 0, 0, 0.015, 0, 0, 0, 0.15, 0, -3.0, -1.5, 0.7]
+
+
+def study(*arguments, cwd: Path, code: int = 0) -> str:
+    """Run the command; assert its exit code; return what it printed."""
+    with contextlib.chdir(cwd):
+        done = CliRunner().invoke(main, ["study", *map(str, arguments)])
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+@pytest.fixture
+def bubble(tmp_path: Path) -> Path:
+    """A folder with a small bubble project and the card of Table 4.2."""
+    text = (EXAMPLES / "bubble-known-solution" / "project.toml").read_text()
+    (tmp_path / "project.toml").write_text(text.replace("elements = 800", "elements = 80", 1))
+    law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.13] * 3)
+    write_card(MaterialCard(law, 0.81, "Table 4.2"), tmp_path / "card.toml")
+    return tmp_path
+
+
+@pytest.fixture
+def strips(tmp_path: Path) -> Path:
+    """A folder with the strips, 10 increments, and a card that fine bias strips cannot carry."""
+    example = EXAMPLES / "uniaxial-valmex7318"
+    text = (example / "project.toml").read_text()
+    (tmp_path / "project.toml").write_text(text.replace("increments = 100", "increments = 10", 1))
+    (tmp_path / "curves.csv").write_bytes((example / "curves.csv").read_bytes())
+    card = MaterialCard(HypoelasticLaw(1000 * np.array(FALLING)), 0.81)
+    write_card(card, tmp_path / "card.toml")
+    return tmp_path
+
+
+def test_mesh_of_a_bubble(bubble: Path) -> None:
+    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 3, "--coarser", 0,
+                 "--out", "out", cwd=bubble)  # fmt: skip
+    result = json.loads((bubble / "out/result.json").read_text())
+    model = result["models"]["bubble"]
+    counts = [level["elements"] for level in model["levels"]]
+    assert counts[2] == 4 * counts[1]
+    assert all(level["seconds"] > 0 and level["iterations"] > 0 for level in model["levels"])
+    apex = model["quantities"]["apex at 300 kPa, mm"]
+    assert apex["limit"] == pytest.approx(39.7838, abs=0.02)  # of 12800 quads on the quarter
+    assert abs(apex["own_error"]) < 5e-3 and apex["own_error_against"] == "limit"
+    assert len(model["quantities"]) == 8 and "rms_N" not in model
+    table = pd.read_csv(bubble / "out/convergence.csv")
+    assert len(table) == 3 * 8
+    finest = table[table.elements == counts[-1]]
+    assert (finest.off_finest == 0).all()
+    coarse = table[(table.factor == 1) & (table.quantity == "apex at 300 kPa, mm")].iloc[0]
+    assert coarse.value - coarse.off_finest == pytest.approx(apex["finest"])
+    assert (bubble / "out/convergence.png").stat().st_size > 10_000
+    assert "(the project's own)" in done and "order" in done
+    again = study("mesh", "project.toml", "--card", "card.toml", "--out", "out", cwd=bubble, code=2)
+    assert "--overwrite" in again
+
+
+def test_increments_of_strips(strips: Path) -> None:
+    done = study("mesh", "project.toml", "--card", "card.toml", "--what", "increments",
+                 "--levels", 3, "--json", cwd=strips)  # fmt: skip
+    result = json.loads(done)
+    folder = strips / "out" / f"{strips.name}-increments"
+    assert result == json.loads((folder / "result.json").read_text())
+    for name in ("warp", "fill"):
+        model = result["models"][name]
+        assert [level["increments"] for level in model["levels"]] == [10, 20, 40]
+        # The mean of a modulus over an increment is exact where strain follows the elongation.
+        assert "accuracy" in model["quantities"]["load at the end, N"]["remark"]
+        assert model["rms_N"]["order"] is None
+        assert max(model["rms_N"]["to_next_finer"]) < 1e-6 * model["rms_N"]["largest_load"]
+
+
+def test_a_level_that_fails_is_named_and_left_out(strips: Path) -> None:
+    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 3, "--out", "out",
+                 cwd=strips)  # fmt: skip
+    result = json.loads((strips / "out/result.json").read_text())
+    bias = result["models"]["bias"]["levels"]
+    failed = [level for level in bias if level["values"] is None]
+    assert failed and all("elongation" in level["failed"] for level in failed)
+    assert "failed: " in done
+    table = pd.read_csv(strips / "out/convergence.csv")
+    assert table.quantity.str.startswith("failed: ").sum() == len(failed)
+    assert all(level["values"] for level in result["models"]["warp"]["levels"])
+
+
+def test_nothing_that_ends_well_is_exit_code_4(bubble: Path) -> None:
+    card = MaterialCard(HypoelasticLaw(1000 * np.array([*TABLE_4_2[:11], -0.1])), 0.81)
+    write_card(card, bubble / "bad.toml")
+    for command in ("mesh", "nu12"):
+        done = study(command, "project.toml", "--card", "bad.toml", cwd=bubble, code=4)
+        assert len(done.splitlines()) == 1 and not (bubble / "out").exists()
+
+
+def test_nu12_of_a_bubble_and_of_strips(bubble: Path) -> None:
+    done = study("nu12", "project.toml", "--card", "card.toml", "--out", "out", cwd=bubble)
+    result = json.loads((bubble / "out/result.json").read_text())
+    last = result["models"]["bubble"]["responses"]["300 kPa"]
+    assert result["base_nu12"] == 0.24 and last["nu12"] == [0.05, 0.15, 0.25, 0.35, 0.45]
+    assert last["to_base"] == sorted(last["to_base"], reverse=True)
+    assert np.mean(last["to_mean"]) == pytest.approx(1.0)
+    table = pd.read_csv(bubble / "out/nu12.csv")
+    assert len(table) == 7 * 5
+    assert (bubble / "out/nu12.png").stat().st_size > 10_000
+    assert "bubble, 300 kPa" in done
+    assert result["models"]["bubble"]["failed"] == {}
+
+
+def test_what_a_reader_should_know_is_said(bubble: Path) -> None:
+    law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.05, 0.13, 0.13])
+    write_card(MaterialCard(law, 0.81), bubble / "card.toml")
+    for name, *options in (["nu12", "--nu12", 0.3], ["mesh", "--levels", 2]):
+        done = study(name, "project.toml", "--card", "card.toml", *options, "--out", name,
+                     cwd=bubble)  # fmt: skip
+        result = json.loads((bubble / name / "result.json").read_text())
+        (words,) = result["models"]["bubble"]["warnings"]
+        assert "beyond the card's valid range 0.050" in words and words in done
+
+
+def test_a_nu12_that_fails_is_named_and_left_out(
+    bubble: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = MembraneSolver.run
+
+    def picky(self: MembraneSolver, model, law, *args, **kwargs):
+        if law.nu12 > 0.4:
+            raise SolverFailure("no equilibrium at 186 kPa")
+        return run(self, model, law, *args, **kwargs)
+
+    monkeypatch.setattr(MembraneSolver, "run", picky)
+    options = ["project.toml", "--card", "card.toml", "--out", "out"]
+    done = study("nu12", *options, cwd=bubble)
+    assert "nu12 = 0.45: no equilibrium at 186 kPa" in done
+    model = json.loads((bubble / "out/result.json").read_text())["models"]["bubble"]
+    assert model["failed"] == {"0.45": "no equilibrium at 186 kPa"}
+    assert model["responses"]["300 kPa"]["to_base"][-1] is None
+    study("nu12", *options, "--overwrite", "--nu12", 0.45, cwd=bubble, code=4)
+
+
+def test_chosen_values_of_nu12(strips: Path) -> None:
+    study("nu12", "project.toml", "--card", "card.toml", "--nu12", 0.3, "--nu12", 0, "--out", "out",
+          cwd=strips)  # fmt: skip
+    models = json.loads((strips / "out/result.json").read_text())["models"]
+    assert set(models) == {"warp", "fill", "bias"}
+    for model in models.values():
+        (response,) = model["responses"].values()
+        assert response["nu12"] == [0.0, 0.3]
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["mesh", "--levels", 3, "--coarser", 3], "--coarser: expected fewer than the 3 levels"),
+        (["mesh", "--what", "increments", "--coarser", 1], "use --coarser 0"),
+        (["mesh", "--levels", 5, "--coarser", 4], "elements: expected 8 to"),
+        (["mesh", "--factor", 10, "--levels", 8], "elements: expected 8 to"),
+        (["nu12", "--nu12", 1.5], "--nu12: expected 0 <= nu12 < 1, got 1.5"),
+        (["nu12", "--element", "S4"], "means nothing to the solver 'membrane'"),
+        (["nu12", "--solver", "none"], "is not one of"),
+    ],
+)
+def test_bad_options_end_in_one_line(bubble: Path, options: list, words: str) -> None:
+    command, *rest = options
+    done = study(command, "project.toml", "--card", "card.toml", *rest, cwd=bubble, code=2)
+    assert words in done and len(done.splitlines()) == 1
+    assert not (bubble / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("radius = 100.0", "radius = -1", "bubble[0].radius"),
+        ("[fabric]", "[fabric", "TOML syntax"),
+    ],
+)
+def test_bad_projects_end_in_one_line(bubble: Path, old: str, new: str, words: str) -> None:
+    path = bubble / "project.toml"
+    path.write_text(path.read_text().replace(old, new, 1))
+    done = study("mesh", "project.toml", "--card", "card.toml", cwd=bubble, code=2)
+    assert words in done and "project.toml" in done
+    assert len(done.splitlines()) == 1
+
+
+def test_a_strip_too_coarse_to_coarsen(strips: Path) -> None:
+    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 8, "--coarser", 6,
+                 cwd=strips, code=2)  # fmt: skip
+    assert "come out the same" in done
+
+
+@pytest.mark.slow
+def test_a_study_on_calculix(bubble: Path, ccx) -> None:
+    options = ["project.toml", "--card", "card.toml", "--nu12", 0.45, "--json", "--overwrite"]
+    done = study("nu12", *options, "--solver", "calculix", "--ccx", ccx.path, cwd=bubble)
+    other = study("nu12", *options, cwd=bubble)
+    both = [json.loads(d)["models"]["bubble"]["responses"] for d in (done, other)]
+    assert list(both[0]) == list(both[1])
+    for pressure in both[0]:
+        ratios = [b[pressure]["to_base"][0] for b in both]
+        assert ratios[0] == pytest.approx(ratios[1], abs=2e-3)

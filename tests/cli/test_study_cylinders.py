@@ -1,0 +1,98 @@
+"""`bubblefit study` of cylinders: tests by name, cards of the project, runs that stop early."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..commands import in_process, one_line, result_in
+from ..cylinder_cases import STUDIED_PROJECT
+from ..places import KNOWN
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    path = tmp_path / "project.toml"
+    path.write_text(STUDIED_PROJECT)
+    return path
+
+
+def study(*arguments, cwd: Path, code: int = 0):
+    return in_process("study", *arguments, cwd=cwd, code=code)
+
+
+def test_increments_of_a_cylinder_converge(project: Path) -> None:
+    done = study("mesh", "project.toml", "--card", "known", "--test", "narrow", "--what",
+                 "increments", "--levels", 3, "--out", "out", cwd=project.parent)  # fmt: skip
+    result = result_in(project.parent / "out")
+    assert list(result["models"]) == ["narrow"] and result["card"] == "known"
+    found = result["models"]["narrow"]["quantities"]
+    # The mean of a modulus over an increment leaves next to nothing to the increments.
+    for quantity in found.values():
+        assert abs(quantity["own_error"]) < 2e-6
+    coarse, fine = result["models"]["narrow"]["rms_N"]["to_next_finer"]
+    assert coarse / fine == pytest.approx(4.0, abs=0.2)  # second order
+    # Sideways radius, volume, stiffness, load at 40 mm and RMS: each has its line.
+    assert (project.parent / "out/convergence.png").stat().st_size > 10_000
+    assert "load at 40 mm" in done.stdout
+
+
+def test_levels_without_a_quantity_are_left_out_of_it(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = MembraneSolver.run
+
+    def tired(self: MembraneSolver, model, law, *args, **kwargs) -> History:
+        history = run(self, model, law, *args, **kwargs)
+        if len(model.increments) > len(model.deflections):
+            return history
+        return replace(
+            history, load=history.load[:4], displacement=history.displacement[:4],
+            remarks=("the run stopped early",),
+        )  # fmt: skip
+
+    monkeypatch.setattr(MembraneSolver, "run", tired)
+    done = study("mesh", "project.toml", "--card", "known", "--case", "narrow", "--what",
+                 "increments", "--levels", 2, "--out", "out", cwd=project.parent)  # fmt: skip
+    found = result_in(project.parent / "out")["models"]["narrow"]
+    assert "load at 40 mm, N" not in found["levels"][0]["values"]
+    assert found["quantities"]["load at 40 mm, N"]["own_error"] is None
+    assert len(found["rms_N"]["to_next_finer"]) == 1
+    table = pd.read_csv(project.parent / "out/convergence.csv")
+    assert (table.quantity == "load at 40 mm, N").sum() == 1
+    assert (project.parent / "out/convergence.png").stat().st_size > 10_000
+    assert "-" in done.stdout
+
+
+def test_nu12_of_all_cylinders(project: Path) -> None:
+    study("nu12", "project.toml", "--card", "known", "--nu12", 0.4, "--out", "out",
+          cwd=project.parent)  # fmt: skip
+    models = result_in(project.parent / "out")["models"]
+    assert list(models) == ["narrow", "wide"]
+    for model in models.values():
+        assert list(model["responses"]) == ["load at 40 mm, N"]
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["--card", "other"], "--card: there is no card (and no file) 'other'"),
+        (["--card", "known", "--test", "slim"], "--test: there is no test 'slim'"),
+        (["--card", "known", "--coarser", 3], "size: expected at most the radius"),
+        (["--card", "known", "--solver", "none"], "fit.solver (or --solver)"),
+    ],
+)
+def test_mistakes_end_in_one_line(project: Path, options: list, words: str) -> None:
+    one_line(study("mesh", "project.toml", *options, cwd=project.parent, code=2), words)
+    assert not (project.parent / "out").exists()
+
+
+def test_other_projects_have_no_cylinders(tmp_path: Path) -> None:
+    (tmp_path / "project.toml").write_text(KNOWN.read_text())
+    done = study("mesh", "project.toml", "--card", "x", "--test", "a", cwd=tmp_path, code=2)
+    one_line(done, "there is no")

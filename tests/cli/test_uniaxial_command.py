@@ -1,0 +1,450 @@
+"""`bubblefit uniaxial` and `simulate uniaxial` as a user runs them."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.materials.card import MaterialCard, read_card, write_card
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..commands import bubblefit, one_line, result_in
+from ..commands import in_process as quick
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
+COARSE = ("increments = 100", "increments = 10")
+LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
+# Thesis Table 3.2, GPa.
+TABLE_3_2 = [
+    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
+    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
+    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
+]  # fmt: skip
+
+
+def changed(text: str, *changes: tuple[str, str]) -> str:
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def small(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The example with 10 increments, changed further by replacing text."""
+    shutil.copy(EXAMPLE / "curves.csv", folder)
+    path = folder / "project.toml"
+    path.write_text(changed((EXAMPLE / "project.toml").read_text(), COARSE, *changes))
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """An uninterrupted study of three starts: its folder and the terminal's output."""
+    folder = tmp_path_factory.mktemp("uniaxial")
+    done = bubblefit("uniaxial", small(folder), "--out", "out", "--starts", 3, cwd=folder)
+    return folder, done.stdout
+
+
+# uniaxial
+
+
+def test_the_files_of_a_study_agree(study):
+    folder, text = study
+    out = folder / "out"
+    result = result_in(out)
+    assert result["command"] == "strips" and list(result["tests"]) == ["strips"]
+    assert result["tests"]["strips"]["directions"] == result["directions"]
+    assert list(result["directions"]) == list(LENGTHS)
+    errors = [t["rms_N"] for t in result["directions"].values()]
+    assert result["e_uniaxial_N"] == pytest.approx(sum(errors))
+    assert result["objective"] == pytest.approx(sum(errors), rel=1e-6)
+    assert result["objective"] == min(s["objective"] for s in result["starts"])
+    # Every start ends there: start 1 once stopped at the border of a positive definite law.
+    assert [s["objective"] for s in result["starts"]] == pytest.approx([result["objective"]] * 3)
+
+    loads = pd.read_csv(out / "loads.csv")
+    for direction, (start, end) in LENGTHS.items():
+        test, rows = result["directions"][direction], loads[loads["direction"] == direction]
+        assert (test["gauge_length_mm"], test["final_length_mm"]) == (start, end)
+        assert len(rows) == test["matched"] == 10
+        off = rows["model_N"] - rows["polynomial_N"]
+        assert np.sqrt((off**2).mean()) == pytest.approx(test["rms_N"], rel=1e-6)
+        assert rows["model_N"].iloc[-1] == pytest.approx(test["end_load_N"])
+        assert rows["elongation_mm"].iloc[-1] == pytest.approx(end - start)
+        strain = rows["elongation_mm"] / start
+        np.testing.assert_allclose(rows["engineering_strain"], strain)
+
+    card = read_card(out / "material.toml")
+    np.testing.assert_allclose(card.law.beta, 1e3 * np.array(result["beta"]["values"]), rtol=1e-9)
+    assert card.thickness == 0.81 and "strips" in card.source
+    # Page, card and result.json say the same ends, whatever the corners of the grips reached.
+    ends = result["valid_strain"]
+    assert card.law.strain_range.tolist() == pytest.approx(list(ends.values()))
+    assert result["strain_reached"]["warp"] > 1.5 * ends["warp"]
+
+    history = pd.read_csv(out / "history.csv")
+    assert len(history) == result["analyses"]
+    assert list(history.columns[:5]) == ["start", "analysis", "solver", "objective", "status"]
+    assert list(history.columns[5:]) == [f"beta_{i}_GPa" for i in range(12)]
+    for start in result["starts"]:
+        rows = history[history["start"] == start["start"]]
+        assert rows["objective"].min() == pytest.approx(start["objective"], rel=1e-6)
+    best = history.loc[history["objective"].idxmin()]
+    np.testing.assert_allclose(
+        best[history.columns[5:]].astype(float), result["beta"]["values"], rtol=1e-2
+    )
+
+    page = (out / "report.html").read_text()
+    figures = re.findall(r'src="([^"]+\.png)"', page)
+    assert set(figures) == {p.name for p in out.glob("*.png")}
+    assert {"loads.png", "bias.png", "failure.png", "moduli.png", "optima.png"} <= set(figures)
+    for name in re.findall(r'href="([^"]+)"', page):
+        assert (out / name).exists(), name
+    for name, end in ends.items():
+        assert f"<td>{name}</td><td>{end:.4g}</td>" in page
+    assert not re.search("thesis|Eq\\.|Fig\\.", page + text)
+    for test in result["directions"].values():
+        assert f"{test['rms_N']:.3g}" in page and f"{test['rms_N']:.3g}" in text
+    assert (out / "bias.vtu").exists() and not list(out.glob("*.part"))
+
+
+def test_json_fail_above_and_overwrite(study, tmp_path):
+    project = small(tmp_path)
+    arguments = ("uniaxial", project, "--out", "out", "--starts", 1, "--quiet")
+    done = bubblefit(*arguments, "--json", "--fail-above", 1e3, cwd=tmp_path)
+    assert json.loads(done.stdout) == result_in(tmp_path / "out")
+    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
+    done = bubblefit(*arguments, "--overwrite", "--fail-above", 1, cwd=tmp_path, code=1)
+    assert "--fail-above" in done.stderr
+    # Start 0 of one is start 0 of three.
+    first = result_in(study[0] / "out")["starts"][0]
+    assert result_in(tmp_path / "out")["starts"] == [first]
+
+
+def test_interrupted_and_resumed_ends_the_same(study, tmp_path):
+    folder, _ = study
+    arguments = ["uniaxial", str(small(tmp_path)), "--out", "out", "--starts", "3", "--jobs", "1"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "bubblefit.cli", *arguments],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    starts = tmp_path / "out" / "starts.jsonl"
+    deadline = time.monotonic() + 120
+    while not (starts.exists() and starts.read_text().count("\n")):
+        assert time.monotonic() < deadline and running.poll() is None
+        time.sleep(0.01)
+    os.kill(running.pid, signal.SIGINT)
+    running.communicate(timeout=30)
+    assert running.returncode == 130
+    assert not (tmp_path / "out" / "result.json").exists()
+    bubblefit(*arguments, "--resume", cwd=tmp_path)
+    ours, theirs = result_in(tmp_path / "out"), result_in(folder / "out")
+    for key in ("objective", "beta", "starts", "analyses", "tests", "uncertainty", "warnings"):
+        assert ours[key] == theirs[key], key
+    histories = [(f / "out/history.csv").read_text() for f in (tmp_path, folder)]
+    assert histories[0] == histories[1]
+
+
+WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
+RANGE = ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.153, 0.232, 0.883]")
+OTHER_STUDIES = {
+    "weights": ("fill = 1.0", "fill = 2.0"),
+    "increments": ("increments = 10", "increments = 11"),
+    "gauge": ("[strips.data]", "[strips.warp]\ngauge_length = 21.0\n[strips.data]"),
+    "width": ("width = 25.0", "width = 24.0"),
+    "objective": ('objective = "N"', 'objective = "relative"'),
+    "bounds": ("E1 = [0.02, 2.0]", "E1 = [0.03, 2.0]"),
+}
+
+
+@pytest.fixture(scope="module")
+def of_points(tmp_path_factory):
+    """A finished start on measured points, with a strain range of its own."""
+    folder = tmp_path_factory.mktemp("points")
+    write_points(folder / "points.csv")
+    project = small(folder, *POINTS, RANGE, WIDER)
+    bubblefit("uniaxial", project, "--out", "out", "--starts", 1, cwd=folder)
+    return folder
+
+
+def write_points(path: Path, law: HypoelasticLaw | None = None, factor: float = 1.0) -> None:
+    """Points as a test machine lists them: what a law gives, at the ten increments."""
+    law = law or HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
+    lines = ["direction,elongation_mm,load_N"]
+    for direction, lengths in LENGTHS.items():
+        model = (
+            bias_strip(*lengths, 0.81, increments=10)
+            if direction == "bias"
+            else straight_strip(direction, *lengths, 0.81, increments=10)
+        )
+        load = factor * MembraneSolver(1e-10).run(model, law).load
+        rows = zip(model.elongations, load, strict=True)
+        lines += [f"{direction},{float(u)!r},{float(p)!r}" for u, p in rows]
+    path.write_text("\n".join(lines) + "\n")
+
+
+#: The example on a points file of the same strips.
+POINTS = (
+    ('match = "polynomial"', 'match = "points"'),
+    (
+        'polynomials = "curves.csv"',
+        'files = ["points.csv"]',
+    ),
+    (
+        "[strips.weights]",
+        "\n".join(
+            f"[strips.{d}]\ngauge_length = {a}\nfinal_length = {b}\n"
+            for d, (a, b) in LENGTHS.items()
+        )
+        + "[strips.weights]",
+    ),
+)
+
+
+@pytest.mark.parametrize("what", [*OTHER_STUDIES, "data", "gauge length", "final length"])
+def test_another_study_is_not_resumed(of_points, tmp_path, what):
+    shutil.copytree(of_points / "out", tmp_path / "out")
+    shutil.copy(of_points / "points.csv", tmp_path)
+    changes = [*POINTS, RANGE, WIDER]
+    if what == "data":
+        write_points(tmp_path / "points.csv", factor=1.01)
+    elif what == "gauge length":
+        changes.append(("gauge_length = 20.022", "gauge_length = 21.0"))
+    elif what == "final length":
+        changes.append(("final_length = 30.734", "final_length = 31.0"))
+    elif what == "gauge":
+        changes.append(("gauge_length = 22.78", "gauge_length = 22.7"))
+    else:
+        changes.append(OTHER_STUDIES[what])
+    arguments = ("uniaxial", small(tmp_path, *changes), "--out", "out", "--starts", 1, "--resume")
+    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite", "run.json")
+
+
+def test_a_study_of_points_finds_what_made_them(of_points):
+    result = result_in(of_points / "out")
+    assert result["matched_by"] == "points" and result["e_uniaxial_N"] < 1e-4
+    card = read_card(of_points / "out" / "material.toml").law
+    law = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
+    for modulus, end in (("E1", 0.15), ("E2", 0.23), ("G12", 0.6)):
+        x = np.linspace(0, end, 31)
+        np.testing.assert_allclose(card.modulus(modulus, x), law.modulus(modulus, x), rtol=1e-4)
+
+
+BAD = [
+    (("width = 25.0", "width = -25.0"), "strips[0].width"),
+    (("bias_angle = 45.0", "bias_angle = 95.0"), "strips[0].bias_angle"),
+    (("grip_distance = 75.0", "grip_distance = 15.0"), "strips[0].bias.gauge_length"),
+    (('match = "polynomial"', 'match = "points"'), "strips[0].match"),
+    (('polynomials = "curves.csv"', 'polynomials = "none.csv"'), "none.csv"),
+    (('polynomials = "curves.csv"', ""), "strips[0].data"),
+    (('polynomials = "curves.csv"', 'files = ["curves.csv"]'), "curves.csv"),
+    (("warp = 1.0\nfill = 1.0\nbias = 1.0", "warp = 0\nfill = 0\nbias = 0"), "strips[0].weights"),
+    (("E1 = [0.02, 2.0]", "E1 = [2.0, 0.02]"), "law.bounds.E1"),
+    (("E1 = [0.02, 2.0]", ""), "law.bounds.E1"),
+    (("E1 = [0.02, 2.0]", "lower = [0.1]"), "law.bounds"),
+    (("nu12 = 0.24", "nu12 = 0.24\nmargin = { E = 0.1, G12 = 0.1 }"), "law.margin"),
+    (("[fabric]", '[project]\nkind = "uniaxial"\n[fabric]'), "From version 0.1"),
+    (("[fit]", "[fit]\nnuisance = 1"), "fit.nuisance"),
+    (("[strips.data]", "[strips.fill]\nfinal_length = 22.0\n[strips.data]"), "strips[0].fill"),
+    (('form = "cubic"', 'form = "quartic"'), "law.form"),
+    (('form = "cubic"', 'form = "cubic"\nbreaks = {warp=[0.1, 0.2]}'), "law.breaks"),
+]
+
+
+@pytest.mark.parametrize("change, words", BAD)
+def test_bad_projects_end_in_one_line(tmp_path, change, words):
+    project = small(tmp_path, change)
+    done = quick("uniaxial", project, "--out", "out", cwd=tmp_path, code=2)
+    one_line(done, words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_feasible_start_is_exit_code_3(tmp_path):
+    """Between these coefficients every modulus is negative at the end of its range."""
+    bounds = (
+        "lower = [-9e9, 1e-3, -9e9, 1e-3, -9e9, 1e-3]\nupper = [-9e8, 2e-3, -9e8, 2e-3, -9e8, 2e-3]"
+    )
+    project = small(
+        tmp_path,
+        ('form = "cubic"', 'form = "linear"'),
+        ("E1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]", bounds),
+    )
+    done = quick("uniaxial", project, "--out", "out", "--starts", 1, cwd=tmp_path, code=3)
+    assert "feasible" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_solver_that_is_not_one(tmp_path):
+    """A program of another name is a failure of the solver, a wrong path bad input."""
+    run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
+    one_line(quick(*run, "no-ccx", cwd=tmp_path, code=2), "no-ccx")
+    done = quick(*run, shutil.which("false"), cwd=tmp_path, code=4)
+    assert "Traceback" not in done.stderr and done.stderr
+    assert not (tmp_path / "out" / "result.json").exists()
+
+
+@pytest.mark.slow
+def test_the_example_is_better_than_the_published_fit(tmp_path):
+    """Thesis section 3.4: e_uniaxial = 50.1 N on the same polynomials; here at 100 increments."""
+    project = EXAMPLE / "project.toml"
+    bubblefit("uniaxial", project, "--out", "out", "--starts", 1, cwd=tmp_path)
+    result = result_in(tmp_path / "out")
+    assert result["e_uniaxial_N"] < 50.1
+    assert all(t["rms_N"] < t["scatter_N"] for t in result["directions"].values())
+
+
+def test_raw_points_fit_within_the_scatter_of_the_specimens(shared_data, tmp_path):
+    """Fill and bias do; warp misses it by 1 %, which is as near as a cubic E1 can come.
+
+    The scatter is about a quartic load curve; a cubic E1 makes other curves of it (closed form).
+    """
+    scatter = {"warp": 21.7, "fill": 64.1, "bias": 40.3}
+    points = ('files = ["points.csv"]', 'files = ["valmex7318_load_gauge.csv"]')
+    project = small(tmp_path, *POINTS, points, ("increments = 10", "increments = 20"))
+    data = shared_data / "uniaxial"
+    bubblefit("uniaxial", project, "--data", data, "--out", "out", "--starts", 1, cwd=tmp_path)
+    tests = result_in(tmp_path / "out")["directions"]
+    for direction, known in scatter.items():
+        assert tests[direction]["scatter_N"] == pytest.approx(known, rel=2e-3)
+        assert tests[direction]["matched"] > 30
+    assert tests["fill"]["rms_N"] < scatter["fill"] and tests["bias"]["rms_N"] < scatter["bias"]
+    assert tests["warp"]["rms_N"] == pytest.approx(least_warp_error(data), rel=1e-3)
+    assert tests["warp"]["rms_N"] < 1.011 * scatter["warp"]
+    assert 'src="orders.png"' in (tmp_path / "out" / "report.html").read_text()
+
+
+def least_warp_error(data: Path) -> float:
+    """Least RMS error of load = b t exp(-nu12 eps) integral of a cubic E1, closed form."""
+    points = pd.read_csv(data / "valmex7318_load_gauge.csv", comment="#")
+    points = points[points["series"] == "warp"]
+    start, end = LENGTHS["warp"]
+    points = points[points["gauge_disp_mm"].between(0, end - start)]
+    strain = np.log1p(points["gauge_disp_mm"].to_numpy() / start)
+    curves = np.exp(-0.24 * strain[:, None]) * strain[:, None] ** np.arange(1, 5)
+    load = points["load_N"].to_numpy()
+    best = curves @ np.linalg.lstsq(curves, load, rcond=None)[0]
+    return float(np.sqrt(np.mean((best - load) ** 2)))
+
+
+# simulate uniaxial
+
+
+def card(folder: Path, name: str, law: HypoelasticLaw) -> Path:
+    path = folder / f"{name}.toml"
+    write_card(MaterialCard(law, 0.81, name, "a test"), path)
+    return path
+
+
+def test_simulate_two_cards(study, tmp_path):
+    folder, _ = study
+    published = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
+    cards = ["--card", folder / "out/material.toml", "--card", card(tmp_path, "table", published)]
+    arguments = ("simulate", "uniaxial", folder / "project.toml", *cards, "--out", "sim")
+    done = quick(*arguments, cwd=tmp_path)
+    result, loads = result_in(tmp_path / "sim"), pd.read_csv(tmp_path / "sim/loads.csv")
+    assert list(result["cards"])[1] == "table" and "table: RMS" in done.stdout
+    name, fitted = next(iter(result["cards"].items()))
+    fit = result_in(folder / "out")
+    beside = pd.read_csv(folder / "out/loads.csv")
+    for direction in LENGTHS:
+        ours = fitted["directions"][direction]
+        assert ours["rms_N"] == pytest.approx(fit["directions"][direction]["rms_N"], rel=1e-3)
+        rows = loads[(loads["card"] == name) & (loads["direction"] == direction)]
+        same = beside[beside["direction"] == direction]
+        np.testing.assert_allclose(rows["load_N"], same["model_N"], rtol=1e-5)
+        np.testing.assert_allclose(rows["elongation_mm"], same["elongation_mm"])
+    assert fitted["e_uniaxial_N"] == pytest.approx(fit["e_uniaxial_N"], rel=1e-3)
+    assert {p.name for p in (tmp_path / "sim").glob("*.png")} == {
+        "loads.png", "bias-1.png", "bias-2.png"
+    }  # fmt: skip
+    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
+    done = quick(*arguments, "--overwrite", "--json", cwd=tmp_path)
+    assert json.loads(done.stdout)["cards"] == result["cards"]
+
+
+def test_simulate_within_the_range_of_the_card(study, tmp_path):
+    """A card of small strains: its curves end early, and no sum of errors is made of them."""
+    folder, _ = study
+    law = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2])
+    options = ("--card", card(tmp_path, "short", law), "--within-range", "--out", "sim")
+    quick("simulate", "uniaxial", folder / "project.toml", *options, cwd=tmp_path)
+    (found,) = result_in(tmp_path / "sim")["cards"].values()
+    assert found["e_uniaxial_N"] is None
+    for direction, end in (("warp", 0.08), ("fill", 0.1)):
+        shown, start = found["directions"][direction]["shown_to_mm"], LENGTHS[direction][0]
+        step = (LENGTHS[direction][1] - start) / 10
+        assert shown <= start * np.expm1(end) < shown + step
+    assert 0 < found["directions"]["bias"]["shown_to_mm"] < 5
+    assert any(
+        "beyond the card's valid range" in w for w in found["directions"]["warp"]["warnings"]
+    )
+
+
+def test_simulate_a_card_that_fails_on_a_strip(study, tmp_path):
+    folder, _ = study
+    beta = np.zeros(12)
+    beta[[3, 7, 10, 11]] = 20.0, 220.0, -5000.0, 300.0  # E1 negative beyond a strain of 0.06
+    failing = card(tmp_path, "brittle", HypoelasticLaw(beta))
+    good = card(tmp_path, "good", HypoelasticLaw.linear(500.0, 200.0, 20.0))
+    run = ("simulate", "uniaxial", folder / "project.toml", "--out", "sim")
+    done = quick(*run, "--card", failing, "--card", good, cwd=tmp_path)
+    assert "warp failed" in done.stdout and "no equilibrium" in done.stdout
+    brittle, fine = result_in(tmp_path / "sim")["cards"].values()
+    assert "failed" in brittle["directions"]["warp"] and brittle["e_uniaxial_N"] is None
+    assert brittle["directions"]["fill"]["rms_N"] > 0 and fine["e_uniaxial_N"] > 0
+    loads = pd.read_csv(tmp_path / "sim/loads.csv")
+    assert set(loads[loads["card"] == "good"]["direction"]) == set(LENGTHS)
+    assert "warp" not in set(loads[loads["card"] == "brittle"]["direction"])
+
+    hopeless = card(tmp_path, "hopeless", HypoelasticLaw.linear(300.0, 220.0, -5.0))
+    done = quick(*run, "--card", hopeless, "--overwrite", cwd=tmp_path, code=4)
+    one_line(done, "no equilibrium")
+    bad = quick(*run, "--card", "none.toml", "--overwrite", cwd=tmp_path, code=2)
+    one_line(bad, "none.toml")
+    twice = quick(*run, "--card", good, "--card", good, "--overwrite", cwd=tmp_path)
+    assert len(result_in(tmp_path / "sim")["cards"]) == 2, twice.stdout
+
+
+def test_simulate_without_data(study, tmp_path):
+    """Lengths in the project are enough."""
+    project = small(tmp_path, *POINTS)
+    law = card(tmp_path, "some", HypoelasticLaw.linear(500.0, 200.0, 20.0))
+    done = quick("simulate", "uniaxial", project, "--card", law, "--out", "sim", cwd=tmp_path)
+    assert "N at the end" in done.stdout
+    (found,) = result_in(tmp_path / "sim")["cards"].values()
+    assert found["e_uniaxial_N"] is None
+    assert all(t["rms_N"] is None and t["end_load_N"] > 0 for t in found["directions"].values())
+
+
+# CalculiX
+
+
+def test_strips_fitted_by_calculix(ccx, tmp_path):
+    """Warp and fill of a known law, led by the membrane; a bias strip would take minutes."""
+    write_points(tmp_path / "points.csv")
+    lines = (tmp_path / "points.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "points.csv").write_text("".join(x for x in lines if not x.startswith("bias")))
+    start, end = LENGTHS["bias"]
+    bias = f"[strips.bias]\ngauge_length = {start}\nfinal_length = {end}\n"
+    project = small(tmp_path, *POINTS, RANGE, WIDER, (bias, ""))
+    options = ("--solver", "calculix", "--element", "S4", "--out", "out", "--starts", 1)
+    bubblefit("uniaxial", project, *options, cwd=tmp_path)
+    result = result_in(tmp_path / "out")
+    assert result["solver"] == "calculix" and 1 <= result["external_runs"] <= 10
+    assert all(t["rms_N"] < 0.01 * t["end_load_N"] for t in result["directions"].values()), result
+    history = pd.read_csv(tmp_path / "out/history.csv")
+    assert (history["solver"] == "calculix").sum() == result["external_runs"]

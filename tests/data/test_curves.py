@@ -1,0 +1,336 @@
+"""Load curves of strips from what test machines export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.data.column_names import means, split_unit
+from bubblefit.data.curves import (
+    DIRECTION_ALIASES,
+    LoadCurve,
+    read_load_curves,
+    split_at_restarts,
+)
+from bubblefit.errors import InputError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..complaints import complaint
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("exports") / "strip 3.csv"
+
+
+def read(path: Path, text: str, encoding: str = "utf-8", **options) -> tuple[LoadCurve, ...]:
+    path.write_bytes(text.encode(encoding))
+    return read_load_curves(path, **{"direction": "warp", **options})
+
+
+#: Instron Bluehill: properties, then names and bracketed units; with a German setting every
+#: number is a quoted decimal comma, though the separator is a comma.
+BLUEHILL = """\
+Specimen properties : Width,25.0,mm
+Specimen properties : Thickness,0.81,mm
+Specimen properties : Specimen label,""
+
+Time,Extension,Load,Tensile strain (Extension),Tensile stress,Cycle count
+(s),(mm),(N),(mm/mm),(MPa),
+0.000,-0.01,-0.02,0.0,0.0,0
+0.100,0.25,100.5,0.003,5.0,0
+"""
+BLUEHILL_COMMAS = """\
+Results Table 1
+
+
+Results Table 2
+
+
+
+Time,Displacement,Force
+(s),(mm),(kN)
+"0,0000","-0,0100","-0,00002"
+"0,1000","0,2500","0,1005"
+"""
+#: Bluehill with several specimens: the specimen's number stands before the names.
+BLUEHILL_BLOCK = """\
+Results Table 1
+,Width,Thickness
+,(mm),(mm)
+"1","25.0","0.81"
+
+1,Time,Displacement,Force
+,(s),(mm),(kN)
+,"0.0","-0.01","-0.00002"
+,"0.1","0.25","0.1005"
+"""
+#: MTS TestSuite: four lines about the test, two blank ones, names, units without brackets.
+TESTSUITE = """\
+C:\\MTS\\Strip tests\\DAQ- Crosshead, Load.csv
+Test: cut strip, ASTM D751
+Test Run: 3
+Date: 1/2/2014 10:11:12 AM
+
+
+Axial Displacement,Axial Force,Running Time
+mm,kN,sec
+-0.01,-0.00002,0.0
+0.25,0.1005,0.1
+"""
+#: MTS TestWorks and Elite: quoted names, rates among the properties.
+TESTWORKS = """\
+"Test Method","Strip test, extension control"
+"Sample ID","warp 3"
+"Test Date","1/2/2014"
+"Load Cell","30","kN"
+"Test speed","300","mm/min"
+"Crosshead [mm]"\t"Load [N]"\t"Time [s]"
+-0.01\t-0.02\t0
+0.25\t100.5\t0.1
+"""
+#: ZwickRoell testXpert: properties with value and unit, tabs, quoted names and units.
+TESTXPERT = """\
+"Probenkennung 2"\t"Kette_3"
+"Messlänge Standardweg"\t80\t"mm"
+"Prüfgeschwindigkeit"\t300\t"mm/min"
+"Vorkraft"\t2\t"N"
+"Prüfzeit"\t"Standardkraft"\t"Standardweg"\t"Dehnung"
+"s"\t"N"\t"mm"\t"%"
+0,0\t-0,02\t-0,01\t0
+0,1\t100,5\t0,25\t0,3
+"""
+SEMICOLONS = "Weg in mm; Kraft in kN;\n-0,01;-0,00002;\n0,25;0,1005;\n;;\n"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        BLUEHILL,
+        BLUEHILL_COMMAS,
+        BLUEHILL_BLOCK,
+        TESTSUITE,
+        TESTWORKS.replace("\t", ","),
+        TESTWORKS,
+        TESTXPERT,
+        SEMICOLONS,
+    ],
+)
+def test_what_machines_export(scratch, text, encoding):
+    (curve,) = read(scratch, text, encoding)
+    np.testing.assert_allclose(curve.elongation, [-0.01, 0.25], rtol=1e-14)
+    np.testing.assert_allclose(curve.load, [-0.02, 100.5], rtol=1e-14)
+    assert (curve.direction, curve.specimen, curve.path) == ("warp", "strip 3", scratch)
+    assert curve.time is None
+
+
+def test_the_measured_points_need_no_options(shared_data):
+    path = shared_data / "uniaxial/valmex7318_load_gauge.csv"
+    curves = read_load_curves(path)
+    assert [c.direction for c in curves] == ["warp", "fill", "bias"]
+    assert [c.specimen for c in curves] == ["warp", "fill", "bias45"]
+    assert [len(c.load) for c in curves] == [59, 39, 98]
+    rows = [line.split(",") for line in path.read_text().splitlines()[2:]]
+    for curve in curves:
+        here = [row for row in rows if row[0] == curve.specimen]
+        np.testing.assert_array_equal(curve.elongation, [float(row[1]) for row in here])
+        np.testing.assert_array_equal(curve.load, [float(row[2]) for row in here])
+    # Five specimens a direction (section 3.1), listed one after the other.
+    parts = [[len(part.load) for part in split_at_restarts(curve)] for curve in curves]
+    assert parts == [[10, 18, 10, 10, 11], [10, 9, 9, 3, 8], [11, 22, 21, 22, 22]]
+    (fill,) = read_load_curves(path, direction="weft")
+    np.testing.assert_array_equal(fill.load, curves[1].load)
+
+
+def test_specimens_and_directions_have_columns(scratch):
+    text = (
+        "Specimen No.,Test direction,Load (kN),Extension (cm)\n"
+        "A,Warp,0.1,1\nB,Warp,0.2,2\nA,Warp,0.3,3\nA,45-degree bias,0.4,4\n"
+    )
+    curves = read(scratch, text, direction=None)
+    assert [(c.direction, c.specimen) for c in curves] == [
+        ("warp", "A"),
+        ("warp", "B"),
+        ("bias", "A"),
+    ]
+    np.testing.assert_allclose(curves[0].load, [100, 300])
+    np.testing.assert_allclose(curves[0].elongation, [10, 30])
+    assert "no fill; it has: warp, bias" in complaint(read, scratch, text, direction="fill")
+    columns = {"specimen": "Test direction", "direction": "Specimen No."}
+    message = complaint(read, scratch, text, direction=None, columns=columns)
+    assert "line 2, column 'Specimen No.': unknown direction 'A'; use one of warp" in message
+
+
+def test_names_given_settle_what_is_ambiguous(scratch):
+    text = TESTXPERT.replace("Dehnung", "Traversenweg absolut").replace('"%"', '"mm"')
+    message = complaint(read, scratch, text)
+    assert "line 5: the column of elongation may be 'Standardweg' or 'Traversenweg" in message
+    assert "the file has: Prüfzeit, Standardkraft, Standardweg" in message
+    (curve,) = read(scratch, text, columns={"elongation": "Traversenweg absolut"})
+    np.testing.assert_allclose(curve.elongation, [0, 0.3])
+    # Names the reader does not know, with and without their unit; a column of time.
+    text = "t,Kanal 1 [mm],Kanal 2 [kN]\n0,1,2\n5,3,4\n"
+    columns = {"elongation": "Kanal 1", "load": "Kanal 2 [kN]", "time": "t"}
+    (curve,) = read(scratch, text, columns=columns)
+    np.testing.assert_allclose(curve.load, [2000, 4000])
+    np.testing.assert_allclose(curve.time, [0, 5])
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("", {}, "no header row"),
+        ("a,b\n1,2\n", {}, "line 1, above the first numbers, has: a, b"),
+        ("Load (N),Extension (mm)\n", {}, "line 1: no rows of numbers"),
+        ("Load,Extension\n1,2\n", {}, "column 'Extension': the file does not name the unit"),
+        ("Load (lbf),disp_mm\n1,2\n", {}, "line 1, column 'Load (lbf)': unit 'lbf' is not one of"),
+        ("Load (kN),disp_mm\n1,2\n", {"load_unit": "N"}, "the file says 'kN', load_unit says 'N'"),
+        ("Load (N),disp_mm\nkN,mm\n1,2\n", {}, "line 2, column 'Load (N)': unit 'kN' here"),
+        ("Load (N),disp_mm\n1,2\n\n3,x\n", {}, "line 4, column 'disp_mm': expected a number"),
+        ("Load (N),disp_mm\n1,2\n3\n", {}, "line 3, column 'disp_mm': expected a number, found no"),
+        ("Load (N),disp_mm\n1,2\n3,4,5\n", {}, "line 3: expected 2 cells as in line 1, found 3"),
+        ('Load (N),disp_mm\n"1,234","2,345"\n', {}, "column 'disp_mm': '2,345': is the comma a"),
+        ('Load (N),disp_mm\n"1.234,5",1\n', {}, "expected a number, found '1.234,5'"),
+        ("Load (N);disp_mm\n1,5;1.000\n", {"decimal": ","}, "column 'disp_mm': expected a number"),
+        ("Load (N),disp_mm,disp_mm\n1,2,3\n", {}, "may be 'disp_mm' or 'disp_mm'"),
+        ("Load (N),disp_mm\n1,2\n", {"direction": None}, "no column says the direction"),
+        ("Load (N),disp_mm\n1,2\n", {"direction": "90"}, "direction: unknown direction '90'"),
+        ("Load (N),disp_mm\n1,2\n", {"columns": {"force": "Load"}}, "unknown quantity 'force'"),
+        ("Load (N),disp_mm\n1,2\n", {"columns": {"time": "t"}}, "column of time 't' is missing"),
+        ("Load (N),disp_mm\n1,2\n", {"columns": {"load": "F"}}, "with the columns one of elon"),
+        ("Load,disp_mm\n1,2\n", {"load_unit": "lbf"}, "load_unit: expected one of N, kN"),
+        ("Load (kN),disp_mm\n1e307,2\n", {}, "numbers too large; is the unit 'kN' right?"),
+        ("Load (N),disp_mm\n1,2\n", {"decimal": ";"}, "decimal: expected a point or a comma"),
+        ("Specimen,Load (N),disp_mm\n,1,2\n", {}, "column 'Specimen': expected the specimen's"),
+        ("Load\0(N),disp_mm\n1,2\n", {}, "not a text file"),
+    ],
+)
+def test_the_refusal_says_what_is_wrong(scratch, text, options, words):
+    assert words in complaint(read, scratch, text, **options)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    assert "no such file" in complaint(read_load_curves, tmp_path / "x.csv")
+    assert "cannot be read" in complaint(read_load_curves, tmp_path)
+
+
+def test_one_thousand_and_little_more_than_one(scratch):
+    text = "Load (N);disp_mm\n1,234;2\n"
+    (curve,) = read(scratch, text, decimal=",")
+    assert curve.load == [1.234]
+    # One number that can only be a decimal settles it for the file.
+    (curve,) = read(scratch, text + "0,5;3\n")
+    np.testing.assert_allclose(curve.load, [1.234, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("name", "plain", "unit"),
+    [
+        ("Load (kN)", "Load", "kN"),
+        ("Crosshead [mm]", "Crosshead", "mm"),
+        ("gauge_disp_mm", "gauge_disp", "mm"),
+        ("load_N", "load", "N"),
+        ("Kraft / N", "Kraft", "N"),
+        ("Weg in mm", "Weg", "mm"),
+        ("PROBENBREITE <mm>", "PROBENBREITE", "mm"),
+        ("Tensile strain (Extension)", "Tensile strain (Extension)", ""),
+        ("Load (Channel 1)", "Load (Channel 1)", ""),
+        ("Strain (mm/mm)", "Strain", "mm/mm"),
+        ("Extension", "Extension", ""),
+        ("m", "m", ""),
+    ],
+)
+def test_units_in_names(name, plain, unit):
+    assert split_unit(name) == (plain, unit)
+
+
+def test_what_is_neither_load_nor_elongation():
+    for name in ("Tensile strain (Extension)", "Load rate (N/s)", "Load Cell", "Preload (N)"):
+        assert not means(name, "elongation") and not means(name, "load")
+
+
+measured = st.lists(
+    st.tuples(*[st.floats(-1e6, 1e6, allow_subnormal=False)] * 2), min_size=1, max_size=20
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    rows=measured,
+    separator=st.sampled_from([",", ";", "\t"]),
+    comma=st.booleans(),
+    quoted=st.booleans(),
+    units=st.sampled_from(["names", "row", "options"]),
+    load_unit=st.sampled_from(["N", "kN"]),
+    length_unit=st.sampled_from(["mm", "m"]),
+    noise=st.lists(
+        st.sampled_from(
+            ["", "Test run 3", "Load cell,30,kN", "Width;25;mm", '"Date"\t"1/2/2014"', "# comment"]
+        )
+    ),
+    breaks=st.sampled_from(["\n", "\r\n", "\r"]),
+    encoding=st.sampled_from(["utf-8", "utf-16", "latin-1"]),
+    order=st.permutations([0, 1, 2]),
+)
+def test_good_exports_come_back(
+    scratch, rows, separator, comma, quoted, units, load_unit, length_unit, noise, breaks,
+    encoding, order,
+):  # fmt: skip
+    quoted = quoted or (comma and separator == ",")
+    load, length = (f" ({load_unit})", f" ({length_unit})") if units == "names" else ("", "")
+    table = [[f"Extension{length}", f"Load{load}", "Größe"]]
+    if units == "row":
+        table.append([f"({length_unit})", load_unit, ""])
+    for u, f in rows:
+        # One decimal sixteen places long: no thousand.
+        cells = [f"{u:.16e}", f"{f:.16e}", "a b"]
+        table.append([cell.replace(".", ",") if comma else cell for cell in cells])
+    if quoted:
+        table = [[f'"{cell}"' for cell in row] for row in table]
+    lines = noise + [separator.join(row[i] for i in order) for row in table]
+    options = {}
+    if units == "options":
+        options = {"load_unit": load_unit, "length_unit": length_unit}
+    (curve,) = read(scratch, breaks.join(lines) + breaks, encoding, **options)
+    expected = np.array(rows) * [{"mm": 1, "m": 1e3}[length_unit], {"N": 1, "kN": 1e3}[load_unit]]
+    np.testing.assert_allclose(np.stack([curve.elongation, curve.load], 1), expected, rtol=1e-14)
+
+
+@settings(deadline=None, max_examples=400)
+@given(
+    whole=st.sampled_from([BLUEHILL, BLUEHILL_COMMAS, TESTSUITE, TESTXPERT, SEMICOLONS]),
+    start=st.floats(0, 1),
+    length=st.integers(0, 60),
+    garbage=st.one_of(
+        st.binary(max_size=30),
+        st.text('",;\n#.e-+0129 \t\r()mkN', max_size=30).map(str.encode),
+        st.sampled_from([b"Load (N)", b"Extension", b"nan", b"1e999", b"_", b"\xff\xfe"]),
+    ),
+)
+def test_a_damaged_export_is_curves_or_refused(scratch, whole, start, length, garbage):
+    content = whole.encode()
+    at = int(start * len(content))
+    scratch.write_bytes(content[:at] + garbage + content[at + length :])
+    try:
+        curves = read_load_curves(scratch, direction="fill")
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert str(scratch) in str(error)
+    else:
+        for curve in curves:
+            assert len(curve.load) == len(curve.elongation) > 0
+            assert np.isfinite(curve.load).all() and np.isfinite(curve.elongation).all()
+
+
+@settings(deadline=None, max_examples=200)
+@given(garbage=st.one_of(st.binary(max_size=80), st.text(max_size=80).map(str.encode)))
+def test_garbage_is_refused(scratch, garbage):
+    scratch.write_bytes(garbage)
+    assert str(scratch) in complaint(read_load_curves, scratch, direction="fill")
+
+
+def test_directions_have_a_table_of_names():
+    assert set(DIRECTION_ALIASES.values()) == {"warp", "fill", "bias"}

@@ -1,0 +1,26 @@
+"""Which files the frames of a test are."""
+
+from __future__ import annotations
+
+from bubblefit.data.frame_files import frame_files
+
+
+def test_the_order_of_frames(tmp_path):
+    for name in ("f10.csv", "f2.csv", "f1.csv", "g.csv"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "f3.csv").mkdir()
+
+    def order(*names: str) -> tuple[list[str], str | None]:
+        files, note = frame_files([str(tmp_path / name) for name in names])
+        return [file.name for file in files], note
+
+    assert order("f*.csv") == (["f1.csv", "f2.csv", "f10.csv"], None)
+    assert order("f2.csv", "f1.csv", "f10.csv") == (["f2.csv", "f1.csv", "f10.csv"], None)
+    assert order("g.csv", "f?.csv") == (["g.csv", "f1.csv", "f2.csv"], None)
+    # As a shell sorts an unquoted pattern.
+    files, note = order("f1.csv", "f10.csv", "f2.csv")
+    assert files == ["f1.csv", "f10.csv", "f2.csv"]
+    assert note is not None and "f10.csv before f2.csv; quote the pattern" in note
+    # A name with a bracket in it is a file before it is a pattern.
+    (tmp_path / "a[1].csv").write_text("")
+    assert order("a[1].csv")[0] == ["a[1].csv"]

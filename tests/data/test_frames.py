@@ -1,0 +1,55 @@
+"""Frames of image correlation read from tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.data.frames import FrameOptions, read_frames
+from bubblefit.errors import InputError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..complaints import complaint
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("frames") / "frame.csv"
+
+
+def options(columns=None, **others) -> FrameOptions:
+    return FrameOptions(columns=columns, **others)
+
+
+def test_frames_are_read_with_holes(tmp_path):
+    path = tmp_path / "B00001.csv"
+    path.write_text("# m\nX,Y,Z,U,V,W,mask\n1,2,3,4,5,6,0\n1,2,3,,NaN,,0\n1,x,3,4,5,6,1\n")
+    names = dict(zip(("x", "y", "z", "dx", "dy", "dz"), "XYZUVW", strict=True))
+    (frame,) = read_frames([path], options(names, flag_column="mask", length_scale=10.0))
+    np.testing.assert_array_equal(frame.points, [[10, 20, 30], [10, 20, 30]])
+    np.testing.assert_array_equal(frame.displacement, [[40, 50, 60], [np.nan] * 3])
+    assert frame.path == path
+    message = complaint(read_frames, [path], options(names))
+    assert "B00001.csv: line 5, column 'Y': expected a number, found 'x'" in message
+    assert "column 'x': this column is missing" in complaint(read_frames, [path])
+    assert complaint(read_frames, []).startswith("files")
+    assert complaint(options, {"x": "X"}).startswith("columns")
+    assert complaint(options, length_scale=0.0).startswith("length_scale")
+    assert "length unit" in complaint(
+        read_frames, [path], options(names, flag_column="mask", length_scale=1e308)
+    )
+
+
+@settings(deadline=None, max_examples=200)
+@given(start=st.integers(0, 60), length=st.integers(0, 30), garbage=st.binary(max_size=20))
+def test_a_damaged_frame_is_a_frame_or_refused(scratch, start, length, garbage):
+    content = b"x,y,z,dx,dy,dz\n1,2,3,4,5,6\n1,2,3,,nan,\n7,8,9,10,11,12\n"
+    scratch.write_bytes(content[:start] + garbage + content[start + length :])
+    try:
+        (frame,) = read_frames([scratch])
+    except InputError as error:
+        assert str(scratch) in str(error) and "\n" not in str(error)
+    else:
+        assert not np.isinf(frame.points).any() and not np.isinf(frame.displacement).any()

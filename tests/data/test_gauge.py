@@ -1,0 +1,181 @@
+"""The virtual strain gauge, and the machine's loads beside it."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+from bubblefit.data.frames import Frame
+from bubblefit.data.gauge import gauge_load_curve, virtual_strain_gauge
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..complaints import complaint
+
+
+def grid(spacing: float = 1.0, jitter: float = 0.0, seed: int = 0) -> np.ndarray:
+    """Reference points (m, 3) on a 25 x 60 mm strip that is not quite flat."""
+    x, y = np.meshgrid(np.arange(0, 25.1, spacing), np.arange(0, 60.1, spacing))
+    flat = np.stack([x.ravel(), y.ravel()], axis=1)
+    flat += jitter * spacing * np.random.default_rng(seed).uniform(-1, 1, flat.shape)
+    return np.column_stack([flat, 0.02 * flat[:, 1] + 1.0])
+
+
+def stretched(points: np.ndarray, stretch: float, angle: float, shift=(3.0, -7.0, 2.0)):
+    """Stretch along the strip, turn about x (out of the camera's plane), slip in the grips."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    moved = (points * [0.9, stretch, stretch]) @ turn.T + shift
+    return Frame(points, moved - points)
+
+
+LOWER, UPPER = (12.3, 20.1), (12.3, 40.122)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    stretches=st.lists(st.floats(0.95, 1.6), min_size=1, max_size=4),
+    angle=st.floats(-1, 1),
+    jitter=st.sampled_from([0.0, 0.1]),
+    spacing=st.sampled_from([1.0, 1.3, 2.0]),
+)
+def test_a_homogeneous_stretch_is_met_exactly(stretches, angle, jitter, spacing):
+    points = grid(spacing, jitter)
+    frames = [stretched(points, stretch, angle) for stretch in stretches]
+    record = virtual_strain_gauge(frames, LOWER, UPPER)
+    # By x, y and z: the strip's slope of 0.02 is part of the length.
+    reference = (UPPER[1] - LOWER[1]) * np.hypot(1, 0.02)
+    assert record.reference_length == pytest.approx(reference, rel=1e-12)
+    np.testing.assert_allclose(record.length, reference * np.array(stretches), rtol=1e-10)
+    np.testing.assert_allclose(record.elongation, record.length - reference, atol=1e-10)
+    np.testing.assert_allclose(record.strain, np.array(stretches) - 1, atol=1e-10)
+    np.testing.assert_allclose(record.log_strain, np.log(stretches), atol=1e-10)
+    assert (record.lost, record.warnings) == ((), ())
+
+
+def test_interpolation_is_second_order():
+    errors = []
+    for spacing in (2.0, 1.0, 0.5):
+        points = grid(spacing)
+        move = np.zeros_like(points)
+        move[:, 1] = 3 * np.sin(points[:, 1] / 10)
+        record = virtual_strain_gauge([Frame(points, move)], (12.3, 20.73), (12.3, 41.31))
+        change = 3 * (np.sin(4.131) - np.sin(2.073))
+        exact = np.hypot(20.58 + change, 0.02 * 20.58) - np.hypot(1, 0.02) * 20.58
+        errors.append(abs(record.elongation[0] - exact))
+    assert errors[2] < errors[0] / 8
+    assert errors[2] < 0.005
+
+
+@pytest.mark.parametrize("how", ["nan", "missing"])
+@pytest.mark.parametrize("jitter", [0.0, 0.05])
+def test_one_missing_point_at_the_gauge_is_lost_correlation(how, jitter):
+    points = grid(1.0, jitter)
+    frames = [stretched(points, stretch, 0.0) for stretch in (1.0, 1.1, 1.2, 1.3)]
+    near = np.argmin(np.linalg.norm(points[:, :2] - UPPER, axis=1))
+    for i in (1, 3):
+        if how == "nan":
+            moved = frames[i].displacement.copy()
+            moved[near, 2] = np.nan
+            frames[i] = Frame(points, moved)
+        else:
+            kept = np.arange(len(points)) != near
+            frames[i] = Frame(points[kept], frames[i].displacement[kept])
+    record = virtual_strain_gauge(frames, LOWER, UPPER)
+    assert record.lost == (1, 3)
+    for values in (record.length, record.elongation, record.strain, record.log_strain):
+        np.testing.assert_array_equal(np.isnan(values), [False, True, False, True])
+    np.testing.assert_allclose(record.strain[[0, 2]], [0.0, 0.2], atol=1e-12)
+    (warning,) = record.warnings
+    assert "upper end" in warning and "lost in 2 of 4 frames (1, 3)" in warning
+    assert virtual_strain_gauge(frames, LOWER, UPPER, max_gap=3.0).lost == ()
+    # A hole elsewhere does not matter.
+    assert virtual_strain_gauge(frames, LOWER, (5.0, 30.0)).lost == ()
+
+
+def test_what_lies_outside_is_not_extrapolated():
+    points = grid()
+    short = points[points[:, 1] < 38]
+    frames = [stretched(points, 1.0, 0.0), stretched(short, 1.1, 0.0)]
+    record = virtual_strain_gauge(frames, LOWER, UPPER)
+    assert record.lost == (1,)
+    assert "outside the correlated points" in record.warnings[0]
+    line = Frame(points[points[:, 0] == 12], np.zeros((61, 3)))
+    nothing = Frame(np.zeros((0, 3)), np.zeros((0, 3)))
+    record = virtual_strain_gauge([line, frames[0], nothing], LOWER, UPPER)
+    assert record.lost == (0, 2)
+    assert len(record.warnings) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"frames": []}, "frames: expected at least one"),
+        ({"upper": LOWER}, "gauge: lower and upper are the same point"),
+        ({"upper": (1.0, 2.0, 3.0)}, "upper: expected x and y in mm"),
+        ({"lower": (np.nan, 2.0)}, "lower: expected x and y in mm"),
+        ({"upper": (12.0, 99.0)}, "upper end of the gauge at (12, 99) mm: lost in every frame"),
+    ],
+)
+def test_gauges_that_cannot_be(change, words):
+    asked = {"frames": [stretched(grid(), 1.0, 0.0)], "lower": LOWER, "upper": UPPER} | change
+    assert words in complaint(virtual_strain_gauge, **asked)
+
+
+def test_ends_never_seen_together():
+    points = grid()
+    low, high = points[points[:, 1] < 30], points[points[:, 1] > 30]
+    frames = [stretched(low, 1.0, 0.0), stretched(high, 1.0, 0.0)]
+    assert "no frame shows both ends" in complaint(virtual_strain_gauge, frames, LOWER, UPPER)
+
+
+def three_frames():
+    points = grid()
+    frames = [stretched(points, stretch, 0.0) for stretch in (1.0, 1.1, 1.2)]
+    frames[1] = Frame(points[points[:, 1] < 38], frames[1].displacement[points[:, 1] < 38])
+    return virtual_strain_gauge(frames, LOWER, UPPER)
+
+
+def test_loads_are_paired_by_frame():
+    record = three_frames()
+    curve = gauge_load_curve(record, [0, 50, 120], direction="weft", specimen="3")
+    assert (curve.direction, curve.specimen, curve.path) == ("fill", "3", None)
+    np.testing.assert_array_equal(curve.load, [0, 120])
+    np.testing.assert_array_equal(curve.elongation, record.elongation[[0, 2]])
+
+
+def test_loads_are_paired_by_time(caplog):
+    record = virtual_strain_gauge(
+        [stretched(grid(), stretch, 0.0) for stretch in (1.0, 1.1, 1.2, 1.3)], LOWER, UPPER
+    )
+    with caplog.at_level(logging.WARNING, logger="bubblefit"):
+        curve = gauge_load_curve(
+            record,
+            [0, 10, 30],
+            direction="warp",
+            specimen="1",
+            frame_times=[-1, 0.5, 1.5, 2],
+            load_times=[0, 1, 2],
+        )
+    np.testing.assert_allclose(curve.load, [5, 20, 30])
+    np.testing.assert_allclose(curve.elongation, record.elongation[1:])
+    np.testing.assert_allclose(curve.time, [0.5, 1.5, 2])
+    assert "1 of 4 frames have no load at their time" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"loads": [1, 2]}, "expected one load a frame, got 2 for 3 frames; pair by time"),
+        ({"loads": [1, np.nan, 2]}, "loads: expected finite numbers"),
+        ({"direction": "90"}, "unknown direction '90'"),
+        ({"frame_times": [0, 1, 2]}, "times: expected both"),
+        ({"frame_times": [0, 1], "load_times": [0, 1, 2]}, "frame_times: expected 3"),
+        ({"frame_times": [0, 1, 2], "load_times": [0, 2, 1]}, "load_times: expected two"),
+        ({"frame_times": [7, 8, 9], "load_times": [0, 1, 2]}, "only 0 of 3 frames"),
+    ],
+)
+def test_loads_that_do_not_pair(options, words):
+    asked = {"loads": [1, 2, 3], "direction": "warp", "specimen": "1"} | options
+    assert words in complaint(gauge_load_curve, three_frames(), **asked)

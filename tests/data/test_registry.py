@@ -1,0 +1,163 @@
+"""Formats of data files: how they are told apart, named, and added by one file or one plug-in."""
+
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.data import registry
+from bubblefit.data.curves import read_load_curves
+from bubblefit.data.fields import read_fields
+from bubblefit.data.frames import Frame, read_frames
+from bubblefit.data.published_polynomials import read_published_polynomials
+from bubblefit.data.registry import (
+    Format,
+    format_named,
+    format_names,
+    format_of,
+    formats,
+    register_format,
+)
+from bubblefit.errors import InputError, PlugInFailure
+
+from ..complaints import complaint
+from ..plug_ins import install
+
+STARRED = "*** a camera\n1 2 0 0.1 0.2 0.3\n4 5 0 0.4 0.5 0.6\n7 8 0 nan nan nan\n"
+
+
+def read_starred(path: Path, options) -> list[Frame]:
+    values = np.loadtxt(path, skiprows=1, ndmin=2)
+    return [Frame(values[:, :3], values[:, 3:], path)]
+
+
+def starred(name="starred", recognises=lambda path, head: head.startswith(b"*** a camera")):
+    return Format(name, "frame", "with three stars", read_starred, recognises)
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """Formats registered by a test are gone after it."""
+    formats("frame")
+    monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
+
+
+def test_every_content_has_one_format_that_takes_what_no_other_recognises():
+    for content in ("frame", "machine table", "load polynomials"):
+        ours = formats(content)
+        assert sum(one.recognises is None for one in ours) == 1
+        assert format_names(content)[: len(ours)] == tuple(one.name for one in ours)
+        assert all(one.title and format_named(content, one.name) == one for one in ours)
+
+
+def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
+    path = tmp_path / "frame.csv"
+    path.write_text(STARRED)
+    assert "this column is missing" in complaint(read_frames, [path])
+    register_format(starred())
+    assert format_of("frame", path).name == "starred"
+    (frame,) = read_frames([path])
+    np.testing.assert_array_equal(frame.displacement[0], [0.1, 0.2, 0.3])
+    # A field needs all of a point: what correlation lost is dropped.
+    (field,) = read_fields([path], [0.1])
+    assert (len(field.points), field.dropped) == (2, 1)
+    # What is named is not looked for; other contents do not know it.
+    assert "'csv'" not in complaint(read_frames, [path], format="csv")
+    assert format_of("machine table", path).name == "text"
+    register_format(starred("other"))
+    message = complaint(read_frames, [path])
+    assert message == f"{path}: the format may be 'other' or 'starred'; say which with format"
+    assert len(read_frames([path], format="other")) == 1
+
+
+def test_lost_everywhere_and_several_frames_are_no_field(tmp_path, own):
+    path = tmp_path / "frame.txt"
+    path.write_text("*** a camera\n7 8 0 nan nan nan\n")
+    register_format(starred())
+    assert "all 1 rows are doubtful; none is left" in complaint(read_fields, [path], [0.1])
+    twice = Format("twice", "frame", "two", lambda *a: read_starred(*a) * 2)
+    register_format(twice)
+    assert len(read_frames([path], format="twice")) == 2
+    message = complaint(read_fields, [path], [0.1], format="twice")
+    assert "expected one frame, one a pressure; found 2" in message
+
+
+def test_names_that_are_not_there_and_files_that_are_not_there(tmp_path):
+    message = complaint(read_load_curves, tmp_path / "a.csv", format="csb")
+    assert message.startswith("format: 'csb' is not one of: text")
+    for read in (lambda p: read_frames([p]), read_load_curves, read_published_polynomials):
+        assert "no such file" in complaint(read, tmp_path / "a.csv")
+
+
+# --- plug-ins ------------------------------------------------------------------------------------
+
+READER = """
+import json
+import numpy as np
+from bubblefit.data.frames import Frame
+from bubblefit.data.registry import Format
+
+def read(path, options):
+    content = json.loads(path.read_text())
+    return [Frame(np.array(content["places"]), np.array(content["moves"]), path)]
+
+def recognises(path, head):
+    return b'"places"' in head
+
+THING = Format("{name}", "frame", "places and moves", read, recognises)
+"""
+
+
+def install_reader(folder, name="json", text=READER, **options):
+    install(folder, name, text.replace("{name}", name), group="bubblefit.readers", **options)
+
+
+def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages, tmp_path):
+    install_reader(packages)
+    path = tmp_path / "frame.json"
+    path.write_text(json.dumps({"places": [[1, 2, 3]], "moves": [[0.1, 0.2, 0.3]]}))
+    assert "json" in format_names("frame")
+    assert format_of("frame", path).name == "json"
+    assert read_frames([path])[0].points.tolist() == [[1, 2, 3]]
+    assert len(read_frames([path], format="json")) == 1
+    message = complaint(read_load_curves, path, format="json")
+    assert message == "format: 'json' is of a frame, not of a machine table"
+    for text, cause in (('{"places": []}', "KeyError: 'moves'"), ('"places"', "TypeError: ")):
+        path.write_text(text)
+        with pytest.raises(PlugInFailure) as failure:
+            read_frames([path])
+        words = f"the plug-in 'json' of acme-things 2.5 fails on {path} ({cause}"
+        assert str(failure.value).startswith(words) and "\n" not in str(failure.value)
+
+
+def test_ours_are_asked_before_plug_ins_and_keep_their_names(packages, tmp_path, own):
+    install_reader(packages)
+    install_reader(packages, "csv", "raise RuntimeError")
+    path = tmp_path / "frame.json"
+    path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')
+    assert format_named("frame", "csv").title.startswith("comma-separated")
+    register_format(starred("mine", lambda path, head: head.startswith(b"{")))
+    assert format_of("frame", path).name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("raise RuntimeError('no licence')", "cannot be imported (RuntimeError: no licence)"),
+        ("THING = 3", "is no format: acme_json:THING has no name, content, read, recognises"),
+        (READER.replace("{name}", "else"), "calls its format 'else'; both must have one name"),
+        (READER.replace("in head", "in None"), "fails on "),
+    ],
+)
+def test_a_broken_reader_breaks_nothing_else(packages, tmp_path, caplog, text, words):
+    install_reader(packages, text=text)
+    path = tmp_path / "frame.csv"
+    path.write_text("x,y,z,dx,dy,dz\n1,2,3,4,5,6\n")
+    with caplog.at_level(logging.WARNING, logger="bubblefit"):
+        assert len(read_frames([path])) == 1
+    assert f"the plug-in 'json' of acme-things 2.5 {words}" in caplog.text
+    with pytest.raises((PlugInFailure, InputError)):
+        read_frames([path], format="json")

@@ -1,0 +1,150 @@
+"""[[bubble]] of a project: conversion to mm and MPa, the examples, and one-line errors."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.experiments.bubble.sources import KnownSolution, PointFiles
+from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.fits.project import Project, read_project
+
+from ...complaints import complaint
+from ...places import EXAMPLES, KNOWN, SHARED
+
+VALMEX = EXAMPLES / "bubble-valmex7318"
+GRID = SHARED / "bubble"
+
+
+@pytest.fixture
+def edit(tmp_path: Path):
+    """Read the known-solution example after replacing one text by another."""
+
+    def read(old: str, new: str, source: Path = KNOWN, **options) -> Project:
+        text = source.read_text()
+        assert old in text
+        path = tmp_path / "project.toml"
+        path.write_text(text.replace(old, new, 1))
+        return read_project(path, **options)
+
+    return read
+
+
+def bubble(project: Project) -> BubbleTest:
+    (test,) = project.tests.values()
+    assert isinstance(test, BubbleTest)
+    return test
+
+
+def test_known_solution_is_table_4_2_in_mpa():
+    p = bubble(read_project(KNOWN))
+    assert isinstance(p.data, KnownSolution)
+    assert p.pressures == pytest.approx([0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.300])
+    assert p.increments == pytest.approx(
+        [0.006, 0.022, 0.040, 0.059, 0.097, 0.132, 0.186, 0.251, 0.300]
+    )
+    assert set(p.pressures) <= set(p.increments)
+    assert (p.radius, p.thickness, p.elements, p.symmetry) == (100.0, 0.81, 800, "quarter")
+    assert p.data.beta[[0, 3, 7, 11]] == pytest.approx([-7.96788, 20.0439, 139.437, 806.35])
+    assert (p.data.elements, p.data.symmetry) == (800, "quarter")
+    assert p.data.increments == p.increments
+    assert (p.match_by, p.objective, p.name, p.weight) == ("points", "e", "bubble", 1.0)
+
+
+def test_units_of_the_file_do_not_matter(edit):
+    reference = bubble(read_project(KNOWN))
+    bar = bubble(edit('pressure = "kPa"', 'pressure = "bar"'))
+    assert bar.pressures == pytest.approx(np.array(reference.pressures) * 100)
+    mpa = bubble(edit('modulus = "GPa"', 'modulus = "MPa"'))
+    assert isinstance(mpa.data, KnownSolution) and isinstance(reference.data, KnownSolution)
+    assert mpa.data.beta == pytest.approx(reference.data.beta / 1000)
+    metre = bubble(edit('length = "mm"', 'length = "m"'))
+    assert metre.radius == pytest.approx(reference.radius * 1000)
+
+
+def test_data_from_another_model(edit):
+    other = bubble(edit("# elements = 1800\n# increments", "elements = 1800\nincrements"))
+    assert isinstance(other.data, KnownSolution) and other.data.elements == 1800
+    assert other.data.increments[0] == pytest.approx(0.004)
+    assert set(other.pressures) <= set(other.data.increments)
+    assert other.data.increments != other.increments
+
+
+def test_default_increments_and_repeated_ones(edit):
+    reference = bubble(read_project(KNOWN)).increments
+    assert bubble(edit("increments = [6, 40]", "")).increments == pytest.approx(reference)
+    assert len(bubble(edit("increments = [6, 40]", "increments = [40, 22, 6]")).increments) == 9
+
+
+@pytest.mark.parametrize("name", sorted(p.name for p in VALMEX.glob("*.toml")))
+def test_real_examples(name: str, shared_data: Path):
+    p = bubble(read_project(VALMEX / name, shared_data / "bubble"))
+    assert isinstance(p.data, PointFiles)
+    assert len(p.data.files) == len(p.pressures) == 20 and p.symmetry == "full"
+    recorded = np.loadtxt(GRID / "grid_pressures.csv", delimiter=",", skiprows=1)
+    indices = [int(f.stem[-2:]) for f in p.data.files]
+    assert p.pressures == pytest.approx(recorded[indices, 2])
+    assert p.data.columns["dz"] == "dz" and p.data.flag_column == "flag"
+    for file, bar in zip(p.data.files, recorded[indices, 1], strict=True):
+        assert f"p_bar={bar:.6f}" in file.open().readline()
+
+
+def test_missing_data_says_what_to_do(tmp_path: Path):
+    project = VALMEX / "test1-linear.toml"
+    for folder in (None, tmp_path / "nowhere", tmp_path):
+        assert "--data DIR" in complaint(read_project, project, folder)
+    p = bubble(read_project(project, need_data=False))
+    assert isinstance(p.data, PointFiles) and p.data.files[0].name == "test1_00.csv"
+
+
+def test_data_folder_is_relative_to_the_project(tmp_path: Path):
+    shutil.copy(VALMEX / "test2-cubic.toml", tmp_path)
+    (tmp_path / "data" / "grid").mkdir(parents=True)
+    for i in range(20):
+        (tmp_path / "data" / "grid" / f"test2_{i:02d}.csv").touch()
+    data = bubble(read_project(tmp_path / "test2-cubic.toml")).data
+    assert isinstance(data, PointFiles) and all(f.is_file() for f in data.files)
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("radius = 100.0", "", ["bubble[0].radius", "missing"]),
+        ("radius =", "raduis =", ["bubble[0].raduis", "did you mean 'radius'"]),
+        ("[bubble.match]", "[bubble.matsch]", ["bubble[0].matsch", "did you mean 'match'"]),
+        ("displacement_offset", "offset", ["bubble[0].nuisance.offset", "displacement_offset"]),
+        ("radius = 100.0", 'radius = "100 mm"', ["bubble[0].radius", "number", "'100 mm'"]),
+        ("radius = 100.0", "radius = -1.0", ["bubble[0].radius", "greater than 0"]),
+        ("radius = 100.0", "radius = 0.5", ["bubble[0].radius", "thickness 0.81 mm"]),
+        ("[22, 59, 97", "[22, 97, 59", ["bubble[0].pressures[2]", "59 after 97"]),
+        ("[22, 59, 97", "[22, 22, 97", ["bubble[0].pressures[1]", "increase"]),
+        ("[22, 59, 97", "[0, 59, 97", ["bubble[0].pressures[0]", "greater than 0"]),
+        ("[6, 40]", "[6, 301]", ["bubble[0].increments[1]", "last pressure"]),
+        ("-7.96788e-3,", "inf,", ["bubble[0].data.known_solution.beta[0]", "finite"]),
+        ("[fit]", "[bubble.data.points]\nfiles=[]\n[fit]", ["bubble[0].data", "exactly one"]),
+    ],
+)
+def test_bad_input_names_file_and_field(edit, tmp_path: Path, old, new, words):
+    message = complaint(edit, old, new)
+    assert message.startswith(str(tmp_path / "project.toml"))
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        ("indices = [0, ", "indices = [", ["data.points.indices", "20 pressures", "got 19"]),
+        ("indices =", "# indices =", ["data.points.indices", "missing"]),
+        ("{index:02d}", "{number}", ["data.points.pattern", "{index}"]),
+        ("{index:02d}", "02", ["data.points.pattern", "same file"]),
+        ("pattern =", 'files = ["a.csv"]\npattern =', ["data.points", "exactly one"]),
+        ('dz = "dz"', 'w = "dz"', ["data.points.columns.w", "allowed here: x, y, dx, dy, dz"]),
+    ],
+)
+def test_bad_point_files(edit, old, new, words):
+    message = complaint(edit, old, new, source=VALMEX / "test1-linear.toml", need_data=False)
+    for word in words:
+        assert word in message, message

@@ -1,0 +1,198 @@
+"""[[cylinder]] of a project: what it gives, what it says of mistakes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.experiments.cylinder import CylinderTest
+from bubblefit.fits.project import Project, read_project
+from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bending import DEFLECTION, FRAMES
+
+from ...complaints import complaint
+from ...cylinder_cases import write_project, write_readings
+from ...places import EXAMPLES
+
+EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
+# Thesis Tables 3.2 and 5.4, GPa.
+TABLES = {
+    "uniaxial": [-7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2, -1.13743e1, 1.07160e1,
+                 -6.17621e-1, 1.41287e-1, -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1],
+    "bubble 1": [-1.28170e-3, 9.49079e-1, -4.48869e-2, 8.04287e-2, 9.70652e1, 1.23017e1,
+                 -2.75939e0, 1.18880e-1, -1.59163e2, 3.81894e2, -4.04413e1, 1.17116e0],
+    "bubble 2": [-4.42858e-3, 9.87096e-1, -2.05457e-1, 9.33764e-2, 6.73425e1, 1.46374e1,
+                 -3.42911e0, 1.46766e-1, -3.81685e2, 1.32145e2, -1.26632e1, 7.42916e-1],
+    "bubble 3": [-1.09230e-3, 8.24376e-1, -1.73231e-1, 1.22820e-1, 9.99878e1, -2.19352e0,
+                 -2.44582e0, 1.89481e-1, -3.65789e2, 3.07545e2, -3.34450e1, 9.89845e-1],
+    "bubble 4": [-2.97973e-3, 3.67627e-1, -1.01234e-1, 8.26297e-2, 8.17789e1, 1.56849e1,
+                 -4.03842e0, 1.81033e-1, -2.89436e2, 9.75725e1, -9.87010e0, 5.63206e-1],
+}  # fmt: skip
+TABLE_6_1 = {150.0: (90, 110, 140), 200.0: (60, 80, 100), 250.0: (50, 65, 85)}
+
+
+def cylinders(project: Project) -> list[CylinderTest]:
+    return list(project.tests.values())
+
+
+def test_the_example_is_table_6_1_with_tables_3_2_and_5_4() -> None:
+    project = read_project(EXAMPLE)
+    wanted = [(d, p) for d, pressures in TABLE_6_1.items() for p in pressures]
+    tests = cylinders(project)
+    assert [(t.diameter, round(1e3 * t.pressure, 9)) for t in tests] == wanted
+    assert list(project.tests) == [f"{d:g} mm, {p} kPa" for d, p in wanted]
+    assert list(project.cards) == list(TABLES)
+    for name, beta in TABLES.items():
+        card = project.cards[name]
+        np.testing.assert_allclose(card.card.law.beta, 1e3 * np.array(beta), rtol=1e-12)
+        assert card.card.thickness == 0.81 and card.card.law.nu12 == 0.24
+        assert card.test == name.split()[0]
+    for test in tests:
+        collar = (295.0, 147.0) if test.diameter == 250 else (240.0, 145.0)
+        assert (test.collar.inner_diameter, test.collar.length) == collar
+        assert (test.length, test.supports.span) == (3000.0, 2000.0)
+        assert len(test.deflections) == FRAMES and test.deflections[-1] == DEFLECTION
+        assert list(test.reading.places.values()) == [40.0, 100.0, 240.0]
+        assert test.reading.slope_over == 20.0
+        assert test.measured == ()
+    assert tests[2].name == "150 mm, 140 kPa"
+    # Moduli stay above zero as far as each card says that it is valid.
+    for card in project.cards.values():
+        law = card.card.law
+        for modulus, column in (("E1", 0), ("E2", 1), ("G12", 2)):
+            assert law.modulus(modulus, np.linspace(0, law.strain_range[column], 500)).min() > 0
+
+
+def test_a_cylinder_says_its_own(tmp_path: Path) -> None:
+    write_readings(tmp_path / "a.csv")
+    first = """length = 2500
+span = 1800
+collar = { inner_diameter = 200, length = 100, fillet = 5 }
+deflections = [5, 10]
+gas = { ambient = 95 }
+measured.files = ["a.csv"]"""
+    one, other = cylinders(read_project(write_project(tmp_path, first)))
+    assert (one.length, one.supports.span, one.deflections) == (2500.0, 1800.0, (5.0, 10.0))
+    assert (one.collar.inner_diameter, one.collar.length, one.collar.fillet) == (200, 100, 5)
+    assert one.gas.ambient == pytest.approx(0.095) and other.gas.ambient == 0.101
+    assert [c.repetition for c in one.measured] == ["a 1", "a 2"]
+    assert (other.length, len(other.deflections), other.name) == (3000.0, 24, "high")
+    assert one.model(0.5).thickness.min() == 0.5
+
+
+def test_where_a_curve_is_read_follows_the_diameter(tmp_path: Path) -> None:
+    path = write_project(tmp_path)
+    usual = path.read_text().replace("places = [40, 100, 240]\nslope_over = 20\n", "")
+    path.write_text(usual.replace("diameter = 150", "diameter = 200", 1))
+    wide, narrow = cylinders(read_project(path))
+    names = ["0.25 diameters", "0.5 diameters", "1 diameters"]
+    assert wide.reading.places == dict(zip(names, (50.0, 100.0, 200.0), strict=True))
+    assert narrow.reading.places == dict(zip(names, (37.5, 75.0, 150.0), strict=True))
+    assert (wide.reading.slope_over, narrow.reading.slope_over) == (20.0, 15.0)
+    assert wide.model().reading == wide.reading
+
+
+def test_metres_and_bars_are_the_same_cylinder(tmp_path: Path) -> None:
+    path = write_project(tmp_path)
+    usual = read_project(path)
+    text = path.read_text().replace('modulus = "MPa"', 'modulus="MPa"\nlength="m"\npressure="bar"')
+    for old, new in (("thickness = 0.81", "thickness = 0.81e-3"), ("size = 40.0", "size = 0.04"),
+                     ("diameter = 150", "diameter = 0.15"), ("= 90\n", "= 0.9\n"),
+                     ("= 140\n", "= 1.4\n"), ("[40, 100, 240]", "[0.04, 0.1, 0.24]"),
+                     ("slope_over = 20", "slope_over = 0.02")):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    metres = read_project(path)
+    for one, other in zip(cylinders(usual), cylinders(metres), strict=True):
+        assert other.name == one.name
+        for key in ("diameter", "pressure", "length", "size", "seam_width"):
+            assert getattr(other, key) == pytest.approx(getattr(one, key)), key
+        assert other.deflections == pytest.approx(one.deflections)
+        assert other.reading.places == pytest.approx(one.reading.places)
+        assert other.reading.slope_over == pytest.approx(one.reading.slope_over)
+    assert metres.cards["soft"].card.thickness == pytest.approx(0.81)
+
+
+def test_cards_from_files(tmp_path: Path) -> None:
+    law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
+    write_card(MaterialCard(law, 0.7, "mine", "a test"), tmp_path / "card.toml")
+    path = write_project(tmp_path)
+    text = path.read_text()
+    path.write_text(text + '[[card]]\nfile = "card.toml"\n[[card]]\nfile="card.toml"\nname="b"\n')
+    cards = read_project(path).cards
+    assert list(cards) == ["soft", "stiff", "mine", "b"]
+    assert cards["mine"].card.thickness == 0.7
+    np.testing.assert_allclose(cards["b"].card.law.beta, law.beta)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("diameter = 150", "diamter = 150", ["cylinder[0].diamter", "did you mean 'diameter'"]),
+        ("diameter = 150", "diameter = -1", ["cylinder[0].diameter", "greater than 0"]),
+        ("diameter = 150", "diameter = 280", ["cylinder[0].collar", "give inner_diameter"]),
+        ("pressure = 90\n", "", ["cylinder[0].pressure", "missing"]),
+        ("pressure = 90\n", "pressure = 90\nspan = 2960\n", ["cylinder[0].span", "fit"]),
+        ("pressure = 90\n", "pressure = 90\nseam_width = 300\n", ["cylinder[0].seam_width"]),
+        ('"150 mm, 90 kPa"', '"high"', ["cylinder[1].name", "twice"]),
+        (
+            "pressure = 90\n",
+            "pressure = 90\ncollar = { inner_diameter = 140, length = 100 }\n",
+            ["cylinder[0].collar.inner_diameter", "more than the cylinder's 150"],
+        ),
+        (
+            "pressure = 90\n",
+            "pressure = 90\ncollar = { inner = 140 }\n",
+            ["cylinder[0].collar.inner", "did you mean 'inner_diameter'"],
+        ),
+        (
+            "pressure = 90\n",
+            "pressure = 90\nmeasured.files = ['none.csv']\n",
+            ["cylinder[0].measured.files[0]", "none.csv", "--data"],
+        ),
+        ("frames = 24", "deflections = [3, 2]", ["cylinder[0].deflections", "increasing"]),
+        ("thickness = 0.81", "", ["fabric.thickness", "missing"]),
+        ("pressure = 90\n", "pressure = 90\nplaces = [-3]\n", ["cylinder[0].places[0]"]),
+        ('name = "soft"', "", ["card[0].name", "missing"]),
+        ('name = "soft"', 'name = "stiff"', ["card[1].name", "twice"]),
+        ("beta = [0, ", "beta = [", ["card[0].beta", "12"]),
+        ('name = "soft"', 'name = "soft"\nnu12 = 1.5', ["card[0].nu12"]),
+        ('name = "soft"', 'name = "soft"\nfile = "a.toml"', ["card[0]", "exactly one"]),
+        ("[fabric]", "[project]\nkind = 'bend'\n[fabric]", ["project.kind", "version 0.1"]),
+        ("[fit]", "[fits]", ["fits", "did you mean 'fit'"]),
+        ('modulus = "MPa"', 'modulus = "psi"', ["units.modulus"]),
+        ('unit = "kg"', 'units = "kg"', ["cylinder[0].measured.load.units", "did you mean 'unit'"]),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+    path = write_project(tmp_path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    message = complaint(read_project, path)
+    assert message.startswith(str(path))
+    for word in words:
+        assert word in message, message
+
+
+def test_nothing_of_it_is_fitted(tmp_path: Path) -> None:
+    project = read_project(write_project(tmp_path))
+    with pytest.raises(InputError, match="no test to be fitted"):
+        project.chosen(None, fitted=True)
+
+
+def test_what_the_example_leaves_out_is_the_default(tmp_path: Path) -> None:
+    """Without [defaults.cylinder], but for where curves are read, the cylinders are the same."""
+    text = EXAMPLE.read_text()
+    bare = re.sub(r"\[defaults.cylinder\].*?\n\n", "\n\n", text, flags=re.S)
+    (tmp_path / "project.toml").write_text(bare)
+    usual, plain = read_project(EXAMPLE), read_project(tmp_path / "project.toml")
+    own = {"name", "place", "reading"}
+    for one, other in zip(cylinders(usual), cylinders(plain), strict=True):
+        said, left = ({k: v for k, v in vars(t).items() if k not in own} for t in (one, other))
+        assert said == left

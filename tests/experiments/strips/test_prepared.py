@@ -1,0 +1,294 @@
+"""Strips in a fit: comparisons, weights, folds; what a finished fit says, shows and writes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.data.polynomial_order import compare_orders
+from bubblefit.experiments.base import FittedTest, Output, Weighting
+from bubblefit.experiments.strips import figures
+from bubblefit.experiments.strips.prepared import PreparedStrips
+from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from threadpoolctl import threadpool_limits
+
+from ...complaints import complaint
+from .sections import CURVES, PUBLISHED, SMALL, changed, read, write_exports
+
+LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
+COARSE = ("increments = 100", "increments = 5")
+POINTS = ("[warp]", 'match = "points"\nincrements = 5\n[warp]')
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread() -> Iterator[None]:
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture
+def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
+    """The published polynomials, five increments."""
+    (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
+
+    def prepared(*changes: tuple[str, str]) -> PreparedStrips:
+        test = read(changed(PUBLISHED, (COARSE, *changes), tmp_path))
+        return test.prepare(LAW, MembraneSolver)
+
+    return prepared
+
+
+@pytest.fixture
+def exported(tmp_path: Path) -> Callable[..., PreparedStrips]:
+    """Measured points of one or two specimens a direction, five increments."""
+    write_exports(tmp_path)
+
+    def prepared(*changes: tuple[str, str]) -> PreparedStrips:
+        test = read(changed(SMALL, (POINTS, *changes), tmp_path))
+        return test.prepare(LAW, MembraneSolver)
+
+    return prepared
+
+
+def fitted(prepared: PreparedStrips, law: HypoelasticLaw = LAW) -> FittedTest:
+    """As if the law had been found."""
+    comparisons = prepared.comparisons(MembraneSolver, Weighting())
+    histories = tuple(c.solver.run(c.model, law) for c in comparisons)
+    valid = np.array([0.1, 0.5, 0.3])
+    return FittedTest(comparisons, histories, {}, law, (law,), 1.5 * valid, valid, None)
+
+
+def runs(prepared: PreparedStrips, weighting: Weighting) -> dict[str, float]:
+    """Norm of each comparison's residual with the law."""
+    return {
+        c.name: float(np.linalg.norm(c.objective.residual(c.solver.run(c.model, LAW), {})))
+        for c in prepared.comparisons(MembraneSolver, weighting)
+    }
+
+
+# What is compared
+
+
+def test_a_comparison_a_direction(published):
+    compared = published().comparisons(MembraneSolver, Weighting())
+    assert [c.name for c in compared] == ["strips: warp", "strips: fill", "strips: bias"]
+    # Strips along the yarns lead into a fit; all are free to contract.
+    assert [c.stage for c in compared] == [0, 0, 1] and all(c.contracts for c in compared)
+    assert all(c.nuisance == () for c in compared)
+    assert len({id(c.solver) for c in compared}) == 3
+    assert [len(c.objective.load) for c in compared] == [5, 5, 5]
+    assert [c.objective.least_noise for c in compared] == [21.7, 64.1, 40.3]
+    warp = published().test.strips["warp"]
+    np.testing.assert_allclose(
+        compared[0].objective.load, warp.polynomial(compared[0].model.elongations)
+    )
+
+
+def test_a_direction_without_weight_is_not_run(published):
+    prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
+    assert prepared.test.matched == ("warp", "bias")
+    assert list(runs(prepared, Weighting())) == ["strips: warp", "strips: bias"]
+
+
+def test_alone_the_errors_are_in_newtons_or_relative(published):
+    plain, relative = published(), published(('objective = "N"', 'objective = "relative"'))
+    assert "N" in plain.objective_is and "largest load" in relative.objective_is
+    largest = {
+        c.name: c.objective.load.max() for c in plain.comparisons(MembraneSolver, Weighting())
+    }
+    newtons, shares = runs(plain, Weighting()), runs(relative, Weighting())
+    for name, rms in newtons.items():
+        assert rms > 1
+        assert shares[name] == pytest.approx(rms / largest[name])
+
+
+def test_among_other_tests_the_strips_share_one_weight(published):
+    """The blocks add up to the weight times the weighted mean of the relative errors."""
+    prepared = published(("[data]", "[weights]\nwarp = 3\nbias = 0.5\n[data]"))
+    alone = published(('objective = "N"', 'objective = "relative"'))
+    own = runs(alone, Weighting())
+    wanted = 2.0 * np.dot([3, 1, 0.5], list(own.values())) / 4.5
+    assert sum(runs(prepared, Weighting(True, 2.0)).values()) == pytest.approx(wanted)
+
+
+def test_specimens_of_points_can_be_left_out(published, exported):
+    assert published().specimens == {}
+    prepared = exported()
+    whose = prepared.specimens
+    assert {name: len(set(w)) for name, w in whose.items()} == {
+        "strips: warp": 2, "strips: fill": 1, "strips: bias": 2,
+    }  # fmt: skip
+    masks = {"strips: warp": np.array(whose["strips: warp"]) == 1}
+    warp, fill, _ = prepared.comparisons(MembraneSolver, Weighting(), masks)
+    np.testing.assert_allclose(warp.objective.elongation, 0.9 * np.linspace(0, 4, 21), atol=1e-6)
+    assert len(fill.objective.load) == 21
+    assert prepared.reach(masks).break_shares[1] == prepared.test.reach.break_shares[1]
+
+
+def test_loads_that_are_zero_have_no_relative_error(exported, tmp_path):
+    text = (tmp_path / "f.TXT").read_bytes().decode("latin-1")
+    head, *lines = text.split('"s"\t"N"\t"mm"\n')
+    rows = [line.split("\t") for line in lines[0].splitlines()]
+    # Loads only beyond the end of the model.
+    new = [f"{a}\t{b if i > 15 else '0,0'}\t{c}" for i, (a, b, c) in enumerate(rows)]
+    (tmp_path / "f.TXT").write_bytes((head + '"s"\t"N"\t"mm"\n' + "\n".join(new)).encode("latin-1"))
+    prepared = exported(("gauge_length = 22.0", "gauge_length = 22.0\nfinal_length = 24.0"))
+    message = complaint(prepared.comparisons, MembraneSolver, Weighting(True))
+    assert "strips[0].fill: the measured load is zero" in message
+
+
+# Models
+
+
+def test_refined_models(published):
+    test = published().test
+    own, finer, more = test.models(), test.models(factor=2.0), test.models(0.5, "increments", 2.0)
+    assert list(own) == ["warp", "fill", "bias"]
+    assert [len(m.mesh.quads) for m in own.values()] == [40, 40, 300]
+    assert [len(m.mesh.quads) for m in finer.values()] == [160, 160, 1200]
+    assert [len(m.elongations) for m in more.values()] == [10, 10, 10]
+    assert [m.thickness for m in own.values()] == [0.81] * 3
+    assert [m.thickness for m in more.values()] == [0.5] * 3
+    assert len(test.models(what="increments", factor=0.01)["warp"].elongations) == 1
+
+
+def settings(test: StripsTest) -> str:
+    return repr(dict(test.settings()))
+
+
+def test_settings_are_what_a_result_depends_on(published, tmp_path):
+    own = settings(published().test)
+    assert str(tmp_path) not in own and "curves" not in own
+    for change in (
+        ("width = 25.0", "width = 24.0"),
+        ("[data]", "[weights]\nfill = 2\n[data]"),
+        ("[data]", "[warp]\ngauge_length = 21.0\n[fill]\n[bias]\n[data]"),
+        ("[data]", "[bias]\nfinal_length = 30.0\n[warp]\n[fill]\n[data]"),
+        ('objective = "N"', 'objective = "relative"'),
+        ("bias_angle = 45.0", "bias_angle = 44.0"),
+    ):
+        assert settings(published(change).test) != own, change
+
+
+# What a fit says and shows
+
+
+def test_findings(published):
+    prepared = published()
+    fit = fitted(prepared)
+    found = prepared.findings(fit)
+    directions = found.numbers["directions"]
+    assert list(directions) == ["warp", "fill", "bias"]
+    for (name, numbers), c, h in zip(
+        directions.items(), fit.comparisons, fit.histories, strict=True
+    ):
+        off = h.load - c.objective.load
+        assert numbers["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2))), name
+        assert numbers["end_load_N"] == h.load[-1] and numbers["matched"] == 5
+        assert f"{numbers['rms_N']:.3g}" in found.lines[0]
+        assert f"{numbers['rms_N']:.4g}" in found.quality
+    total = sum(n["rms_N"] for n in directions.values())
+    assert found.numbers["e_uniaxial_N"] == pytest.approx(total)
+    assert found.numbers["matched_by"] == "polynomial"
+    assert "specimens scatter by 21.7" in found.lines[0]
+    assert found.warnings == ()
+
+
+def test_what_the_data_leave_open_is_said(published, exported):
+    prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
+    assert prepared.findings(fitted(prepared)).warnings == (
+        "no fill strip of strips is matched: E2 rests on the other directions",
+    )
+    cut = exported(("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"))
+    (words,) = cut.findings(fitted(cut)).warnings
+    beyond = cut.test.strips["warp"].beyond
+    assert words == f"warp: {beyond} points beyond the final length (or before zero) were left out"
+
+
+def test_residuals_are_every_matched_load(exported):
+    prepared = exported()
+    fit = fitted(prepared)
+    table = prepared.residuals(fit)
+    assert list(table.columns) == [
+        "part", "elongation_mm", "quantity", "measured", "modelled", "difference",
+    ]  # fmt: skip
+    assert len(table) == sum(len(c.objective.load) for c in fit.comparisons)
+    for direction, numbers in prepared.findings(fit).numbers["directions"].items():
+        own = table[table["part"] == direction]
+        np.testing.assert_allclose(own["modelled"] - own["measured"], own["difference"])
+        assert np.sqrt((own["difference"] ** 2).mean()) == pytest.approx(numbers["rms_N"])
+
+
+@pytest.mark.parametrize("prefix", ["", "two-"])
+def test_what_is_shown_is_written(exported, tmp_path, prefix):
+    prepared = exported()
+    fit = fitted(prepared)
+    shown = prepared.show(fit, prepared.findings(fit), Output(tmp_path / "out", prefix))
+    names = [name for name, _ in (*shown.figures, *shown.files)]
+    there = {p.name for p in (tmp_path / "out").iterdir()}
+    assert set(names) == there and all(name.startswith(prefix) for name in names)
+    assert {f"{prefix}{n}" for n in ("loads.png", "bias.png", "failure.png")} <= there
+    assert f"{prefix}orders.png" in there and f"{prefix}bias.vtu" in there
+    loads = pd.read_csv(tmp_path / "out" / f"{prefix}loads.csv")
+    for strip in prepared.fitted_strips(fit):
+        own = loads[loads["direction"] == strip.direction]
+        np.testing.assert_allclose(own["model_N"], strip.history.load)
+        np.testing.assert_allclose(
+            own["polynomial_N"], strip.strip.polynomial(own["elongation_mm"])
+        )
+        strain = own["elongation_mm"] / strip.strip.gauge_length
+        np.testing.assert_allclose(own["engineering_strain"], strain)
+    (table,) = shown.tables
+    assert [row[0] for row in table.rows] == ["warp", "fill", "bias"]
+
+
+def test_no_modulus_is_shown_beyond_where_it_is_fitted(published):
+    """Gauges that went further than the card is valid for are drawn to the card's end."""
+    prepared = published()
+    fit = fitted(prepared)
+    strips = prepared.fitted_strips(fit)
+    gauges = [s.strip.strain for s in strips]
+    assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
+    ends = figures.failure_strains(strips, fit.valid)
+    assert (ends <= fit.valid).all()
+    assert ends[:2] == pytest.approx([fit.valid[0], gauges[1]])
+    # As far as the card goes otherwise: nothing but the gauge ends it.
+    far = figures.failure_strains(strips, np.array([9.0, 9.0, 9.0]))
+    assert far[:2] == pytest.approx(gauges[:2]) and 0.5 < far[2] < 1.2
+    warp_only = figures.failure_strains(strips[:1], fit.valid)
+    assert warp_only[1:] == pytest.approx(fit.valid[1:])
+
+
+@pytest.mark.parametrize("through_origin", [True, False])
+def test_orders_are_those_of_polynomials_as_they_are_fitted(
+    exported, tmp_path, monkeypatch, through_origin
+):
+    told = []
+    monkeypatch.setattr(figures, "plot_orders", lambda path, panels: told.extend(panels))
+    write = functools.partial(write_offset, tmp_path)
+    write()
+    prepared = exported(("[data]", f"[data]\nthrough_origin = {str(through_origin).lower()}"))
+    strip = prepared.test.strips["warp"]
+    assert figures.draw_orders([strip], tmp_path / "orders.png")
+    expected = compare_orders(
+        *strip.points, range(1, 9), through_origin=through_origin,
+        specimens=strip.specimen_of.tolist(),
+    )  # fmt: skip
+    assert told[0].rmse == [s.rmse for s in expected.scores]
+    assert told[0].left_out == [s.left_out for s in expected.scores]
+    # A load at rest of 50 N: only a polynomial with a constant can follow it.
+    assert (min(told[0].rmse) < 1.0) == (not through_origin)
+
+
+def write_offset(folder: Path) -> None:
+    """Two warp specimens that are pretensioned by 50 N."""
+    u = np.linspace(0, 4, 21)
+    for number, name in enumerate(("w1.csv", "w2.csv")):
+        lines = [f"{a},{50 + 200 * a + 0.01 * number}" for a in u]
+        (folder / name).write_text("Extension (mm),Load (N)\n" + "\n".join(lines) + "\n")

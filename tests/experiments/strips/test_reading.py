@@ -1,0 +1,228 @@
+"""[[strips]] of a project: units, defaults, data by direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.experiments.strips.test import StripsTest
+
+from ...complaints import complaint
+from .sections import CURVES, ENDS, LENGTHS, PUBLISHED, SMALL, changed, read, rows, write_exports
+
+Edit = Callable[..., StripsTest]
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Edit:
+    """Read the small section beside its exports after replacing some texts."""
+    write_exports(tmp_path)
+
+    def edited(*changes: tuple[str, str], **options) -> StripsTest:
+        return read(changed(SMALL, changes, tmp_path), **options)
+
+    return edited
+
+
+@pytest.fixture
+def example(tmp_path: Path) -> Edit:
+    """Read the published polynomials after replacing some texts."""
+    (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
+
+    def edited(*changes: tuple[str, str], **options) -> StripsTest:
+        return read(changed(PUBLISHED, changes, tmp_path), **options)
+
+    return edited
+
+
+def test_the_published_polynomials_in_mm(example):
+    p = example()
+    assert (p.thickness, p.width, p.grip_distance, p.bias_angle) == (0.81, 25.0, 75.0, 45.0)
+    assert (p.increments, p.match_by, p.objective) == (100, "polynomial", "N")
+    assert p.weights == {"warp": 1.0, "fill": 1.0, "bias": 1.0} and p.weight == 1.0
+    assert (p.kind, p.name) == ("strips", "strips")
+    assert {d: (s.gauge_length, s.final_length) for d, s in p.strips.items()} == LENGTHS
+    warp = p.strips["warp"]
+    assert warp.polynomial is not None
+    assert warp.polynomial.coefficients == pytest.approx([0, 812.44, -516.29, 183.02, -18.557])
+    assert [s.scatter for s in p.strips.values()] == [21.7, 64.1, 40.3]
+    assert warp.curves == () and len(warp.points[0]) == len(warp.specimen_of) == 0
+    # Log strains at the ends; shear of a 45-degree strip that keeps its area: 2 ln(l_f/l_i).
+    assert p.reach.strain == pytest.approx((ENDS["warp"], ENDS["fill"], 2 * ENDS["bias"]))
+    assert p.reach.strain == pytest.approx((0.153, 0.232, 0.883), abs=5e-4)
+
+
+def test_units_of_the_file_do_not_matter(example):
+    metres = example(
+        ("width = 25.0", "width = 25.0e-3"),
+        ("grip_distance = 75.0", "grip_distance = 75.0e-3"),
+        ("[data]", "[warp]\nfinal_length = 23.0e-3\n[data]"),
+        length="m",
+    )
+    assert metres.width == pytest.approx(25)
+    assert metres.grip_distance == pytest.approx(75)
+    # A table picks its direction among those of the file, and replaces its lengths.
+    assert list(metres.strips) == ["warp"]
+    assert metres.strips["warp"].final_length == pytest.approx(23.0)
+    assert metres.strips["warp"].gauge_length == 20.022
+
+
+def test_what_the_gauges_say_of_the_law(example):
+    turned = example(("bias_angle = 45.0", "bias_angle = 30.0"))
+    shear = 2 * np.sin(np.radians(60)) * ENDS["bias"]
+    assert turned.reach.strain == pytest.approx((ENDS["warp"], ENDS["fill"], shear))
+    # Two directions say nothing about the third strain.
+    two = example(("[data]", "[warp]\n[fill]\n[data]"))
+    assert two.reach.strain == (pytest.approx(ENDS["warp"]), pytest.approx(ENDS["fill"]), None)
+    assert two.reach.break_shares[2] is None
+    # Where three lines follow the load curves best; the warp curve is stiff, soft, stiff.
+    shares = np.array(example().reach.break_shares)
+    assert (shares[:, 0] > 0).all() and (shares[:, 1] < 1).all()
+    assert (shares[:, 0] < shares[:, 1]).all()
+    assert ENDS["warp"] * shares[0] == pytest.approx([0.022, 0.11], abs=0.006)
+
+
+# Measured curves
+
+
+def test_machine_exports_by_direction(small):
+    p = small()
+    assert list(p.strips) == ["warp", "fill", "bias"]
+    names = {d: [c.specimen for c in s.curves] for d, s in p.strips.items()}
+    # b.csv lists two specimens, one after the other.
+    assert names == {"warp": ["w1", "w2"], "fill": ["f"], "bias": ["b 1", "b 2"]}
+    for (direction, strip), slope, gauge in zip(
+        p.strips.items(), (200, 80, 50), (20, 22, 19), strict=True
+    ):
+        u, load = strip.points
+        np.testing.assert_allclose(load, slope * u, atol=1e-3, err_msg=direction)
+        assert (np.diff(u) >= 0).all()
+        assert strip.final_length == pytest.approx(gauge + 4)
+        assert strip.polynomial is not None
+        assert strip.polynomial.coefficients[:2] == pytest.approx([0, slope], abs=1e-2)
+        assert strip.scatter == pytest.approx(0.0, abs=1e-3)
+    whose = p.strips["warp"].specimen_of
+    u = p.strips["warp"].points[0]
+    np.testing.assert_allclose(u[whose == 1], 0.9 * np.linspace(0, 4, 21), atol=1e-6)
+
+
+def test_what_a_small_section_leaves_out(small):
+    p = small()
+    assert (p.width, p.grip_distance, p.bias_angle, p.increments) == (25.0, 75.0, 45.0, 100)
+    assert (p.match_by, p.objective) == ("polynomial", "N")
+    assert p.strips["warp"].polynomial is not None and p.strips["warp"].polynomial.order == 4
+    assert p.strips["warp"].through_origin
+    lower = small(("[data]", "[data]\norder = 2\nthrough_origin = false"))
+    assert lower.strips["warp"].polynomial is not None
+    assert lower.strips["warp"].polynomial.order == 2 and not lower.strips["warp"].through_origin
+
+
+def test_points_end_where_the_model_ends(small):
+    p = small(
+        ("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"),
+        ("[warp]", 'match = "points"\n[warp]'),
+    )
+    u, load = p.strips["warp"].points
+    assert p.match_by == "points" and u.max() <= 2.5 < u.max() + 0.2
+    assert len(u) == len(load) == len(p.strips["warp"].specimen_of)
+    assert p.strips["warp"].beyond == 42 - len(u) > 0
+    assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].beyond == 0
+
+
+def test_breaks_follow_the_specimens_kept(small, tmp_path):
+    """A second specimen of another shape moves the breaks; without it they are the first's."""
+    u = np.linspace(0, 4, 41)
+    head = "Extension (mm),Load (N)\n"
+    early = 200 * np.minimum(u, 0.8) + 20 * u
+    late = 200 * np.minimum(u, 3.0) + 20 * u
+    (tmp_path / "w1.csv").write_text(head + rows(",", u, early))
+    (tmp_path / "w2.csv").write_text(head + rows(",", u, late))
+    strip = small().strips["warp"]
+    first = strip.specimen_of == 0
+    (tmp_path / "w2.csv").write_text(head + rows(",", u, early))
+    alone = small().strips["warp"]
+    assert strip.break_shares(first) == pytest.approx(alone.break_shares())
+    assert strip.break_shares(first) != pytest.approx(strip.break_shares())
+
+
+def test_one_file_of_all_directions(small, tmp_path):
+    u = np.linspace(0, 4, 9)
+    lines = [f"{d},{s},{v},{k * v}" for d, k in (("Warp", 200), ("weft", 80), ("45", 50))
+             for s in "AB" for v in u]  # fmt: skip
+    text = "Direction,Specimen,Extension (mm),Load (N)\n" + "\n".join(lines) + "\n"
+    (tmp_path / "all.csv").write_text(text)
+    old = 'files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }'
+    p = small((old, 'files = ["all.csv"]'))
+    for strip in p.strips.values():
+        assert [c.specimen for c in strip.curves] == ["A", "B"]
+    # By direction the same file gives the rows of that direction.
+    both = small((old, 'files = { warp = ["all.csv"], fill = ["all.csv"], bias = ["b.csv"] }'))
+    for direction in ("warp", "fill"):
+        np.testing.assert_array_equal(
+            both.strips[direction].points, p.strips[direction].points, direction
+        )
+    # A table picks among what the file holds.
+    p = small((old, 'files = ["all.csv"]'), ("[bias]\ngauge_length = 19.0\n", ""))
+    assert list(p.strips) == ["warp", "fill"]
+
+
+def test_columns_and_units_of_exports(small, tmp_path):
+    u = np.linspace(0, 0.4, 9)
+    (tmp_path / "f.TXT").write_text("A;B;C\n" + rows(";", u, 0.8 * u, u, comma=True) + "\n")
+    for name in ("w1", "w2", "b"):
+        (tmp_path / f"{name}.csv").write_bytes((tmp_path / "f.TXT").read_bytes())
+    wanted = 'columns = { elongation = "A", load = "B" }\n'
+    old = "files ="
+    message = complaint(small, (old, wanted + old))
+    assert "w1.csv: line 1, column 'A': the file does not name the unit; say length_unit" in message
+    units = 'length_unit = "cm"\nload_unit = "kN"\ndecimal = ","\n'
+    p = small((old, wanted + units + old))
+    curve = p.strips["warp"].curves[0]
+    np.testing.assert_allclose(curve.elongation, 10 * u)
+    np.testing.assert_allclose(curve.load, 800 * u)
+
+
+def test_data_folder(small, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    for name in ("w1.csv", "w2.csv", "f.TXT", "b.csv"):
+        (tmp_path / name).rename(other / name)
+    message = complaint(small)
+    assert message == (
+        f"{tmp_path / 'project.toml'}: strips[0].data.files.warp[0]: there is no file"
+        f" {tmp_path / 'w1.csv'}; --data DIR names another folder"
+    )
+    assert small(data_folder=other).strips.keys() == LENGTHS.keys()
+    assert small(("[data]", '[data]\nfolder = "other"')).strips.keys()
+
+
+def test_a_forward_analysis_does_without_data(example, small, tmp_path):
+    write_exports(tmp_path)
+    for name in ("w1.csv", "curves.csv"):
+        (tmp_path / name).unlink()
+    # Without lengths there is no model: the data are needed for them.
+    assert "there is no file" in complaint(small, need_data=False)
+    assert "there is no file" in complaint(example, need_data=False)
+    ends = [(f"gauge_length = {a}.0", f"gauge_length = {a}.0\nfinal_length = {a + 4}.0")
+            for a in (20, 22, 19)]  # fmt: skip
+    p = small(*ends, need_data=False)
+    assert [s.final_length for s in p.strips.values()] == [24, 26, 23]
+    assert all(s.polynomial is None and s.scatter is None for s in p.strips.values())
+    assert p.reach.strain[0] == pytest.approx(np.log(24 / 20))
+    assert p.reach.break_shares == (None, None, None)
+    assert "there is no file" in complaint(small, *ends)
+
+
+def test_real_points(shared_data, tmp_path):
+    lengths = "".join(
+        f"[{d}]\ngauge_length = {a}\nfinal_length = {b}\n" for d, (a, b) in LENGTHS.items()
+    )
+    text = f'match = "points"\n{lengths}[data]\nfiles = ["valmex7318_load_gauge.csv"]\n'
+    p = read(changed(text, (), tmp_path), data_folder=shared_data / "uniaxial")
+    assert p.match_by == "points"
+    assert [len(s.curves) for s in p.strips.values()] == [5, 5, 5]
+    scatter = [s.scatter for s in p.strips.values()]
+    assert scatter == pytest.approx([21.7, 64.1, 40.3], abs=0.05)
+    assert p.reach.strain == pytest.approx((ENDS["warp"], ENDS["fill"], 2 * ENDS["bias"]))

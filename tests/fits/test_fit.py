@@ -1,0 +1,166 @@
+"""A fit from Python: the same result as the command, tables, interruption, several tests."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import bubblefit as bf
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.fits import best
+from bubblefit.fits.start import StartRecord
+
+from ..commands import in_process, result_in
+from ..projects import small, with_form
+
+SECOND = """
+[[bubble]]
+name = "softer reading"
+radius = 80.0
+pressures = [40, 120]
+elements = 48
+symmetry = "quarter"
+nuisance = { displacement_offset = true }
+[bubble.data.known_solution]
+beta = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1,  1.37830e1,  -9.31830e-1, 1.39437e-1,
+    -4.79622e2,  2.12650e2,  -2.02028e1,  8.06350e-1,
+]
+
+[fit]"""
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory) -> bf.Fit:
+    project = bf.read_project(small(tmp_path_factory.mktemp("fit")))
+    return bf.fit(project, tests="bubble", starts=2, jobs=1)
+
+
+def test_the_same_as_the_command(fitted: bf.Fit, tmp_path: Path):
+    in_process("bubble", fitted.project.path, "--starts", 2, "--out", "out", cwd=tmp_path)
+    theirs = result_in(tmp_path / "out")
+    for key in ("objective", "beta", "strain_reached", "starts", "moduli_error", "warnings"):
+        assert json.loads(json.dumps(fitted.result[key])) == theirs[key], key
+
+
+def test_every_place_says_the_same_objective(fitted: bf.Fit, tmp_path: Path):
+    page = fitted.report(tmp_path).read_text()
+    said = result_in(tmp_path)
+    assert said["objective"] == fitted.objective == fitted.best.point.value
+    first = min(said["starts"], key=lambda s: s["objective"])
+    assert first["objective"] == fitted.objective
+    assert f"objective {fitted.objective:.4g}" in fitted.card.source
+    assert f"{fitted.objective:.3g}" in page
+    assert fitted.starts()["objective"].min() == fitted.objective
+
+
+def test_tables(fitted: bf.Fit, tmp_path: Path):
+    moduli = fitted.moduli()
+    assert list(moduli.columns) == ["modulus", "strain", "MPa", "sigma_relative"]
+    e1 = moduli[moduli["modulus"] == "E1"]
+    assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
+    assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
+    residuals = fitted.residuals()
+    assert set(residuals["quantity"]) == {"dx", "dy", "dz"}
+    off = residuals["modelled_mm"] - residuals["measured_mm"]
+    assert residuals["difference_mm"].to_numpy() == pytest.approx(off.to_numpy())
+    assert residuals["difference_mm"].abs().max() < 1e-4
+    fitted.report(tmp_path)
+    assert len(pd.read_csv(tmp_path / "residuals.csv")) == len(residuals)
+    assert len(pd.read_csv(tmp_path / "moduli.csv")) == len(moduli)
+    card = bf.read_card(tmp_path / "material.toml")
+    assert card.law.beta == pytest.approx(fitted.law.beta)
+    assert card.law.strain_range == pytest.approx(fitted.best.valid)
+    assert result_in(tmp_path)["valid_strain"]["warp"] == pytest.approx(card.law.strain_range[0])
+
+
+def test_progress_is_told_of_everything(fitted: bf.Fit):
+    heard: list[object] = []
+    again = bf.fit(fitted.project, starts=1, jobs=1, progress=heard.append)
+    starts = [r for r in heard if isinstance(r, StartRecord)]
+    assert len(starts) == 1
+    analyses = sum(r is not None and not isinstance(r, StartRecord) for r in heard)
+    assert analyses == starts[0].analyses == again.result["analyses"]
+
+
+def test_interrupted_and_gone_on_with(fitted: bf.Fit, tmp_path: Path):
+    def interrupt(record: object) -> None:
+        if isinstance(record, StartRecord):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bf.fit(fitted.project, jobs=1, out=tmp_path / "out", progress=interrupt)
+    with pytest.raises(OutputError, match="--resume"):
+        bf.fit(fitted.project, jobs=1, out=tmp_path / "out")
+    heard: list[object] = []
+    gone_on = bf.fit(
+        fitted.project, jobs=1, out=tmp_path / "out", resume=True, progress=heard.append
+    )
+    assert gone_on.objective == fitted.objective
+    assert [r.number for r in heard if isinstance(r, StartRecord)] == [0, 1]
+    with pytest.raises(InputError, match=r"another fit settings"):
+        bf.fit(fitted.project, seed=9, out=tmp_path / "out", resume=True)
+    with pytest.raises(InputError, match="nothing to go on with"):
+        bf.fit(fitted.project, out=tmp_path / "nowhere", resume=True)
+
+
+def test_a_best_fit_that_gives_another_objective_is_a_failure(fitted: bf.Fit):
+    records = list(fitted.best.records)
+    first = fitted.best.ranked[0]
+    wrong = best.replace(first, objective=first.objective + 1e-3)
+    others = [wrong if r.number == first.number else r for r in records]
+    only = [r for r in others if r.number == first.number]
+    with pytest.raises(SolverFailure, match="from the unloaded state"):
+        best.best_fit(fitted.problem, only, fitted.project.fit.tolerance)
+
+
+def test_two_bubbles_with_offsets_of_their_own(tmp_path: Path):
+    project = bf.read_project(small(tmp_path, ("[fit]", SECOND)))
+    fit = bf.fit(project, starts=1, jobs=1)
+    assert list(fit.findings) == ["bubble 1", "softer reading"]
+    assert fit.objective < 1e-5
+    assert fit.tests["bubble 1"].nuisance == {}
+    offset = fit.result["tests"]["softer reading"]["nuisance"]["displacement_offset_mm"]
+    assert offset == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
+    assert set(fit.result["mean_relative_error"]) == {"bubble 1", "softer reading"}
+    assert set(fit.residuals()["test"]) == {"bubble 1", "softer reading"}
+    sure, pinned = fit.best.certainty, fit.result["pinned"]["all together"]
+    assert sure is not None
+    for name, sigma in sure.sigma.items():
+        assert pinned[name]["largest"] == pytest.approx(float(sigma.max()))
+    page = fit.report(tmp_path / "out").read_text()
+    for name in ("bubble-1-profiles.png", "softer-reading-heights.png", "pinned.png"):
+        assert name in page and (tmp_path / "out" / name).exists()
+    alone = bf.fit(project, tests=["softer reading"], starts=1, jobs=1)
+    assert list(alone.findings) == ["softer reading"] and "pinned" not in alone.result
+
+
+@pytest.mark.parametrize("form", ['form = "spline"\nknots = 5', 'form = "quadratic"'])
+def test_another_form_of_the_moduli(tmp_path: Path, form: str):
+    """A spline with a continuous curvature can be the cubic behind the data, a quadratic not."""
+    fit = bf.fit(bf.read_project(with_form(tmp_path, form)), starts=1, jobs=1)
+    errors = fit.result["moduli_error"]
+    if "spline" in form:
+        assert fit.objective < 1e-6 and max(errors["E1"], errors["E2"]) < 1e-3
+        assert len(fit.law.beta) == 15
+        card = fit.report(tmp_path / "out").parent / "material.toml"
+        again = bf.read_card(card).law
+        x = np.linspace(0, fit.best.valid[0], 9)
+        assert again.E1(x) == pytest.approx(fit.law.E1(x))
+    else:
+        assert fit.objective > 1e-3
+
+
+def test_a_test_that_says_nothing_of_a_modulus_is_named(fitted: bf.Fit):
+    from bubblefit.fits.numbers import warnings_of
+
+    def said(least: float) -> list[str]:
+        sigma = {"least": least, "median": 2.0, "largest": 9.0}
+        return [w for w in warnings_of(fitted, {"bubble": {"G12": sigma}}) if "alone" in w]
+
+    assert said(0.9) == []
+    assert len(said(1.1)) == 1 and "bubble alone does not determine G12" in said(1.1)[0]

@@ -1,0 +1,118 @@
+"""A quarter bubble of 45 quads with a known solution, for the tests of this room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
+from bubblefit.identification.bounds import LawBounds
+from bubblefit.identification.comparison import Comparison
+from bubblefit.identification.methods import FitOptions
+from bubblefit.identification.methods.lm import LevenbergMarquardt
+from bubblefit.identification.nuisance import Nuisance, NuisanceOf
+from bubblefit.identification.problem import FitProblem
+from bubblefit.identification.unknowns import Unknowns
+from bubblefit.materials.forms import polynomial as forms
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+# Thesis Table 4.2, GPa: solution and bounds.
+SOLUTION = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
+    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+LOWER = [-1e-2, 0, -3e-1, 7e-3, -1e3, -1e1, -1e1, 5e-2, -1e3, 0, -70, 0.25]
+UPPER = [0, 1, 0, 7e-2, 1e2, 1e2, 1, 0.5, 0, 7e2, 0, 1.5]
+RANGE = [0.13, 0.13, 0.13]
+PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
+LAW = HypoelasticLaw(1e3 * np.array(SOLUTION), 0.24, RANGE)
+MODEL = BubbleModel(
+    disk_mesh(100.0, 192, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
+)
+MARGINS = {"E1": 5.0, "E2": 5.0, "G12": 0.5}
+CUBIC = Unknowns.of(
+    forms.CUBIC,
+    0.24,
+    RANGE,
+    LawBounds.of_entries(1e3 * np.array(LOWER), 1e3 * np.array(UPPER), MARGINS),
+)
+NUISANCE = (
+    *(Nuisance(name, -20.0, 20.0, "mm") for name in OFFSETS),
+    Nuisance("pressure_offset", -0.9e3 * PRESSURES[0], 50.0, "kPa", "pressure_offset", 1e-3),
+)
+EVERYTHING = replace(CUBIC, nuisance=NuisanceOf({"bubble": NUISANCE}))
+CONSTANT = Unknowns.of(
+    forms.CONSTANT,
+    0.24,
+    RANGE,
+    LawBounds.of_entries([1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0], MARGINS),
+)
+
+
+@cache
+def reference() -> History:
+    """What the known law does."""
+    return MembraneSolver(1e-10).run(MODEL, LAW)
+
+
+def targets(fields: np.ndarray | None = None, noise: float = 0.0) -> list[FieldTarget]:
+    """Of the known law unless other fields are given."""
+    fields = reference().displacement if fields is None else fields
+    random = np.random.default_rng(12)
+    return [
+        FieldTarget(p, u + noise * random.standard_normal(u.shape))
+        for p, u in zip(MODEL.pressures, fields, strict=True)
+    ]
+
+
+def problem(
+    unknowns: Unknowns = CUBIC, noise: float = 0.0, normalise: Any = "e", **other: Any
+) -> FitProblem:
+    objective = FieldObjective(targets(noise=noise), normalise)
+    return single(MODEL, MembraneSolver(), LAW, objective, unknowns, **other)
+
+
+def single(
+    model: BubbleModel,
+    solver: Any,
+    law: HypoelasticLaw,
+    objective: FieldObjective,
+    unknowns: Unknowns,
+    **other: Any,
+) -> FitProblem:
+    """A fit to one bubble test."""
+    nuisance = unknowns.nuisance.comparisons.get("bubble", ())
+    comparison = Comparison("bubble", model, solver, objective, nuisance)
+    return FitProblem((comparison,), law, unknowns, **other)
+
+
+class Failing(MembraneSolver):
+    """Ends badly, or returns NaN, whenever `when` says so."""
+
+    def __init__(self, when: Callable[[int], bool], how: str = "failure") -> None:
+        super().__init__()
+        self.when, self.how, self.runs = when, how, 0
+
+    def _analyse(self, *arguments: Any) -> Any:
+        self.runs += 1
+        if not self.when(self.runs):
+            return super()._analyse(*arguments)
+        if self.how == "failure":
+            raise SolverFailure("on purpose")
+        history, rates = super()._analyse(*arguments)
+        return replace(history, displacement=history.displacement * np.nan), rates * np.nan
+
+
+def levenberg_marquardt(fit: FitProblem, start: np.ndarray, tolerance: float, most: int) -> Any:
+    """The optimum from a start."""
+    options = FitOptions(tolerance=tolerance, max_analyses=most)
+    return LevenbergMarquardt().minimise(fit, start, options)

@@ -1,0 +1,271 @@
+"""Cylinder meshes: closed, of the right size, well shaped, turned outwards, with all their sets."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.meshes.cylinder import cylinder_mesh
+from bubblefit.meshes.graded import GROWTH, Refinement, rows
+from bubblefit.meshes.mesh import Mesh
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from ..mesh_quality import least_scaled_jacobian
+
+LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1
+RADIUS = DIAMETER / 2
+BENDING = (Refinement("collar", 0.0, 90.0, 12.0), Refinement("support", 1000.0, 40.0, 12.0))
+
+
+def area_vectors(mesh: Mesh) -> np.ndarray:
+    """Normal of each quad, as long as its area."""
+    p = mesh.points[mesh.quads]
+    return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+
+
+def areas(mesh: Mesh) -> np.ndarray:
+    return np.linalg.norm(area_vectors(mesh), axis=1)
+
+
+def enclosed(mesh: Mesh) -> float:
+    """Volume: every quad is flat."""
+    p = mesh.points[mesh.quads]
+    first = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    second = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0])
+    return float(((p[:, 0] * (first + second)).sum()) / 6)
+
+
+def edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Each edge once, (k, 2), and how many quads it belongs to."""
+    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+
+
+def check_sound(mesh: Mesh, length: float, diameter: float, seam: float, symmetry: str) -> None:
+    """Everything that any cylinder mesh must satisfy."""
+    radius = diameter / 2
+    p, sets = mesh.points, mesh.node_sets
+    scale = np.array([radius, radius, length / 2])
+    assert len(np.unique(np.round(p / scale, 9), axis=0)) == len(p)  # nothing lies double
+    assert set(mesh.quads.ravel()) == set(range(len(p)))
+    assert (np.hypot(p[:, 0], p[:, 1]) <= radius * (1 + 1e-9)).all()
+
+    # Element sets share the mesh.
+    names = ("body", "seam", "caps") if seam else ("body", "caps")
+    assert set(mesh.element_sets) == set(names)
+    members = np.concatenate([mesh.element_sets[n] for n in names])
+    np.testing.assert_array_equal(np.sort(members), np.arange(len(mesh.quads)))
+    for name in names:
+        quads = mesh.quads[mesh.element_sets[name]]
+        np.testing.assert_array_equal(sets[name], np.unique(quads))
+
+    # Outward: radial on the tube, along the axis on the caps.
+    normal, middle = area_vectors(mesh), p[mesh.quads].mean(axis=1)
+    unit = normal / np.linalg.norm(normal, axis=1)[:, None]
+    cap = np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
+    np.testing.assert_allclose(unit[cap, 2], np.sign(middle[cap, 2]), atol=1e-9)
+    radial = middle[~cap, :2] / np.linalg.norm(middle[~cap, :2], axis=1)[:, None]
+    np.testing.assert_allclose(unit[~cap, :2], radial, atol=1e-9)
+    # The warp lies in the quad's plane.
+    assert mesh.warp.shape == (len(mesh.quads), 3)
+    np.testing.assert_allclose(np.einsum("mx,mx->m", mesh.warp, unit), 0, atol=1e-9)
+    np.testing.assert_array_equal(
+        mesh.warp[~cap], np.broadcast_to([0, 0, 1], mesh.warp[~cap].shape)
+    )
+
+    # The seam is as wide as it should be, around the bottom.
+    if seam:
+        on_seam = p[sets["seam"]]
+        half = radius * np.arctan2(np.abs(on_seam[:, 0]), -on_seam[:, 1])
+        assert half.max() == pytest.approx(seam / 2, rel=1e-9)
+
+    # Connection: closed, or open on the planes of symmetry alone.
+    ends, owners = edges(mesh)
+    euler = len(p) - len(ends) + len(mesh.quads)
+    if symmetry == "full":
+        assert set(owners) == {2}
+        assert euler == 2  # a sphere
+        assert "symmetry_x" not in sets
+    else:
+        assert set(owners) == {1, 2}
+        assert euler == 1  # a disk
+        assert (p[:, [0, 2]] >= 0).all()
+        np.testing.assert_array_equal(sets["symmetry_x"], np.flatnonzero(p[:, 0] == 0))
+        np.testing.assert_array_equal(sets["symmetry_z"], np.flatnonzero(p[:, 2] == 0))
+        named = np.union1d(sets["symmetry_x"], sets["symmetry_z"])
+        np.testing.assert_array_equal(np.unique(ends[owners == 1]), named)
+        for a, b in ends[owners == 1]:  # the whole edge, not only its two nodes
+            assert (p[[a, b], 0] == 0).all() or (p[[a, b], 2] == 0).all()
+
+    # Lines and rows, from the coordinates.
+    at_end = np.abs(p[:, 2]) == length / 2
+    around = np.isclose(np.hypot(p[:, 0], p[:, 1]), radius, rtol=1e-9)
+    np.testing.assert_array_equal(sets["ends"], np.flatnonzero(at_end & around))
+    np.testing.assert_array_equal(sets["mid_span"], np.flatnonzero(p[:, 2] == 0))
+    middle_line = around & (p[:, 0] == 0)
+    np.testing.assert_array_equal(sets["top_line"], np.flatnonzero(middle_line & (p[:, 1] > 0)))
+    np.testing.assert_array_equal(sets["bottom_line"], np.flatnonzero(middle_line & (p[:, 1] < 0)))
+    np.testing.assert_array_equal(sets["side_line"], np.flatnonzero(around & (p[:, 1] == 0)))
+    centres = at_end & (p[:, :2] == 0).all(axis=1)
+    np.testing.assert_array_equal(sets["cap_centres"], np.flatnonzero(centres))
+    assert centres.sum() == (2 if symmetry == "full" else 1)
+    assert least_scaled_jacobian(mesh)["all"] >= 0.62
+    assert least_scaled_jacobian(mesh)["body"] >= 1 - 1e-9
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    length=st.floats(50, 5000),
+    diameter=st.floats(20, 500),
+    fineness=st.floats(1, 12),
+    wide=st.floats(0, 1),
+    symmetry=st.sampled_from(["full", "quarter"]),
+)
+def test_any_size_gives_a_sound_well_shaped_mesh(length, diameter, fineness, wide, symmetry):
+    size = min(diameter, length) / 2 / fineness
+    assume(length * diameter / size**2 < 5000)
+    seam = 0.999 * wide * np.pi * diameter / 4
+    assume(seam == 0 or seam >= size / 2)
+    mesh = cylinder_mesh(length, diameter, size, seam, symmetry)
+    check_sound(mesh, length, diameter, seam, symmetry)
+
+
+@pytest.mark.parametrize("symmetry", ["full", "quarter"])
+def test_the_bending_mesh(symmetry):
+    mesh = cylinder_mesh(LENGTH, DIAMETER, 20.0, SEAM, symmetry, BENDING)
+    check_sound(mesh, LENGTH, DIAMETER, SEAM, symmetry)
+    at = mesh.points[mesh.node_sets["support"]]
+    assert set(at[:, 2]) == ({1000.0, -1000.0} if symmetry == "full" else {1000.0})
+    np.testing.assert_allclose(np.hypot(at[:, 0], at[:, 1]), RADIUS)
+    bottom = mesh.points[mesh.node_sets["support_bottom"]]
+    np.testing.assert_array_equal(bottom[:, :2], np.tile([0.0, -RADIUS], (len(bottom), 1)))
+    np.testing.assert_array_equal(mesh.node_sets["collar"], mesh.node_sets["mid_span"])
+    # Of the elements of the thesis' size, worst 0.86; three quads that meet can have 0.866.
+    assert least_scaled_jacobian(mesh)["caps"] > 0.85
+
+
+def test_area_and_volume_converge_to_those_of_the_cylinder_with_second_order():
+    area = np.pi * DIAMETER * 400 + 2 * np.pi * RADIUS**2
+    volume = np.pi * RADIUS**2 * 400
+    gaps, around = [], []
+    for n in (2, 4, 8, 16):
+        mesh = cylinder_mesh(400.0, DIAMETER, np.pi * RADIUS / (4 * n), SEAM, "full")
+        around.append(len(mesh.node_sets["mid_span"]))
+        gaps.append((1 - areas(mesh).sum() / area, 1 - enclosed(mesh) / volume))
+    assert around == [16, 32, 64, 128]
+    orders = -np.diff(np.log(np.array(gaps)), axis=0) / np.log(2)
+    np.testing.assert_allclose(orders[1:], 2.0, atol=0.12)
+    assert max(gaps[-1]) < 5e-4
+    # Without a seam the rows are even: the prism over a regular polygon, exactly.
+    mesh = cylinder_mesh(400.0, DIAMETER, 20.0, 0.0, "full")
+    n = len(mesh.node_sets["mid_span"])
+    base = n / 2 * np.sin(2 * np.pi / n) * RADIUS**2
+    sides = 2 * n * RADIUS * np.sin(np.pi / n) * 400
+    assert enclosed(mesh) == pytest.approx(400 * base, rel=1e-12)
+    assert areas(mesh).sum() == pytest.approx(2 * base + sides, rel=1e-12)
+
+
+def test_a_quarter_is_a_quarter_of_the_whole():
+    quarter = cylinder_mesh(LENGTH, DIAMETER, 30.0, SEAM, "quarter", BENDING)
+    full = cylinder_mesh(LENGTH, DIAMETER, 30.0, SEAM, "full", BENDING)
+    mirrored = {tuple(p * (sx, 1, sz)) for p in quarter.points for sx in (1, -1) for sz in (1, -1)}
+    assert {tuple(p) for p in full.points} == mirrored
+    assert len(full.quads) == 4 * len(quarter.quads)
+    assert areas(full).sum() == pytest.approx(4 * areas(quarter).sum(), rel=1e-12)
+    assert enclosed(full) == pytest.approx(4 * enclosed(quarter), rel=1e-12)
+    for name, numbers in quarter.element_sets.items():
+        assert len(full.element_sets[name]) == 4 * len(numbers)
+    for name, numbers in full.node_sets.items():
+        folded = {
+            tuple(p)
+            for p in np.abs(full.points[numbers]) * [1, 0, 1] + full.points[numbers] * [0, 1, 0]
+        }
+        assert folded == {tuple(p) for p in quarter.points[quarter.node_sets[name]]}
+
+
+def test_the_caps_can_be_turned():
+    for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0])):
+        mesh = cylinder_mesh(600.0, DIAMETER, 30.0, SEAM, "full", cap_warp=axis)
+        found = mesh.warp[mesh.element_sets["caps"]]
+        np.testing.assert_array_equal(found, np.broadcast_to(direction, found.shape))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    end=st.floats(500, 3000),
+    size=st.floats(10, 80),
+    places=st.lists(st.floats(0.05, 0.9), max_size=3),
+    finer=st.floats(0.1, 1),
+)
+def test_rows_are_graded(end, size, places, finer):
+    fine = [Refinement(f"r{i}", end * f, 20.0, size * finer) for i, f in enumerate(places)]
+    try:
+        z = rows(end, size, fine)
+    except InputError as error:
+        assert error.field.endswith("position")  # two of them too near to each other
+        return
+    assert z[0] == 0 and z[-1] == end
+    steps = np.diff(z)
+    assert (steps > 0).all()
+    assert {r.position for r in fine} <= set(z)
+    middles = 0.5 * (z[1:] + z[:-1])
+    wanted = np.min(
+        [np.full(len(middles), size)]
+        + [r.size + GROWTH * np.maximum(abs(middles - r.position) - r.reach, 0) for r in fine],
+        axis=0,
+    )
+    # A whole number of rows must fit between two places: 1.5 of them become 1 or 2.
+    assert (steps <= 1.6 * wanted).all()
+    inner = [
+        np.diff(z[(z >= a) & (z <= b)])
+        for a, b in pairwise(sorted({0.0, end, *(r.position for r in fine)}))
+    ]
+    assert all((s[1:] < 1.6 * s[:-1]).all() and (s[:-1] < 1.6 * s[1:]).all() for s in inner)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"length": 0.0}, "length"),
+        ({"length": float("nan")}, "length"),
+        ({"length": "3000"}, "length"),
+        ({"diameter": -1.0}, "diameter"),
+        ({"diameter": True}, "diameter"),
+        ({"size": 0.0}, "size"),
+        ({"size": 76.0}, "size"),
+        ({"size": 0.01}, "size"),
+        ({"seam_width": -1.0}, "seam_width"),
+        ({"seam_width": 200.0}, "seam_width"),
+        ({"seam_width": 5.0}, "seam_width"),
+        ({"symmetry": "half"}, "symmetry"),
+        ({"cap_warp": "z"}, "cap_warp"),
+        (
+            {"refinements": [Refinement("support", 1600.0, 40.0, 10.0)]},
+            "refinements.support.position",
+        ),
+        (
+            {"refinements": [Refinement("support", 1498.0, 40.0, 10.0)]},
+            "refinements.support.position",
+        ),
+        ({"refinements": [Refinement("caps", 1000.0, 40.0, 10.0)]}, "refinements"),
+        ({"refinements": [BENDING[0], Refinement("collar", 500.0, 40.0, 10.0)]}, "refinements"),
+    ],
+)
+def test_nonsense_is_refused_by_name(change, field):
+    values = {"length": LENGTH, "diameter": DIAMETER, "size": 30.0, "seam_width": SEAM} | change
+    with pytest.raises(InputError) as caught:
+        cylinder_mesh(**values)
+    assert caught.value.field == field
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"name": "no name"}, {"position": -1.0}, {"reach": float("inf")}, {"size": 0.0}],
+)
+def test_refinements_are_checked(change):
+    with pytest.raises(InputError, match="expected"):
+        Refinement(**({"name": "support", "position": 1.0, "reach": 1.0, "size": 1.0} | change))

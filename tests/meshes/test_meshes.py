@@ -1,0 +1,202 @@
+"""Disk meshes: area, connection, orientation, sets, element shapes."""
+
+from __future__ import annotations
+
+import builtins
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import BubblefitError, InputError
+from bubblefit.meshes.blocks import divisions
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.mesh import Mesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..mesh_quality import scaled_jacobian
+
+RADIUS = 100.0
+BEST = np.sin(np.deg2rad(120))  # three quads meet in a node of each quarter
+
+
+def areas(mesh: Mesh) -> np.ndarray:
+    """Signed area of each quad of a flat mesh: positive is counter-clockwise."""
+    p = mesh.points[mesh.quads]
+    return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2]
+
+
+def edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Each edge once, (k, 2), and how many quads it belongs to."""
+    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+
+
+def check_sound(mesh: Mesh, symmetry: str, radius: float = RADIUS) -> None:
+    """Everything that any disk mesh must satisfy."""
+    assert (areas(mesh) > 0).all()
+    assert (mesh.points[:, 2] == 0).all()
+    assert set(mesh.quads.ravel()) == set(range(len(mesh.points)))
+    assert len(np.unique(np.round(mesh.points / radius, 9), axis=0)) == len(mesh.points)
+
+    ends, owners = edges(mesh)
+    assert set(owners) <= {1, 2}
+    # Euler: one piece without holes.
+    assert len(mesh.points) - len(ends) + len(mesh.quads) == 1
+    on_edge = np.unique(ends[owners == 1])
+    at_rim = np.isclose(np.hypot(*mesh.points[:, :2].T), radius, rtol=1e-12)
+    sets = mesh.node_sets
+    np.testing.assert_array_equal(sets["rim"], np.flatnonzero(at_rim))
+    assert sets["apex"].shape == (1,)
+    assert (mesh.points[sets["apex"]] == 0).all()
+    if symmetry == "full":
+        assert set(sets) == {"rim", "apex"}
+        np.testing.assert_array_equal(on_edge, sets["rim"])
+    else:
+        assert set(sets) == {"rim", "apex", "symmetry_x", "symmetry_y"}
+        assert (mesh.points >= 0).all()
+        for axis, name in enumerate(("symmetry_x", "symmetry_y")):
+            np.testing.assert_array_equal(sets[name], np.flatnonzero(mesh.points[:, axis] == 0))
+        named = np.concatenate([sets["rim"], sets["symmetry_x"], sets["symmetry_y"]])
+        np.testing.assert_array_equal(on_edge, np.unique(named))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    elements=st.integers(8, 3000),
+    symmetry=st.sampled_from(["full", "quarter"]),
+    radius=st.floats(1e-3, 1e5),
+)
+def test_any_count_gives_a_sound_well_shaped_mesh(elements, symmetry, radius):
+    mesh = disk_mesh(radius, elements, symmetry)
+    check_sound(mesh, symmetry, radius)
+    assert scaled_jacobian(mesh).min() >= BEST - 1e-6
+    assert areas(mesh).max() < 3.5 * areas(mesh).min()
+    full = len(mesh.quads) * (4 if symmetry == "quarter" else 1)
+    # Few quads leave few choices: 3, 8, 12, 15, 21, 27 ... a quarter.
+    assert abs(full - elements) <= max(16, 0.07 * elements)
+
+
+def test_the_thesis_mesh():
+    assert divisions(200) == (10, 5)
+    assert len(disk_mesh(RADIUS, 800, "quarter").quads) == 200
+    assert len(disk_mesh(RADIUS, 800, "full").quads) == 800
+
+
+def test_area_converges_to_that_of_the_circle_with_second_order():
+    wanted = np.pi * RADIUS**2
+    counts = [8 * n**2 for n in (4, 10, 20, 40)]  # alike: n / 2 layers around a core of n
+    assert [divisions(c / 4) for c in counts] == [(n, n // 2) for n in (4, 10, 20, 40)]
+    gaps = [1 - areas(disk_mesh(RADIUS, n)).sum() / wanted for n in counts]
+    assert gaps[1] < 1.1e-3
+    order = 2 * np.diff(np.log(gaps)) / -np.diff(np.log(counts))
+    np.testing.assert_allclose(order, 2.0, atol=0.05)
+    # The polygon through the rim nodes, exactly.
+    mesh = disk_mesh(RADIUS, 800)
+    n = len(mesh.node_sets["rim"])
+    assert areas(mesh).sum() == pytest.approx(n / 2 * np.sin(2 * np.pi / n) * RADIUS**2, rel=1e-12)
+
+
+def test_the_full_disk_is_the_quarter_mirrored():
+    quarter, full = disk_mesh(RADIUS, 800, "quarter"), disk_mesh(RADIUS, 800, "full")
+    mirrored = {tuple(p * (sx, sy, 1)) for p in quarter.points for sx in (1, -1) for sy in (1, -1)}
+    assert {tuple(p) for p in full.points} == mirrored
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"elements": 7}, "elements"),
+        ({"elements": 0}, "elements"),
+        ({"elements": -800}, "elements"),
+        ({"elements": 800.0}, "elements"),
+        ({"elements": True}, "elements"),
+        ({"elements": None}, "elements"),
+        ({"elements": 10**12}, "elements"),
+        ({"radius": 0.0}, "radius"),
+        ({"radius": -1.0}, "radius"),
+        ({"radius": float("nan")}, "radius"),
+        ({"radius": float("inf")}, "radius"),
+        ({"radius": "100"}, "radius"),
+        ({"symmetry": "half"}, "symmetry"),
+        ({"generator": "abaqus"}, "generator"),
+    ],
+)
+def test_nonsense_is_refused_by_name(change, field):
+    given_values = {"radius": RADIUS, "elements": 800, "symmetry": "full"} | change
+    with pytest.raises(InputError) as caught:
+        disk_mesh(**given_values)
+    assert caught.value.field == field
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("corners", "wanted"),
+    [
+        ([(0, 0), (2, 0), (2, 1), (0, 1)], 1.0),
+        ([(0, 0), (1, 0), (1.5, np.sqrt(3) / 2), (0.5, np.sqrt(3) / 2)], np.sqrt(3) / 2),
+        ([(0, 0), (1, 0), (1, 0), (0, 1)], 0.0),  # a collapsed edge
+        ([(0, 0), (0, 0), (0, 0), (0, 0)], 0.0),  # a collapsed element
+        ([(0, 0), (4, 0), (1, 1), (0, 4)], -0.8),  # a corner that turns in
+    ],
+)
+def test_scaled_jacobian_of_known_shapes(corners, wanted):
+    points = np.array([(x, y, 0) for x, y in corners], float)
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    for placed in (points, 7 * points @ turn.T + 3):
+        mesh = Mesh(placed, np.array([[0, 1, 2, 3]]), {})
+        assert scaled_jacobian(mesh) == pytest.approx([wanted], abs=1e-12)
+
+
+# gmsh
+
+
+def test_gmsh_makes_a_sound_mesh_too():
+    try:
+        import gmsh
+    except (ImportError, OSError) as missing:
+        pytest.skip(f"gmsh cannot be loaded: {missing}")
+    for symmetry in ("full", "quarter"):
+        mesh = disk_mesh(RADIUS, 800, symmetry, "gmsh")
+        check_sound(mesh, symmetry)
+        assert scaled_jacobian(mesh).min() > 0.5
+        assert len(mesh.quads) == pytest.approx(800 / (4 if symmetry == "quarter" else 1), rel=0.1)
+    assert not gmsh.isInitialized()
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        ImportError("No module named 'gmsh'"),
+        OSError("libGLU.so.1: cannot open shared object file: No such file or directory"),
+    ],
+)
+def test_without_gmsh_the_message_says_what_to_do(monkeypatch, failure):
+    plain = builtins.__import__
+
+    def no_gmsh(name, *arguments, **options):
+        if name == "gmsh":
+            raise failure
+        return plain(name, *arguments, **options)
+
+    monkeypatch.setattr(builtins, "__import__", no_gmsh)
+    with pytest.raises(BubblefitError) as caught:
+        disk_mesh(RADIUS, 800, "quarter", "gmsh")
+    for words in (str(failure), "pip install gmsh", "libglu1-mesa", 'generator = "blocks"'):
+        assert words in str(caught.value)
+    assert len(disk_mesh(RADIUS, 800, "quarter").quads) == 200
+
+
+def test_slow_packages_are_loaded_only_when_used():
+    """meshio is there from the start: `import bubblefit` teaches it to read .frd."""
+    code = (
+        "import sys, bubblefit.meshes.disk, bubblefit.data.fields,"
+        " bubblefit.data.surfaces; bubblefit.meshes.disk.disk_mesh(1.0, 12);"
+        " print([m for m in ('gmsh', 'pandas') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1]
+    )
+    assert done.stdout.strip() == "[]", done.stderr

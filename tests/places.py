@@ -1,0 +1,11 @@
+"""Where things are, for all tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = ROOT / "examples"
+KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"
+#: Measured data beside the repository.
+SHARED = ROOT.parent / "shared" / "data"

@@ -1,0 +1,15 @@
+"""What pip leaves of distributions that add something to bubblefit, written by hand."""
+
+from __future__ import annotations
+
+
+def install(folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"):
+    """One distribution with one entry point into `folder`, which `packages` has on sys.path."""
+    module = module or f"acme_{name}"
+    if text:
+        (folder / f"{module}.py").write_text(text)
+    info = folder / f"{distribution.replace('-', '_')}-2.5.dist-info"
+    info.mkdir(exist_ok=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 2.5\n")
+    with (info / "entry_points.txt").open("a") as file:
+        file.write(f"[{group}]\n{name} = {module}:THING\n")

@@ -1,0 +1,207 @@
+"""Figures, report page and VTU: written whole, readable, honest about what is missing."""
+
+from __future__ import annotations
+
+import os
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from bubblefit.errors import OutputError
+from bubblefit.meshes.mesh import Mesh
+from bubblefit.reports import (
+    Report,
+    StartRow,
+    Table,
+    plot_heights,
+    plot_moduli,
+    plot_optima,
+    plot_profiles,
+    write_report,
+    write_vtu,
+)
+from bubblefit.reports.cuts import node_cut, point_cut
+from bubblefit.reports.html import number, percent
+from bubblefit.writing import replacing
+
+#: Best, median and worst of 50 starts (docs/references.md, its Fig. 4.8).
+PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
+PRESSURES = np.array([0.022, 0.186, 0.3])
+
+
+def cap(xy: np.ndarray, height: float) -> np.ndarray:
+    """Displacement (n, 3) of a parabolic cap of radius 100 mm."""
+    inside = 1 - (xy**2).sum(axis=1) / 1e4
+    return np.column_stack([0.05 * xy * inside[:, None], height * inside])
+
+
+def polar(angles: np.ndarray) -> np.ndarray:
+    r, t = np.meshgrid(np.linspace(10, 100, 10), angles)
+    ring = np.column_stack([(r * np.cos(t)).ravel(), (r * np.sin(t)).ravel()])
+    return np.vstack([[0.0, 0.0], ring])
+
+
+QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
+
+
+def is_png(path: Path) -> bool:
+    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 5000
+
+
+@pytest.mark.parametrize("values", [[0.0, 1e-9, 3.2], [np.nan, 1.3, np.inf, 1.4], [np.nan], [0.1]])
+def test_optima(tmp_path: Path, values: list[float]):
+    assert is_png(plot_optima(tmp_path / "optima.png", values, references=PUBLISHED))
+    assert is_png(plot_optima(tmp_path / "plain.png", values))
+
+
+@pytest.mark.parametrize("fits, known", [(5, True), (5, False), (1, True), (1, False)])
+def test_moduli(tmp_path: Path, fits: int, known: bool):
+    strains = np.linspace(0, [0.08, 0.1, 0.06], 20).T
+    truth = 1000 * (1 - 3 * strains)
+    curves = np.array([truth * (1 + 1e-6 * i) for i in range(fits)])
+    assert is_png(plot_moduli(tmp_path / "m.png", strains, curves, truth if known else None))
+
+
+@pytest.mark.parametrize("points", [QUARTER, FULL], ids=["quarter", "full"])
+def test_profiles_and_heights(tmp_path: Path, points: np.ndarray):
+    heights = (13.0, 30.0, 39.0)
+    model = np.array([cap(points, h) for h in heights])
+    grid = FULL[np.hypot(*FULL.T) < 90]
+    measured = [(grid, cap(grid, h + 1)) for h in heights]
+    assert is_png(plot_profiles(tmp_path / "one.png", PRESSURES, points, model))
+    several = np.array([model, 1.01 * model])
+    assert is_png(plot_profiles(tmp_path / "p.png", PRESSURES, points, several, measured))
+    seen = [d[:, 2] for _, d in measured]
+    assert is_png(plot_heights(tmp_path / "h.png", PRESSURES, seen, [z - 1 for z in seen]))
+    assert is_png(plot_heights(tmp_path / "same.png", PRESSURES, seen, seen))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_cut_follows_the_nodes_on_the_axis(axis: int):
+    cut = node_cut(QUARTER, cap(QUARTER, 30.0), axis)
+    assert len(cut.position) == 11 and cut.height[0] == pytest.approx(30.0)
+    assert (np.diff(cut.position) > 0).all() and (np.diff(cut.height) < 0).all()
+    assert cut.position[5] == pytest.approx(50 + 0.05 * 50 * 0.75)
+
+
+def test_cut_of_a_mesh_without_nodes_on_the_axis_is_interpolated():
+    turned = polar(np.linspace(0, 2 * np.pi, 73)[:-1] + np.pi / 72)
+    cut = node_cut(turned, cap(turned, 30.0), 0)
+    middle = np.interp(0.0, cut.position, cut.height)
+    assert len(cut.position) > 70 and middle == pytest.approx(30.0, rel=0.01)
+
+
+def test_measured_points_beside_the_axis_count():
+    x, y = np.meshgrid(np.arange(-87.5, 90, 5.0), np.arange(-87.5, 90, 5.0))
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    assert len(point_cut(grid, cap(grid, 30.0), 0).position) == 2 * x.shape[1]
+
+
+def square() -> Mesh:
+    points = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], dtype=float)
+    return Mesh(points, np.array([[0, 1, 2, 3]]), {"rim": np.arange(4)})
+
+
+def test_vtu_holds_the_deformed_mesh(tmp_path: Path):
+    mesh = square()
+    u = np.arange(12.0).reshape(4, 3)
+    path = write_vtu(
+        mesh, u, tmp_path / "b.vtu", {"height": u[:, 2]}, {"thickness": np.array([0.81])}
+    )
+    back = meshio.read(path)
+    assert back.points == pytest.approx(mesh.points + u)
+    assert back.point_data["displacement"] == pytest.approx(u)
+    assert back.point_data["height"] == pytest.approx(u[:, 2])
+    assert back.cell_data["thickness"][0] == pytest.approx([0.81])
+    with pytest.raises(ValueError, match="height: 3 rows for 4 nodes"):
+        write_vtu(mesh, u, path, {"height": np.zeros(3)})
+
+
+def full_report() -> Report:
+    return Report(
+        title="Test <1> & more",
+        summary="Good.",
+        facts=[("objective e", 3.1234567e-12), ("method", "lm")],
+        coefficients=[("beta_0", -7.96788e-3, -1e-2, 0.0)],
+        moduli_error={"E1": 1.2e-6},
+        strain_reached={"warp": 0.0852, "fill": 0.313},
+        valid_strain={"fill": 0.153},
+        warnings=["beta_0 <is> on its bound"],
+        figures=[("figures/sorted optima.png", "Optima")],
+        tables=[Table("Surfaces", ["pressure", "R²"], [[22, 0.99971]], "Table 4.1")],
+        starts=[
+            StartRow(7, None, "the solver failed", 3),
+            StartRow(8, 2e-3, "slow", 30),
+            StartRow(9, 1e-9, "converged", 13),
+        ],
+        files=[("result.json", "everything")],
+        versions={"bubblefit": "0.1.0"},
+    )
+
+
+class Tags(HTMLParser):
+    """Checks that tags close in order, and collects links."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.links += [v for k, v in attrs if k in ("src", "href")]
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("report", [full_report(), Report(title="Bare")], ids=["full", "bare"])
+def test_report_is_well_formed(tmp_path: Path, report: Report):
+    tags = Tags()
+    tags.feed(write_report(tmp_path, report).read_text(encoding="utf-8"))
+    assert tags.open == []
+    assert not any("://" in link or link.startswith("/") for link in tags.links)
+
+
+def test_report_shows_everything_and_escapes(tmp_path: Path):
+    page = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
+    for text in (
+        "Test &lt;1&gt; &amp; more", "3.123e-12", "-0.00796788", "0.00012 %", "0.0852",
+        "beta_0 &lt;is&gt;", "figures/sorted%20optima.png", "0.9997", "Table 4.1",
+        "the solver failed", "result.json", "bubblefit 0.1.0",
+    ):  # fmt: skip
+        assert text in page, text
+    row = re.search(r"<td>fill</td><td>(.*?)</td><td>(.*?)</td>", page)
+    assert row is not None and row.groups() == ("0.153", "0.313")
+    assert "<td>warp</td><td>0.0852</td><td>0.0852</td>" in page
+    assert page.index("converged") < page.index("slow") < page.index("the solver failed")
+
+
+def test_numbers():
+    assert [number(v) for v in (None, float("nan"), 3, "x", 0.123456)] == [
+        "–", "–", "3", "x", "0.1235",
+    ]  # fmt: skip
+    assert percent(0.01234) == "1.2 %"
+
+
+def test_replacing_keeps_the_old_file_when_the_block_fails(tmp_path: Path):
+    path = tmp_path / "result.txt"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
+    with pytest.raises(OutputError, match="No space left"), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise OSError(28, "No space left on device")
+    assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
+
+
+def test_output_folder_that_cannot_be_made(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"report\.html: cannot be written"):
+        write_report(tmp_path / "file", Report(title="x"))

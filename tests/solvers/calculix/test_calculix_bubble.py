@@ -1,0 +1,298 @@
+"""The bubble on CalculiX: agreement with the membrane and with published numbers, and the deck."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.base import Solver
+from bubblefit.solvers.calculix.bubble import decks
+from bubblefit.solvers.calculix.pressure import pressure_forces
+from bubblefit.solvers.calculix.shells import shell_mesh
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.decks import OURS, render
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.registry import solver_named
+
+from ...fortran_build import LAWS
+
+# Table 4.2, MPa.
+GPA = [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437]
+BETA = 1e3 * np.array([*GPA, -479.622, 212.650, -20.2028, 0.806350])
+CUBIC = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
+LINEAR = HypoelasticLaw.linear(800.0, 400.0, 20.0)
+TRILINEAR = HypoelasticLaw.trilinear(
+    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (40.0, 30.0, 60.0),
+    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
+)  # fmt: skip
+PRESSURES = (0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.3)
+AGREEMENT = 0.003  # of the apex height
+
+
+def bubble(elements, symmetry="quarter", pressures=PRESSURES):
+    mesh = disk_mesh(100.0, elements, symmetry)
+    return BubbleModel(mesh, 0.81, pressures, default_increments(pressures))
+
+
+def differences(element, model, law):
+    """Largest difference of apex and of any component anywhere, over the apex height, (frames,)."""
+    found = CalculixSolver(element=element).run(model, law)
+    expected = MembraneSolver().run(model, law)
+    np.testing.assert_allclose(found.load, expected.load)
+    apex = model.mesh.node_sets["apex"][0]
+    height = expected.displacement[:, apex, 2]
+    difference = np.abs(found.displacement - expected.displacement)
+    return difference[:, apex, 2] / height, difference.max(axis=(1, 2)) / height, found, expected
+
+
+# S4 stops at 251 kPa with the cubic law: docs/how-to/calculix.md says why.
+@pytest.mark.parametrize(
+    ("element", "elements", "law", "pressures"),
+    [
+        ("S8R", 432, CUBIC, PRESSURES),
+        ("S8R", 432, LINEAR, PRESSURES),
+        ("S8R", 432, TRILINEAR, PRESSURES),
+        ("S8R", 432, LAWS["spline"], PRESSURES),
+        ("S4", 1728, LINEAR, PRESSURES),
+        ("S4", 3072, CUBIC, PRESSURES[:-1]),
+    ],
+    ids=["S8R-cubic", "S8R-linear", "S8R-trilinear", "S8R-spline", "S4-linear", "S4-cubic"],
+)
+def test_agrees_with_the_membrane(ccx, element, elements, law, pressures):
+    apex, field, found, expected = differences(element, bubble(elements, "quarter", pressures), law)
+    print(element, elements, np.round(100 * apex, 3), np.round(100 * field, 3))
+    assert apex.max() < AGREEMENT
+    assert field.max() < AGREEMENT
+    # Support forces: what the pressure pushes up, the rim and the corners of its sets take.
+    up = expected.reactions["rim"][:, 2]
+    np.testing.assert_allclose(found.reactions["rim"][:, 2], up, rtol=0.01)
+    np.testing.assert_allclose(found.strain_max, expected.strain_max, rtol=0.03)
+
+
+def test_linear_orthotropic_as_abaqus(ccx, shared_data):
+    """Abaqus' M3D4 membrane, test 2, model e, as digitised (0.03 mm).
+
+    0.3 %; at the first pressure, 3.9 kPa, 0.6 %: our membrane is 0.49 % off there, too.
+    """
+    lines = (shared_data / "benchmarks" / "abaqus_linear_orthotropic.csv").read_text().splitlines()
+    rows = [
+        row
+        for row in csv.DictReader(line for line in lines if not line.startswith("#"))
+        if (row["test"], row["model"]) == ("2", "e")
+    ]
+    law = HypoelasticLaw.linear(
+        *(1e3 * float(rows[0][name]) for name in ("E1", "E2", "G12")), 0.24, "incompressible"
+    )
+    pressures = [0.1 * float(row["p_bar"]) for row in rows]
+    steps = sorted({0.25 * pressures[0], 0.5 * pressures[0], *pressures})
+    mesh = disk_mesh(100.0, 432, "quarter")
+    found = CalculixSolver().run(BubbleModel(mesh, 0.81, pressures, steps), law)
+    apex = found.displacement[:, mesh.node_sets["apex"][0], 2]
+    theirs = np.array([float(row["apex_x_profile"]) for row in rows])
+    print(np.round(100 * (apex / theirs - 1), 3))
+    error = np.abs(apex / theirs - 1)
+    assert error[0] < 6e-3
+    assert error[1:].max() < AGREEMENT
+
+
+def test_a_whole_disk_is_four_quarters(ccx):
+    quarter, whole = (
+        CalculixSolver(element="S4").run(bubble(64, symmetry, (0.022, 0.059)), LINEAR)
+        for symmetry in ("quarter", "full")
+    )
+    meshes = [bubble(64, symmetry).mesh for symmetry in ("quarter", "full")]
+    for i, point in enumerate(meshes[0].points):
+        j = int(np.argmin(np.linalg.norm(meshes[1].points - point, axis=1)))
+        np.testing.assert_allclose(whole.displacement[:, j], quarter.displacement[:, i], atol=2e-3)
+    up = whole.reactions["rim"][:, 2], quarter.reactions["rim"][:, 2]
+    np.testing.assert_allclose(up[0], 4 * up[1], rtol=1e-3)
+
+
+def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
+    """The strain path is the model's: a deck that cuts every step in four gives the same."""
+    model = bubble(64, "quarter", (0.059, 0.132, 0.186))
+    text = (OURS / "calculix" / "bubble.inp.j2").read_text()
+    (tmp_path / "bubble.inp.j2").write_text(
+        text.replace("least | number }}, 1\n", "least | number }}, 0.25\n")
+    )
+    plain = CalculixSolver(element="S4").run(model, CUBIC)
+    cut = CalculixSolver(element="S4", templates=tmp_path).run(model, CUBIC)
+    assert cut.iterations > 1.5 * plain.iterations
+    np.testing.assert_allclose(cut.displacement, plain.displacement, atol=2e-5)
+
+
+def test_midsides_lie_on_the_rim_and_in_the_sets():
+    mesh = disk_mesh(100.0, 64, "quarter")
+    shells = shell_mesh(mesh, "S8R")
+    assert shells.elements.shape == (len(mesh.quads), 8)
+    np.testing.assert_array_equal(shells.elements[:, :4], mesh.quads)
+    rim = shells.points[shells.node_sets["rim"]]
+    np.testing.assert_allclose(np.hypot(rim[:, 0], rim[:, 1]), 100.0)
+    assert len(rim) == 2 * len(mesh.node_sets["rim"]) - 1
+    assert (shells.points[shells.node_sets["symmetry_x"], 0] == 0).all()
+    assert len(shells.node_sets["symmetry_x"]) == 2 * len(mesh.node_sets["symmetry_x"]) - 1
+    assert len(np.unique(shells.points, axis=0)) == len(shells.points)
+
+
+@pytest.mark.parametrize("element", ["S4", "S8R"])
+def test_pressure_on_a_tilted_surface_is_pressure_times_area(element):
+    shells = shell_mesh(disk_mesh(100.0, 64, "quarter"), element)
+    tilted = shells.points.copy()
+    tilted[:, 2] = 0.5 * tilted[:, 0] - 0.25 * tilted[:, 1]
+    total = pressure_forces(tilted, shells.elements, 0.1).sum(axis=0)
+    flat = pressure_forces(shells.points, shells.elements, 0.1).sum(axis=0)
+    np.testing.assert_allclose(total, flat[2] * np.array([-0.5, 0.25, 1.0]), atol=1e-9)
+    # Curved edges: within the area of the segments that they leave out.
+    assert flat[2] == pytest.approx(0.1 * np.pi * 1e4 / 4, rel=1e-4 if element == "S8R" else 0.02)
+
+
+def test_the_deck_reads_as_written_by_hand():
+    model = bubble(64)
+    text = decks(model, CUBIC, shell_mesh(model.mesh, "S8R"), "S8R")["job.inp"]
+    assert "S8R" in text and "*SHELL SECTION, ELSET=MEMBRANE" in text
+    assert text.count("*STEP") == len(model.increments)
+    assert "MEMBRANE, P, 0.022\n" in text
+    lines = text.splitlines()
+    assert sum(line.startswith("** ") for line in lines) > 10
+    assert max(map(len, lines)) < 132  # CalculiX reads no more
+    # It reads 20 characters of a number, no more.
+    fields = [f.strip() for line in lines if line[:1] in "-0123456789" for f in line.split(",")]
+    assert max(map(len, fields)) <= 20
+
+
+def test_small_numbers_survive_the_deck():
+    assert render("calculix", "bubble.inp.j2", context(constants=[-1.0000803740695e-08] * 9))
+    text = render("calculix", "bubble.inp.j2", context(constants=[-1.0000803740695e-108] * 9))
+    written = re.search(r"CONSTANTS=9\n(.*?),", text)[1]
+    assert len(written) <= 20 and float(written) == pytest.approx(-1.00008e-108, rel=1e-5)
+
+
+def context(**changes):
+    step = {"pressure": 0.3, "first": 1.0, "least": 0.01}
+    plain = {
+        "title": "", "version": "", "mesh_file": "m", "material": "@M", "constants": [],
+        "state_variables": 6, "element": "S4", "thickness": 0.81, "supports": [],
+        "force_tolerance": 1e-7, "correction_tolerance": 1e-6, "time_incrementation": "",
+        "most_increments": 9, "steps": [step],
+    }  # fmt: skip
+    return {**plain, **changes}
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        ("** deck\n{{ thicknes }}\n", "line 2", "'thicknes' is undefined"),
+        ("{% for s in steps %}\n\n{{ s.presure }}\n{% endfor %}", "line 3", "presure"),
+        ("a\nb\n{% if %}", "line 3", "Expected an expression"),
+        ("{% include 'none.j2' %}", "include", "none.j2"),
+        ("x\n{{ thickness / 0 }}", "line 2", "division by zero"),
+        ("{{ ''.__class__.__mro__ }}", "line 1", "unsafe"),
+    ],
+)
+def test_a_template_error_names_template_line_and_variable(tmp_path, text, where, what):
+    (tmp_path / "bubble.inp.j2").write_text(text)
+    with pytest.raises(InputError) as found:
+        render("calculix", "bubble.inp.j2", context(), tmp_path)
+    message = str(found.value)
+    assert str(tmp_path / "bubble.inp.j2") in message
+    assert where in message and what in message
+    assert "\n" not in message
+
+
+def test_own_templates_can_build_on_ours(tmp_path):
+    (tmp_path / "other.inp.j2").write_text("")
+    with pytest.raises(InputError, match=r"holds no bubble\.inp\.j2"):
+        render("calculix", "bubble.inp.j2", context(), tmp_path)
+    (tmp_path / "bubble.inp.j2").write_text("** mine\n*INCLUDE, INPUT={{ mesh_file }}\n")
+    text = render("calculix", "bubble.inp.j2", context(), tmp_path)
+    assert text == "** mine\n*INCLUDE, INPUT=m\n"
+
+
+def test_registered_by_name():
+    solver = solver_named("calculix", element="S4")
+    assert isinstance(solver, Solver) and solver.external and solver.element == "S4"
+    with pytest.raises(InputError, match="S8R, S4"):
+        solver_named("calculix", element="S9")
+
+
+PROJECT = """
+[fabric]
+thickness = 0.81
+[law]
+form = "constant"
+[law.bounds]
+lower = [0.01, 0.1, 0.1]
+upper = [0.2, 1.0, 1.0]
+[[bubble]]
+radius = 100.0
+pressures = [22, 59]
+elements = 64
+symmetry = "quarter"
+[bubble.data.known_solution]
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+[fit]
+starts = 1
+tolerance = 1e-6
+[solver.calculix]
+element = "S4"
+"""
+
+
+def bubblefit(*arguments, cwd, code=0):
+    command = [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, done.stderr + done.stdout
+    return done
+
+
+def test_commands(ccx, tmp_path):
+    (tmp_path / "project.toml").write_text(PROJECT)
+    law = replace(LINEAR, strain_range=np.ones(3))
+    write_card(MaterialCard(law, 0.81, "test", "linear"), tmp_path / "card.toml")
+    arguments = ("project.toml", "--solver", "calculix")
+    bubblefit("simulate", "bubble", *arguments, "--card", "card.toml", "--out", "s", cwd=tmp_path)
+    result = json.loads((tmp_path / "s/result.json").read_text())
+    assert result["solver"] == "calculix"
+    bubblefit("bubble", *arguments, "--out", "f", "--quiet", cwd=tmp_path)
+    result = json.loads((tmp_path / "f/result.json").read_text())
+    assert result["solver"] == "calculix" and result["objective"] < 1e-4
+    # Finite differences on CalculiX itself, as the thesis has it.
+    project = PROJECT.replace("starts = 1", 'starts = 1\nmethod = "slsqp"\nmax_analyses = 6')
+    (tmp_path / "slsqp.toml").write_text(project)
+    bubblefit("bubble", "slsqp.toml", *arguments[1:], "--out", "g", "--quiet", cwd=tmp_path)
+    result = json.loads((tmp_path / "g/result.json").read_text())
+    assert result["method"] == "slsqp" and 5 <= result["external_runs"] <= 7
+
+
+def test_solver_options_are_checked(tmp_path):
+    (tmp_path / "project.toml").write_text(PROJECT)
+    done = bubblefit("bubble", "project.toml", "--element", "S4", cwd=tmp_path, code=2)
+    assert "--element: means nothing to the solver 'membrane'" in done.stderr
+    arguments = ("bubble", "project.toml", "--solver", "calculix")
+    done = bubblefit(*arguments, "--ccx", tmp_path / "none", cwd=tmp_path, code=2)
+    assert "there is no such file" in done.stderr and done.stderr.count("\n") == 1
+    done = bubblefit(*arguments, "--templates", "nowhere", cwd=tmp_path, code=2)
+    assert "nowhere: templates: there is no such folder" in done.stderr
+
+
+def test_a_pressure_offset_reaches_an_external_solver(ccx):
+    model = bubble(64, "quarter", (0.022, 0.059))
+    moved = model.with_pressure_offset(0.003)
+    np.testing.assert_allclose(moved.pressures, (0.025, 0.062))
+    found = CalculixSolver(element="S4").run(moved, LINEAR)
+    expected = MembraneSolver().run(model, LINEAR, pressure_offset=0.003)
+    np.testing.assert_allclose(found.load, expected.load)
+    apex = model.mesh.node_sets["apex"][0]
+    heights = found.displacement[:, apex, 2], expected.displacement[:, apex, 2]
+    np.testing.assert_allclose(*heights, rtol=2e-3)
+    with pytest.raises(InputError):
+        model.with_pressure_offset(-0.02)

@@ -1,0 +1,391 @@
+"""The inflated cylinder on CalculiX: solids, deck, and the tube's middle against closed forms."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.volume import enclosed_volume
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.models.bodies import RigidSupports
+from bubblefit.models.cylinder import CylinderModel
+from bubblefit.models.gas import Gas
+from bubblefit.solvers.calculix import cylinder
+from bubblefit.solvers.calculix.cylinder import cylinder_decks
+from bubblefit.solvers.calculix.cylinder_bending import bending_context, body_nodes
+from bubblefit.solvers.calculix.cylinder_gas import (
+    GasCurve,
+    better_pressure,
+    compliance,
+    gas_pressure,
+)
+from bubblefit.solvers.calculix.cylinder_results import (
+    BentCylinder,
+    bending_history,
+    bent_cylinder,
+    inflation_history,
+)
+from bubblefit.solvers.calculix.frd import FrdFile
+from bubblefit.solvers.calculix.law_file import law_files
+from bubblefit.solvers.calculix.library import material_library
+from bubblefit.solvers.calculix.reasons import increments
+from bubblefit.solvers.calculix.solids import solid_mesh
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from scipy.optimize import fsolve
+
+THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
+WARP, FILL, SHEAR = 400.0, 150.0, 30.0  # MPa
+LINEAR = HypoelasticLaw(np.array([0, 0, 0, SHEAR, 0, 0, 0, FILL, 0, 0, 0, WARP], float))
+
+OURS = Path(cylinder.__file__).parents[2] / "templates" / "calculix"
+#: What a template of our own asks for beside the results of each step.
+FABRIC = "*EL PRINT, ELSET=MEMBRANE, TOTALS=ONLY, FREQUENCY=1\nELSE\n"
+ENERGIES = {
+    "*NODE OUTPUT, DOUBLE, TIME POINTS=WHOLE": FABRIC.replace("FREQUENCY=1", "TIME POINTS=WHOLE"),
+    "*NODE OUTPUT, DOUBLE, FREQUENCY=1": FABRIC + "*CONTACT PRINT, FREQUENCY=1\nCELS\n",
+}
+
+
+def case(size: float = 25.0, seam: float = 0.0, length: float = 900.0) -> CylinderModel:
+    supports = RigidSupports(length / 1.5)
+    return inflated_cylinder(2 * RADIUS, PRESSURE, THICKNESS, size, length, seam, supports=supports)
+
+
+def closed_form(pressure: float) -> np.ndarray:
+    """Axial and hoop log strain of a long thin-walled tube with closed ends.
+
+    Hoop stress p r / t, axial p r / 2 t, with the radius r as inflated and t as at rest.
+    """
+    den = 1 - LINEAR.nu12**2 * FILL / WARP
+    d11, d22, d12 = WARP / den, FILL / den, LINEAR.nu12 * FILL / den
+
+    def unbalance(strain: np.ndarray) -> list[float]:
+        hoop = pressure * RADIUS * np.exp(strain[1]) / THICKNESS
+        return [
+            d11 * strain[0] + d12 * strain[1] - 0.5 * hoop,
+            d12 * strain[0] + d22 * strain[1] - hoop,
+        ]
+
+    return fsolve(unbalance, [0.01, 0.05], xtol=1e-12)
+
+
+def run(ccx, model: CylinderModel, folder: Path):
+    solids = solid_mesh(model)
+    files = cylinder_decks(model, LINEAR, solids) | law_files(LINEAR)
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    environment = os.environ | {
+        "LD_LIBRARY_PATH": str(material_library().parent),
+        "OMP_NUM_THREADS": "1",
+    }
+    done = subprocess.run(
+        [str(ccx.path), "-i", "job"], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    return inflation_history(folder / "job.frd", model, solids, 0)
+
+
+def test_the_middle_of_the_tube_has_the_closed_form(ccx, tmp_path):
+    model = case()
+    history = run(ccx, model, tmp_path)
+    side = model.mesh.node_sets["side_line"]
+    for frame, pressure in enumerate(model.inflation):
+        axial, hoop = closed_form(pressure)
+        at = model.mesh.points[side] + history.displacement[frame, side]
+        # 0.1 % is sixteen quads around; the gas meets the inside, half a thickness (0.5 %) in.
+        assert at[0, 0] == pytest.approx(RADIUS * np.exp(hoop), rel=1e-3)
+        grown = np.log((at[2, 2] - at[0, 2]) / model.mesh.points[side[2], 2])
+        assert grown == pytest.approx(axial, abs=3e-4)
+    assert (np.diff(history.cavity_volume) > 0).all()
+    np.testing.assert_array_equal(history.load, model.inflation)
+    # No seam: nothing bends it.
+    bottom = model.mesh.node_sets["bottom_line"]
+    assert np.ptp(history.displacement[-1, bottom, 1][:4]) < 0.2
+
+
+@pytest.mark.slow
+def test_the_tube_s_strain_converges_to_that_of_a_thin_wall(ccx, tmp_path):
+    model = case(12.0)
+    history = run(ccx, model, tmp_path)
+    at = RADIUS + history.displacement[-1, model.mesh.node_sets["side_line"][0], 0]
+    assert np.log(at / RADIUS) == pytest.approx(closed_form(PRESSURE)[1], rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("bending")
+
+
+@pytest.fixture(scope="module")
+def bent(ccx, scratch):
+    """To 8 mm in increments of 1 mm, with energies printed by a template of our own."""
+    own = scratch / "own"
+    own.mkdir()
+    text = (OURS / "cylinder.inp.j2").read_text()
+    for before, asked in ENERGIES.items():
+        assert text.count(before) == 1
+        text = text.replace(before, asked + before)
+    (own / "cylinder.inp.j2").write_text(text)
+    steps = np.arange(1.0, 9.0).tolist()
+    model = replace(case(30.0, 40.0), deflections=[3.0, 8.0], increments=steps)
+    solver = CalculixSolver(ccx=ccx.path, scratch=scratch, keep=True, templates=own)
+    return model, solver.run(model, LINEAR)
+
+
+def last_run(scratch: Path) -> Path:
+    return max(scratch.rglob("job.frd"), key=os.path.getmtime).parent
+
+
+def energies(dat: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Of the fabric and of contact, N mm of the quarter, at every increment of bending."""
+    found: dict[str, list[float]] = {"internal": [], "contact": []}
+    name = ""
+    for line in dat.read_text().splitlines():
+        words = line.split()
+        if line.startswith(" contact print energy"):
+            found[name := "contact"].append(0.0)
+        elif line.startswith(" total internal energy"):
+            found[name := "internal"].append(0.0)
+        elif words and name:
+            found[name][-1] += float(words[-1])
+    return np.array(found["internal"]), np.array(found["contact"])
+
+
+def test_work_of_collar_and_gas_is_energy_of_fabric_and_contact(bent, scratch):
+    model, history = bent
+    solids, folder = solid_mesh(model), last_run(scratch)
+    fabric, contact = energies(folder / "job.dat")
+    inside = solids.elements[solids.element_sets["inside"], :4]
+    collar = body_nodes(len(solids.points))[1]
+    way, force, volume, middle = [], [], [], []
+    for frame in FrdFile(folder / "job.frd").frames():
+        moved = frame.fields["DISP"]
+        if frame.step == 2:
+            position = solids.points + moved[: len(solids.points)]
+            way.append(-moved[collar, 1].mean())
+            force.append(-frame.fields["FORC"][collar, 1].sum())
+            volume.append(enclosed_volume(position, inside))
+            middle.append(4 * enclosed_volume(solids.middle(position), model.mesh.quads))
+    closed = model.gas.closed_in(model.pressure, history.cavity_volume[0])
+    gauge = np.array([closed.pressure(v) for v in middle])
+
+    def work(force, way) -> float:
+        """From the first increment, where the cylinder has come to lie on its supports."""
+        return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(way)))
+
+    fabric = fabric[len(model.inflation) :]
+    done = work(np.array(force), way)
+    gained = fabric[-1] - fabric[0] + contact[-1] - contact[0]
+    assert 4 * done > 500  # N mm
+    assert contact[-1] < 0.06 * done
+    assert gained - work(gauge, volume) == pytest.approx(done, rel=0.005)
+
+
+def test_collar_and_supports_balance(bent):
+    _, history = bent
+    assert history.load.shape == (3,)
+    assert history.load[0] == 0.0
+    assert 0 < history.load[1] < history.load[2]
+    total = history.reactions["collar"] + history.reactions["supports"]
+    # The tolerance of the run is 5e-3 of the mean force.
+    np.testing.assert_allclose(total, 0, atol=1e-3 * history.load[-1])
+
+
+def test_the_gas_keeps_its_mass(bent):
+    model, history = bent
+    absolute = history.cavity_pressure + model.gas.ambient
+    energy = absolute * history.cavity_volume
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-4)
+    assert history.cavity_pressure[-1] > model.pressure
+    assert any("gas: pass 2, p V constant within" in remark for remark in history.remarks)
+
+
+def test_the_crown_follows_the_collar(bent):
+    model, history = bent
+    top = history.displacement[:, model.mesh.node_sets["top_line"][0], 1]
+    # Pressed into the contact's springs, by a pressure over 5 MPa/mm.
+    np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.3)
+
+
+def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path):
+    model, history = bent
+    solids, results = solid_mesh(model), last_run(scratch) / "job.frd"
+    converged = {(i.step, i.increment) for i in increments(results.with_name("job.sta"))}
+    gas = GasCurve(np.array([0.0]), np.array([model.pressure]))
+    whole = bent_cylinder(results, model, solids, 0)
+    np.testing.assert_array_equal(bending_history(model, whole, gas).load, history.load)
+    assert whole.deflection[-1] == pytest.approx(8.0)
+    # Stopped: no end mark, and a frame of residuals that never converged.
+    cut = tmp_path / "job.frd"
+    data = results.read_bytes()
+    cut.write_bytes(data[: data.rindex(b" 9999")])
+    early = bent_cylinder(cut, model, solids, 0, converged - {max(converged)}, "it gave up")
+    assert 3.0 < early.deflection[-1] < 8.0
+    np.testing.assert_array_equal(early.volume, whole.volume[:-1])
+    reported = bending_history(model, early, gas)
+    np.testing.assert_array_equal(reported.load, history.load[:2])
+    assert "the run stopped early; the last increment is at" in reported.remarks[0]
+    assert reported.early == reported.remarks[0] and reported.early.endswith(": it gave up")
+    assert bending_history(model, whole, gas).early == ""
+    for path, given in ((cut, None), (cut, set()), (tmp_path / "none.frd", None)):
+        with pytest.raises(SolverFailure, match="no usable results"):
+            bent_cylinder(path, model, solids, 0, given)
+    # Cut anywhere it is an early end, too, or none.
+    for part in (0.3, 0.9, 0.99):
+        cut.write_bytes(data[: int(part * len(data))])
+        try:
+            found = bent_cylinder(cut, model, solids, 0, converged)
+        except SolverFailure:
+            continue
+        np.testing.assert_array_equal(found.volume, whole.volume[: len(found.volume)])
+    with pytest.raises(SolverFailure, match="before the first reported deflection"):
+        bending_history(replace(model, deflections=[9.0], increments=()), whole, gas)
+
+
+def test_frames_between_increments_lie_on_a_smooth_curve():
+    model = case(60.0)
+    x = np.array([0.0, 1.0, 2.2, 4.0, 5.0, 7.0, 9.0])
+    model = replace(model, deflections=[0.5, 3.0, 6.0], increments=())
+    force = np.stack([0 * x, -(3 * x - 0.1 * x**2), 0 * x], axis=1)
+    shape = x[:, None, None] * np.ones((1, len(model.mesh.points), 3))
+    bent = BentCylinder(x, shape, {"collar": force, "supports": -force}, 1e7 - x**2, 0, False)
+    gas = GasCurve(x, 0.14 + 1e-3 * x)
+    history = bending_history(model, bent, gas)
+    d = np.array([0.0, *model.deflections])
+    # Slopes of a parabola are exact inside, of first order at the ends.
+    np.testing.assert_allclose(history.load[2:], (3 * d - 0.1 * d**2)[2:], rtol=1e-12)
+    np.testing.assert_allclose(history.load, 3 * d - 0.1 * d**2, atol=0.02)
+    np.testing.assert_allclose(history.displacement[:, 0, 0], d, rtol=1e-12)
+    np.testing.assert_allclose(history.cavity_pressure, 0.14 + 1e-3 * d, rtol=1e-12)
+    np.testing.assert_array_equal(history.reactions["collar"], -history.reactions["supports"])
+
+
+def test_the_gas_settles_in_two_passes_on_a_compliant_volume():
+    """V(p) = V0 (1 + c (p - p0)) - V1(d): what CalculiX would find at a given pressure."""
+    volume, pressure, slope = 6e7, 0.14, 6e7
+    gas = Gas().closed_in(pressure, volume)
+    lost = np.array([0.0, 1e5, 4e5])
+    given = np.full(3, pressure)
+    gaps = []
+    for _ in range(2):
+        found = volume - lost + slope * (given - pressure) * (1 + 2 * (given - pressure))
+        gaps.append(np.abs(gas_pressure(gas, found) - given).max())
+        given = better_pressure(gas, found, given, slope)
+    assert gaps[0] > 1e-3
+    assert gaps[1] < 1e-5
+    p, filled = np.array([0.0, 0.1, 0.14]), np.array([1.0, 1.2, 1.28])
+    assert compliance(p, filled) == pytest.approx(2.0)
+    curved = np.array([0.0, 0.07, 0.14])
+    assert compliance(curved, 1 + curved**2) == pytest.approx(0.28)
+
+
+def test_bending_goes_in_increments_of_its_own():
+    model = replace(case(30.0, 40.0), deflections=[10.0, 40.0], increments=())
+    solids = solid_mesh(model)
+    flat = np.zeros_like(solids.points)
+    gas = GasCurve(np.array([0.0, 20.0, 40.0]), np.array([0.14, 0.141, 0.142]))
+    context = bending_context(model, solids, flat, gas)
+    deck = cylinder_decks(model, LINEAR, solids, context)["job.inp"]
+    step = deck[deck.index("** Step 2") :].splitlines()
+    # At rest through the first increment, then 0.5 mm down to the cylinder.
+    assert "1, 42, 0.0001, 5" in step
+    for line in ("0, 0", "1.5, 0", "42, 40.5", "2, 0.14", "22, 0.141", "42, 0.142"):
+        assert line in deck.splitlines()
+    assert "*NODE OUTPUT, DOUBLE, FREQUENCY=1" in step
+    assert not any("TIME POINTS" in line for line in step if line.startswith("*NODE"))
+    fine = replace(model, increments=np.arange(1.0, 41.0).tolist())
+    assert bending_context(fine, solids, flat)["longest"] == 1.0
+
+
+def test_a_whole_cylinder_is_not_bent():
+    with pytest.raises(InputError, match="mesh it as 'quarter'"):
+        model = inflated_cylinder(150.0, PRESSURE, THICKNESS, 60.0, symmetry="full")
+        solids = solid_mesh(model)
+        bending_context(model, solids, np.zeros_like(solids.points))
+
+
+# Solids
+
+
+def volumes(points: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Least of the Jacobians at the corners, as a sign that a solid is the right way out."""
+    corner = points[elements]
+    spokes = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
+    spokes += ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
+    at = [
+        np.einsum(
+            "mx,mx->m",
+            np.cross(corner[:, b] - corner[:, a], corner[:, c] - corner[:, a]),
+            corner[:, d] - corner[:, a],
+        )
+        for a, b, c, d in spokes
+    ]
+    return np.min(at, axis=0)
+
+
+@pytest.mark.parametrize("seam", [0.0, 40.0])
+def test_solids_have_the_sections_of_the_model(seam):
+    model = case(12.0, seam)
+    mesh, solids = model.mesh, solid_mesh(model)
+    assert (volumes(solids.points, solids.elements) > 0).all()
+    np.testing.assert_allclose(solids.middle(solids.points), mesh.points, atol=1e-9)
+    assert set(solids.elements.ravel()) == set(range(len(solids.points)))
+    owners = np.concatenate([solids.element_sets[n] for n in ("tube", "caps")])
+    np.testing.assert_array_equal(np.sort(owners), np.arange(len(solids.elements)))
+    # A quad's solids together are as thick as the model says.
+    inside = solids.elements[solids.element_sets["inside"], :4]
+    outside = solids.elements[solids.element_sets["outside"], 4:]
+    through = solids.points[outside].mean(axis=1) - solids.points[inside].mean(axis=1)
+    away = np.abs(mesh.points[mesh.quads][:, :, 2]).max(axis=1) < mesh.points[:, 2].max()
+    np.testing.assert_allclose(
+        np.linalg.norm(through, axis=1)[away], model.thickness[away], rtol=0.01
+    )
+    # What the gas meets has no step: its pressure is in balance.
+    rest = enclosed_volume(solids.points, inside)
+    shift = enclosed_volume(solids.points + np.array([0.0, 10.0, 0.0]), inside)
+    assert shift == pytest.approx(rest, rel=1e-12)
+    for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
+        on_plane = np.flatnonzero(solids.points[:, axis] == 0)
+        np.testing.assert_array_equal(solids.node_sets[name], on_plane)
+
+
+def test_sections_that_solids_cannot_have_are_refused():
+    model = case(25.0, 40.0)
+    for thickness in (
+        np.linspace(0.8, 0.9, len(model.thickness)),
+        np.full_like(model.thickness, 1),
+    ):
+        with pytest.raises(InputError) as caught:
+            solid_mesh(replace(model, thickness=thickness))
+        assert caught.value.field == "thickness"
+
+
+def test_the_deck_holds_what_the_model_says():
+    model = case(25.0, 40.0)
+    files = cylinder_decks(model, LINEAR, solid_mesh(model))
+    deck, mesh = files["job.inp"], files["mesh.inp"]
+    for line in (
+        "SYMMETRY_X, 1, 1",
+        "SYMMETRY_Z, 3, 3",
+        "SUPPORT_BOTTOM, 2, 2",
+        "INSIDE, P1, 1",
+        "10, 0.14",
+        "*SOLID SECTION, ELSET=TUBE, MATERIAL=@BUBBLEFIT_HYPOELASTIC@TUBE, ORIENTATION=AROUND",
+        "*SOLID SECTION, ELSET=CAPS, MATERIAL=@BUBBLEFIT_HYPOELASTIC@CAPS",
+    ):
+        assert line in deck.splitlines()
+    for name in ("TUBE", "CAPS", "INSIDE", "OUTSIDE"):
+        assert f"*ELSET, ELSET={name}" in mesh.splitlines()
+    assert "*NSET, NSET=SUPPORT_BOTTOM" in mesh.splitlines()
+
+
+def test_a_run_without_results_is_no_result(tmp_path):
+    model = case()
+    with pytest.raises(SolverFailure, match="no usable results"):
+        inflation_history(tmp_path / "job.frd", model, solid_mesh(model), 0)

@@ -1,0 +1,392 @@
+"""What can go wrong with an external program, each tried with a real or a fake one."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel
+from bubblefit.solvers import process, scratch
+from bubblefit.solvers.calculix import solver as module
+from bubblefit.solvers.calculix.law_file import law_number
+from bubblefit.solvers.calculix.reasons import collapsed, increments
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.process import Outcome
+
+LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
+STA = """SUMMARY OF JOB INFORMATION
+  STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME
+     1          1     1U   12  0.000000E+00  0.000000E+00  0.100000E+01
+     1          1     2    10  0.300000E-02  0.300000E-02  0.300000E-02
+     1          2     1     5  0.600000E-02  0.600000E-02  0.300000E-02
+"""
+
+
+def model():
+    return BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.81, (0.01, 0.03))
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """Makes a solver of a shell script, which runs in the scratch folder with $2 = job."""
+    monkeypatch.setattr(module, "material_library", lambda: tmp_path / "libBUBBLEFIT.so")
+
+    def make(script, **options):
+        path = tmp_path / "ccx"
+        path.write_text(f'#!/bin/sh\n[ "$1" = -v ] && echo "Version 9.9" && exit\n{script}\n')
+        path.chmod(0o755)
+        (tmp_path / "scratch").mkdir(exist_ok=True)
+        return CalculixSolver(ccx=path, element="S4", scratch=tmp_path / "scratch", **options)
+
+    return make
+
+
+def failure(solver, **options):
+    with pytest.raises(SolverFailure) as found:
+        solver.run(model(), LAW, **options)
+    assert found.value.scratch.is_dir()
+    assert (found.value.scratch / "job.inp").exists()
+    return found.value
+
+
+def gone(pid, seconds=5.0):
+    """Whether a process ends soon (a zombie has ended)."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        except OSError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_no_such_program(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        CalculixSolver(ccx=tmp_path / "none").run(model(), LAW)
+
+
+def test_a_program_of_another_machine(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "material_library", lambda: tmp_path / "libBUBBLEFIT.so")
+    (tmp_path / "ccx").write_bytes(b"\x00\x01\x02 no program")
+    (tmp_path / "ccx").chmod(0o755)
+    solver = CalculixSolver(ccx=tmp_path / "ccx", scratch=tmp_path / "s")
+    with pytest.raises(InputError, match=r"ccx.*cannot be started: Exec format error"):
+        solver.run(model(), LAW)
+    assert not list((tmp_path / "s").iterdir())
+
+
+def test_a_program_that_is_not_calculix(fake):
+    found = failure(fake('echo "usage: convert IN OUT"; exit 0'))
+    assert "is this CalculiX?" in found.reason
+    assert "usage: convert IN OUT" in found.log_tail and found.exit_number == 0
+
+
+def test_a_ccx_without_material_libraries():
+    with pytest.raises(SolverFailure, match="cannot load material libraries"):
+        CalculixSolver(ccx="/bin/true").run(model(), LAW)
+
+
+def test_its_own_error_message_is_the_reason(fake):
+    text = " *ERROR reading *STEP: something is\\n        wrong here\\n"
+    found = failure(fake(f"printf '{text}'; for i in $(seq 30); do echo line $i; done; exit 201"))
+    assert found.reason == "reading *STEP: something is wrong here (at once)"
+    assert found.exit_number == 201
+    assert len(found.log_tail.splitlines()) == 25 and "line 30" in str(found)
+
+
+def test_killed_in_the_middle(fake):
+    found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\nkill -9 $$"))
+    assert found.reason == "killed by SIGKILL after step 1, increment 2"
+
+
+def test_negative_jacobian(fake):
+    text = "*ERROR in e_c3d: nonpositive jacobian\\n         determinant in element          17\\n"
+    assert failure(fake(f"printf '{text}'; exit 201")).reason.startswith(
+        "negative Jacobian in element 17"
+    )
+
+
+def test_too_many_increments_is_no_convergence(fake):
+    text = " *ERROR in nonlingeo: max. # of increments reached"
+    found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\necho '{text}'; exit 201"))
+    assert "did not converge at step 1, increment 3" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("said", "exit_code", "timed_out", "early"),
+    [
+        (" *ERROR: increment size smaller than minimum", 201, False, True),
+        (" *ERROR: too many cutbacks", 201, False, True),
+        (" *ERROR: too many cutbacks", -9, False, False),
+        (" *ERROR: too many cutbacks", -9, True, False),
+        (" *ERROR in e_c3d: nonpositive jacobian", 201, False, False),
+        (" *ERROR: No space left on device\n too many cutbacks", 201, False, False),
+        (" *ERROR in nonlingeo: max. # of increments reached", 201, False, False),
+        ("", 0, False, False),
+    ],
+)
+def test_only_its_own_word_makes_an_early_end(tmp_path, said, exit_code, timed_out, early):
+    (tmp_path / "job.log").write_text(f"{said}\n")
+    assert collapsed(tmp_path, "job", Outcome(exit_code, timed_out, 1.0)) == early
+
+
+def test_a_hanging_program_is_killed_with_its_children(fake, tmp_path):
+    pids = tmp_path / "pids"
+    solver = fake(f"sleep 1000 & echo $! $$ > {pids}; wait", timeout=1.0)
+    found = failure(solver)
+    assert found.reason == "did not end within 1 s: killed at once"
+    assert all(gone(pid) for pid in pids.read_text().split())
+
+
+def test_a_child_left_behind_does_not_go_on_writing(fake, tmp_path):
+    pid = tmp_path / "pid"
+    failure(fake(f"sleep 1000 & echo $! > {pid}; exit 1"))
+    assert gone(pid.read_text().strip())
+
+
+def test_garbage_and_nothing_are_no_results(fake):
+    assert "job.frd: cannot be read" in failure(fake("echo Job finished")).reason
+    garbage = "head -c 5000 /dev/urandom > job.frd; echo Job finished"
+    assert "not a CalculiX result file" in failure(fake(garbage)).reason
+
+
+@pytest.fixture(scope="module")
+def results(ccx, tmp_path_factory):
+    """Folder of a real run that ended well."""
+    folder = tmp_path_factory.mktemp("real")
+    CalculixSolver(element="S4", scratch=folder, keep=True).run(model(), LAW)
+    (kept,) = folder.iterdir()
+    return kept
+
+
+def test_a_whole_result_is_taken_and_parts_are_not(fake, results):
+    give = f"cp {results}/job.frd . ; echo Job finished"
+    assert fake(give).run(model(), LAW).displacement.shape[0] == 2
+    size = (results / "job.frd").stat().st_size
+    for part in (size // 3, size // 2, size - 3):
+        cut = f"head -c {part} {results}/job.frd > job.frd; echo Job finished"
+        assert "truncated" in failure(fake(cut)).reason
+    # A file that ends well, one step early.
+    first = (results / "job.frd").read_bytes()
+    place = first.index(b"    1PSTEP", first.rindex(b"    1PSTEP") - 12000)
+    places = [found.start() for found in re.finditer(b"    1PSTEP", first)]
+    assert place in places and len(places) == 4  # displacement and force, two steps
+    (results / "early.frd").write_bytes(first[: places[2]] + b" 9999\n")
+    early = f"cp {results}/early.frd job.frd; echo Job finished"
+    assert "step 2 of 2" in failure(fake(early)).reason
+
+
+def test_nothing_stale_is_read(fake, results, tmp_path):
+    """A good run, then one that writes nothing: in every place where the first left something."""
+    kept = fake(f"cp {results}/job.frd . ; echo Job finished", keep=True)
+    kept.run(model(), LAW)
+    first = {p.name for p in (tmp_path / "scratch").iterdir()}
+    assert len(first) == 1
+    second = failure(fake("ls > seen; echo Job finished"))
+    assert second.scratch.name not in first
+    assert set((second.scratch / "seen").read_text().split()) == {
+        "job.inp", "job.log", "mesh.inp", "seen", f"bubblefit-{law_number(LAW)}.law",
+    }  # fmt: skip
+
+
+def test_scratch_is_removed_after_success_and_interruption(fake, results, tmp_path):
+    fake(f"cp {results}/job.frd . ; echo Job finished").run(model(), LAW)
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fake(f"cat > job.sta <<'.'\n{STA}.\nsleep 1000", progress=stop).run(model(), LAW)
+    assert not list((tmp_path / "scratch").iterdir())
+
+
+def test_progress_is_told_while_it_runs(fake, results):
+    told = []
+    script = f"cat > job.sta <<'.'\n{STA}.\nsleep 0.4; cp {results}/job.frd . ; echo Job finished"
+    fake(script, progress=told.append).run(model(), LAW)
+    assert [(i.step, i.increment, i.iterations, i.time) for i in told] == [
+        (1, 1, 10, 0.003),
+        (1, 2, 5, 0.006),
+    ]
+
+
+def test_half_a_line_of_progress_waits(tmp_path):
+    (tmp_path / "job.sta").write_text(STA[:-40])
+    assert [i.increment for i in increments(tmp_path / "job.sta")] == [1]
+    assert increments(tmp_path / "none.sta") == []
+
+
+def test_a_full_disk(ccx, fake, monkeypatch):
+    """Files may be 4 kB at most: what a full disk does, without one."""
+    solver = fake(f'ulimit -f 8; exec {ccx.path} "$@"')
+    monkeypatch.undo()  # the real library
+    found = failure(solver)
+    assert "disk full" in found.reason or "truncated" in found.reason
+
+
+def test_a_full_file_system(ccx, tmp_path):
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("a small file system can only be mounted by root")
+    try:
+        with pytest.raises(
+            (SolverFailure, OutputError), match=r"No space left|disk full|truncated"
+        ):
+            CalculixSolver(element="S4", scratch=place).run(model(), LAW)
+    finally:
+        subprocess.run(["umount", place], check=True)
+
+
+def test_a_law_that_cannot_converge(ccx, tmp_path):
+    """The warp modulus falls to nothing at 1 % strain: no increment is small enough."""
+    beta = LAW.beta.copy()
+    beta[10:12] = -8e4, 800.0
+    with pytest.raises(SolverFailure) as found:
+        CalculixSolver(element="S4", scratch=tmp_path).run(model(), HypoelasticLaw(beta))
+    assert "did not converge at" in found.value.reason
+    assert found.value.exit_number == 201 and found.value.scratch.parent == tmp_path
+
+
+def test_failed_runs_leave_memory(monkeypatch, tmp_path):
+    monkeypatch.setattr(scratch, "MEMORY", tmp_path / "shm")
+    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))
+    (tmp_path / "shm").mkdir()
+    (tmp_path / "disk").mkdir()
+    assert scratch.default_parent() == tmp_path / "shm"
+    folder = scratch.fresh_folder("ccx")
+    (folder / "job.inp").write_text("deck")
+    kept = scratch.put_aside(folder)
+    assert kept.parent == tmp_path / "disk" and (kept / "job.inp").read_text() == "deck"
+    assert not folder.exists()
+    elsewhere = scratch.fresh_folder("ccx", tmp_path)
+    assert scratch.put_aside(elsewhere) == elsewhere
+    monkeypatch.setattr(scratch, "ROOM", 1 << 60)
+    assert scratch.default_parent() == tmp_path / "disk"
+    with pytest.raises(OutputError, match="no scratch folder"):
+        scratch.fresh_folder("ccx", Path("/proc/none"))
+
+
+def test_a_solver_does_not_outlive_us(tmp_path):
+    code = (
+        "import sys, pathlib; from bubblefit.solvers.process import run_process\n"
+        "here = pathlib.Path(sys.argv[1])\n"
+        "run_process(['sh', '-c', 'echo $$ > pid; exec sleep 1000'], here, here / 'log')\n"
+    )
+    ours = subprocess.Popen([sys.executable, "-c", code, tmp_path])
+    while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
+        time.sleep(0.02)
+    ours.kill()
+    ours.wait()
+    assert gone((tmp_path / "pid").read_text().strip())
+
+
+def test_the_log_may_be_anything(tmp_path):
+    (tmp_path / "log").write_bytes(b"\xff\xfe\n" * 40 + b"x" * 100_000)
+    assert len(process.log_tail(tmp_path / "log").splitlines()) <= 25
+    assert process.log_tail(tmp_path / "none") == ""
+
+
+PROJECT = """
+[fabric]
+thickness = 0.81
+[law]
+form = "constant"
+[law.bounds]
+lower = [0.03, 0.3, 0.3]
+upper = [0.2, 1.0, 1.0]
+[[bubble]]
+radius = 100.0
+pressures = [22, 59]
+elements = 32
+symmetry = "quarter"
+[bubble.data.known_solution]
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+[fit]
+tolerance = 1e-4
+solver = "calculix"
+[solver.calculix]
+element = "S4"
+scratch = "scratch"
+ccx = "./ccx"
+"""
+
+
+def study(folder, script):
+    (folder / "project.toml").write_text(PROJECT)
+    (folder / "ccx").write_text(f'#!/bin/sh\n[ "$1" = -v ] && exec true\n{script}\n')
+    (folder / "ccx").chmod(0o755)
+    return [sys.executable, "-m", "bubblefit.cli", "bubble", "project.toml", "--out", "out"]
+
+
+def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
+    """Run 1 makes the data; run 2, the first of the first start, is killed."""
+    script = f"echo x >> {tmp_path}/runs; [ $(wc -l < {tmp_path}/runs) = 2 ] && kill -9 $$\n"
+    command = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", "1"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    with (tmp_path / "out" / "history.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["solver"] == "calculix"]
+    assert "killed by SIGKILL" in rows[0]["status"]
+    assert all(row["status"] == "ok" for row in rows[1:]) and len(rows) > 2
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["objective"] < 1e-3
+    (kept,) = (tmp_path / "scratch").iterdir()
+    assert (kept / "job.inp").exists()
+
+
+@pytest.mark.parametrize("moment", ["mkdtemp", "rmtree"])
+def test_no_moment_of_an_interruption_leaves_a_folder(tmp_path, monkeypatch, moment):
+    """The signal comes while the folder is made (held off), or while it is removed (finished)."""
+    place = scratch.tempfile if moment == "mkdtemp" else scratch.shutil
+    really, came = getattr(place, moment), []
+
+    def interrupted(*args, **options):
+        done = really(*args, **options) if moment == "mkdtemp" else None
+        if not came:
+            came.append(1)
+            os.kill(os.getpid(), signal.SIGINT)
+        return done if moment == "mkdtemp" else really(*args, **options)
+
+    monkeypatch.setattr(place, moment, interrupted)
+    with (
+        pytest.raises(KeyboardInterrupt),
+        scratch.run_folder("ccx", tmp_path, False, "calculix", "job.log") as folder,
+    ):
+        (folder / "job.inp").write_text("*NODE")
+    scratch.remove_interrupted()
+    assert came and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interruption_ends_calculix(ccx, tmp_path, jobs):
+    script = (
+        f"echo $$ >> {tmp_path}/pids; [ $(wc -l < {tmp_path}/pids) -gt 2 ] && exec sleep 1000\n"
+    )
+    command = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", jobs]
+    ours = subprocess.Popen(
+        list(map(str, command)), cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    end = time.monotonic() + 120
+    pids = tmp_path / "pids"
+    while not pids.exists() or len(pids.read_text().split()) < 3:
+        assert time.monotonic() < end and ours.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.3)
+    ours.send_signal(signal.SIGINT)
+    _, said = ours.communicate(timeout=60)
+    assert ours.returncode == 130 and "--resume" in said
+    assert all(gone(pid) for pid in pids.read_text().split())
+    assert not list((tmp_path / "scratch").iterdir())

@@ -1,0 +1,239 @@
+"""The cylinder on Marc: cavity, contact, load cases; forces, volume and pressure of the results."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.volume import enclosed_volume
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.solvers.marc.bodies import ABOVE, BELOW, contact_bodies
+from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
+from bubblefit.solvers.marc.cylinder_results import may_touch
+from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.solver import MarcSolver
+
+from ...marc_files import sts_text, t19_text
+from ...solvers.marc.test_marc_deck import (
+    blocks_of,
+    conditions,
+    integers,
+    loadcases,
+    parameter,
+    reals,
+    table,
+)
+
+LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
+ROUNDING = 5.1e-6
+
+
+@pytest.fixture(scope="module")
+def model():
+    return inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0, 60.0, 100.0])
+
+
+@pytest.fixture(scope="module")
+def grown(model):
+    """The inflated cylinder: 5 % wider."""
+    return model.mesh.points * [0.05, 0.05, 0.0]
+
+
+def test_inflation_needs_no_contact_and_no_cavity(model):
+    deck = inflation_deck(model, LAW, MarcSettings())
+    for word in ("cavity", "contact"):
+        assert not blocks_of(deck, word)
+    assert set(loadcases(deck)[-1]) == {"fix_symmetry_x", "fix_symmetry_z", "hold", "pressure"}
+    assert conditions(deck)["hold"] == ([2], [0.0], [0], "support_bottom")
+    # Shells do not turn about the axes in their plane of symmetry.
+    assert conditions(deck)["fix_symmetry_z"][0] == [3, 4, 5]
+    np.testing.assert_allclose(table(deck, "load")[2][:, 1], [0, *model.inflation])
+    (step,) = blocks_of(deck, "auto load")
+    assert integers(step[0])[0] == 100
+
+
+def test_bending_is_a_cavity_that_is_filled_and_closed(model, grown):
+    deck = bending_deck(model, LAW, MarcSettings(increments=0), grown)
+    start, inflation, approach, bending = map(set, loadcases(deck))
+    guides = {"fix_symmetry_x", "fix_symmetry_z"}
+    assert start == guides | {"hold"}
+    assert inflation == guides | {"hold", "fill"}
+    assert approach == guides | {"hold", "closed"}
+    assert bending == guides | {"closed"}
+    counts = [integers(data[0])[0] for data in blocks_of(deck, "auto load")]
+    assert counts == [len(model.inflation), 1, 3]
+    assert parameter(deck, "cavity") == [1]
+    (gas,) = [data for data in blocks_of(deck, "cavity") if data[0].strip() == "1"]
+    assert reals(gas[2]) == pytest.approx([0.101, 300.0, 1.2041e-12])
+    (load,) = blocks_of(deck, "cavity load")
+    assert [load[1][60:], load[3][60:]] == ["fill", "closed"]
+    assert integers(load[2][20:]) == [1, 1, 1] and integers(load[4][20:]) == [0, 2, 1]
+    assert not blocks_of(deck, "dist loads")
+
+
+def test_paths_of_the_bodies(model, grown):
+    deck = bending_deck(model, LAW, MarcSettings(), grown)
+    filled, last = len(model.inflation), len(model.inflation) + 1 + 3
+    _, _, support = table(deck, "support_path")
+    _, _, collar = table(deck, "collar_path")
+    _, _, load = table(deck, "load")
+    for points in (support, collar, load):
+        np.testing.assert_array_equal(points[:, 0], range(last + 1))
+    assert (support[: filled + 1, 1] == -BELOW).all() and (support[filled + 1 :, 1] == 0).all()
+    assert (collar[: filled + 2, 1] == 0).all()
+    np.testing.assert_allclose(collar[filled + 2 :, 1], [-(ABOVE + d) for d in (20, 60, 100)])
+    assert (load[filled:, 1] == model.pressure).all()
+
+
+def test_patches_face_the_fabric(model, grown):
+    deck = bending_deck(model, LAW, MarcSettings(), grown)
+    (data,) = blocks_of(deck, "contact")
+    assert integers(data[0])[0] == 3
+    assert data[2][30:].strip() == "cylinder" and data[3] == "fabric"
+    at = 4
+    for number, name, sign in ((2, "support", 1), (3, "collar", -1)):
+        body, kind, count = integers(data[at][:30])
+        assert (body, kind, data[at][30:].strip()) == (number, 1, name)
+        assert integers(data[at + 1][:10]) == [number]
+        assert reals(data[at + 1][10:]) == [0, 1, 0]
+        rows = [reals(line) for line in data[at + 2 : at + 2 + 2 * count]]
+        patches = np.reshape(rows, (count, 4, 3))
+        normal = np.cross(patches[:, 1] - patches[:, 0], patches[:, 3] - patches[:, 0])
+        # The support looks up, the inside of the collar down.
+        level = np.abs(normal[:, 1]) > 0.9 * np.linalg.norm(normal, axis=1)
+        assert level.any() and (sign * normal[level, 1] > 0).all()
+        at += 2 + 2 * count
+    assert data[at].startswith("loadcase")
+
+
+def test_bodies_are_where_they_touch(model, grown):
+    support, collar = contact_bodies(model, grown)
+    crown = 105.0
+    points = np.reshape(support["patches"], (-1, 3))
+    assert points[:, 1].max() == pytest.approx(-crown + 0.02, abs=0.3)
+    points = np.reshape(collar["patches"], (-1, 3))
+    # Its mouth is rounded.
+    assert points[points[:, 2] < 60, 1].max() == pytest.approx(crown + ABOVE, abs=0.3)
+
+
+def test_a_whole_cylinder_is_refused(grown):
+    whole = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0], symmetry="full")
+    with pytest.raises(InputError, match="quarter"):
+        bending_deck(whole, LAW, MarcSettings(), np.zeros_like(whole.mesh.points))
+
+
+def test_seam_and_caps_have_their_own(model):
+    deck = inflation_deck(model, LAW, MarcSettings())
+    (data,) = blocks_of(deck, "geometry")
+    thickness = {data[4 * i + 4]: reals(data[4 * i + 3])[0] for i in range(2)}
+    assert sorted(thickness.values()) == pytest.approx([0.81, 2.43])
+
+
+# Results
+
+
+def frames_of(model, grown, name="Contact Normal Force", last=3):
+    """Inflated, then squeezed by the collar: forces and times as Marc would report them."""
+    filled, points = len(model.inflation), model.mesh.points
+    zero = np.zeros_like(points)
+    frames = [(0.0, {"Displacement": zero, name: zero})]
+    for i in range(filled):
+        frames.append((i + 1.0, {"Displacement": grown * (i + 1) / filled, name: zero}))
+    frames.append((filled + 1.0, {"Displacement": grown, name: zero}))
+    touch, loads = may_touch(model), []
+    for i in range(last):
+        forces = zero.copy()
+        forces[touch["collar"][:3], 1] = -(i + 1.0)
+        forces[touch["supports"][:2], 1] = 1.5 * (i + 1.0)
+        forces[touch["collar"][0], 0] = 7.0
+        u = grown - 0.01 * (i + 1) * points * [1, 1, 0]
+        frames.append((filled + 2.0 + i, {"Displacement": u, name: forces}))
+        loads.append(4 * 3 * (i + 1.0))
+    return frames, loads
+
+
+@pytest.fixture
+def marc(tmp_path, monkeypatch, model, grown):
+    """Makes a Marc that answers inflation and bending with the frames given."""
+    monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
+
+    def make(frames, number=3004, ended=True):
+        for name, given in (("inflation", frames[: len(model.inflation) + 1]), ("bending", frames)):
+            folder = tmp_path / name
+            folder.mkdir()
+            times = [time for time, _ in given[1:]]
+            whole = ended or name == "inflation"
+            text = t19_text(model.mesh.points, model.mesh.quads, given, ended=whole)
+            (folder / "job.t19").write_text(text)
+            exit_number = number if name == "bending" else 3004
+            (folder / "job.sts").write_text(sts_text(times, exit_number))
+        path = tmp_path / "run_marc"
+        path.write_text(
+            f"#!/bin/sh\nif grep -q '^contact' job.dat; then cp {tmp_path}/bending/* .\n"
+            f"else cp {tmp_path}/inflation/* .; fi\n"
+        )
+        path.chmod(0o755)
+        return MarcSolver(marc=path, scratch=str(tmp_path / "scratch"))
+
+    return make
+
+
+@pytest.mark.parametrize("name", ["Contact Normal Force", "Reaction Force"])
+def test_forces_volume_and_pressure(marc, model, grown, name):
+    frames, loads = frames_of(model, grown, name)
+    history = marc(frames).run(model, LAW)
+    np.testing.assert_allclose(history.load, [0, *loads], rtol=ROUNDING)
+    np.testing.assert_allclose(history.reactions["supports"][:, 1], [0, *loads], rtol=ROUNDING)
+    assert (history.reactions["collar"][:, [0, 2]] == 0).all()
+    kept = [fields["Displacement"] for time, fields in frames if time in (10.0, 12.0, 13.0, 14.0)]
+    np.testing.assert_allclose(history.displacement, kept, rtol=2 * ROUNDING, atol=1e-9)
+    volume = [4 * enclosed_volume(model.mesh.points + u, model.mesh.quads) for u in kept]
+    np.testing.assert_allclose(history.cavity_volume, volume, rtol=1e-5)
+    absolute = history.cavity_pressure + 0.101
+    np.testing.assert_allclose(absolute * history.cavity_volume, 0.201 * volume[0], rtol=1e-5)
+    assert history.cavity_pressure[0] == pytest.approx(0.1)
+    assert any("not confirmed" in words for words in history.remarks)
+    assert not any("balance" in words for words in history.remarks)
+
+
+def test_forces_that_do_not_balance_are_remarked(marc, model, grown):
+    frames, _ = frames_of(model, grown)
+    frames[-1][1]["Contact Normal Force"][may_touch(model)["supports"]] = 0.0
+    history = marc(frames).run(model, LAW)
+    assert any("do not balance" in words for words in history.remarks)
+
+
+def test_a_collapse_is_reported_up_to_there(marc, model, grown):
+    frames, loads = frames_of(model, grown, last=2)
+    history = marc(frames, 3015, ended=False).run(model, LAW)
+    np.testing.assert_allclose(history.load, [0, *loads], rtol=ROUNDING)
+    assert any("last increment is at 60 mm" in words for words in history.remarks)
+    assert any("time step could not get smaller" in words for words in history.remarks)
+
+
+def test_a_collapse_before_bending_is_a_failure(marc, model, grown):
+    frames, _ = frames_of(model, grown, last=0)
+    with pytest.raises(SolverFailure, match="time step could not get smaller") as found:
+        marc(frames, 3015).run(model, LAW)
+    assert found.value.exit_number == 3015
+
+
+def test_a_frame_that_is_missing_is_a_failure(marc, model, grown):
+    frames, _ = frames_of(model, grown)
+    del frames[-2]
+    with pytest.raises(SolverFailure, match="holds 3 of 4 frames"):
+        marc(frames).run(model, LAW)
+
+
+def test_without_forces_it_says_what_to_ask_for(marc, model, grown):
+    frames, _ = frames_of(model, grown, "Something Else")
+    with pytest.raises(SolverFailure, match="Reaction Force"):
+        marc(frames).run(model, LAW)
+
+
+def test_what_may_touch_is_apart(model):
+    touch = may_touch(model)
+    assert len(touch["collar"]) and len(touch["supports"])
+    assert not np.intersect1d(touch["collar"], touch["supports"]).size
+    assert (model.mesh.points[touch["collar"], 2] < 133).all()

@@ -1,0 +1,288 @@
+"""HYPELA2, compiled and called as Marc would, against the Python law point by point."""
+
+import ctypes
+
+import numpy as np
+import pytest
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.exports.formats import NoOptions
+from bubblefit.materials.exports.marc_hypela2 import hypela2, hypela2_source
+from bubblefit.materials.law import HypoelasticLaw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ...fortran_build import (
+    LAWS,
+    SIZES,
+    address,
+    build,
+    close,
+    increments_everywhere,
+    reals,
+    strain_path,
+)
+
+# What Marc has: a way to end the job.
+QUIT = """
+      subroutine quit(number)
+      integer number, last
+      common /asked/ last
+      last = number
+      end
+"""
+COUNTS = {"membrane": (3, 1), "thick shell": (5, 3)}  # ngens, nshear
+
+
+class Point:
+    """One integration point of an element, as Marc calls it."""
+
+    def __init__(self, library, element="membrane", integer=np.int32, number=1, own_state=True):
+        self.function, self.integer, self.number = library.hypela2_, integer, number
+        self.own_state = own_state
+        self.asked = (ctypes.c_int64 if integer is np.int64 else ctypes.c_int32).in_dll(
+            library, "asked_"
+        )
+        self.asked.value = 0
+        self.ngens, self.nshear = COUNTS[element]
+        self.ndi = 2
+        self.states = reals(20.0, *np.zeros(3 + self.ngens))
+        self.strain, self.stress = np.zeros(self.ngens), np.zeros(self.ngens)
+
+    def call(self, increment):
+        """Stress, D and state at the end; the arguments that are not for shells are NaN."""
+        n = self.ngens
+        d, g = np.full((n, n), 77.0, order="F"), np.full(n, 77.0)
+        # What lies behind an array is somebody else's.
+        s, t = np.append(self.stress, [77.0] * 9), np.append(self.states, [77.0] * 9)
+        # With own states the subroutine must not look at what Marc says of e and s.
+        e = np.full(n, np.nan) if self.own_state else self.strain
+        if self.own_state:
+            s[:n] = np.nan
+        else:
+            t[1:-9] = np.nan
+        nothing, de = np.full(99, np.nan), reals(*increment)
+        empty = address(nothing)
+        whole = [np.array(v, dtype=self.integer) for v in (
+            n, [3, 3], 2, [1, 1], [self.number, 1], self.ndi, self.nshear,
+            3, 3, 6, 2, 4, 75, [1, 1], 0, 0,
+        )]  # fmt: skip
+        (ngens, m, nn, kcus, matus, ndi, nshear, ncrd, itel, ndeg, ndm, nnode, jtype, lclass,
+         ifr, ifu) = map(address, whole)  # fmt: skip
+        self.function(
+            address(d), address(g), address(e), address(de), address(s), address(t), empty,
+            ngens, m, nn, kcus, matus, ndi, nshear, empty, empty, empty, empty, empty, empty,
+            empty, empty, empty, empty, empty, ncrd, itel, ndeg, ndm, nnode, jtype, lclass,
+            ifr, ifu,
+        )  # fmt: skip
+        assert (s[n:] == 77.0).all() and (t[-9:] == 77.0).all()
+        return s[:n], d, g, t[:-9]
+
+    def commit(self, increment):
+        s, d, _, t = self.call(increment)
+        self.stress, self.states = s, t
+        self.strain = self.strain + increment
+        return s, d
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory):
+    """Each law's library, compiled when it is asked for."""
+    folder, made = tmp_path_factory.mktemp("hypela2"), {}
+
+    def library(name, form="-ffixed-form", **options):
+        key = (name, form, *sorted(options.items()))
+        if key not in made:
+            source = hypela2_source({1: LAWS[name]}, **options)
+            made[key] = build(folder / str(len(made)), source, form, beside=QUIT)
+        return made[key]
+
+    return library
+
+
+def expected(law, old, new, stress):
+    """Cauchy stress, what Marc is given of it, and D: with the thickness that Marc keeps."""
+    after, tangent = law.increment(old, new, stress)
+    after, tangent = after[0], tangent[0]
+    thin = np.exp((law.area_power - 1) * (new[0] + new[1]))
+    tangent[:, :2] += (law.area_power - 1) * after[:, None]
+    return after, thin * after, thin * tangent
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("own_state", [True, False])
+def test_random_paths_give_stress_and_stiffness_of_the_python_law(libraries, name, own_state):
+    law, library = LAWS[name], libraries(name, own_state=own_state)
+    held = passed = 0
+    for seed in range(20):
+        point = Point(library, own_state=own_state)
+        old, stress = np.zeros(3), np.zeros(3)
+        for new in strain_path(seed):
+            s, d = point.commit(new - old)
+            stress, wanted, tangent = expected(law, old, new, stress)
+            close(s, wanted)
+            close(d, 0.5 * (tangent + tangent.T))
+            if own_state:
+                close(point.states[1:4], new)
+                close(point.states[4:7], stress)
+            held += (np.abs(new) > law.strain_range).any()
+            passed += (new[:2] < 0).any()
+            old = new
+        assert point.asked.value == 0 and point.states[0] == 20.0
+    # Otherwise the comparison would say nothing of what is outside the range.
+    assert passed > 10
+    assert held > 10 or "held" not in name
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("size", SIZES)
+def test_increments_of_any_size_from_anywhere(libraries, name, size):
+    """At the ends of pieces, below zero, beyond the range; far below the rounding of a strain."""
+    law, stress = LAWS[name], reals(3.0, -1.0, 0.5)
+    for old, new in increments_everywhere(law, size):
+        point = Point(libraries(name, own_state=True))
+        point.states[1:] = *old, *stress
+        s, d, _, _ = point.call(new - old)
+        _, wanted, tangent = expected(law, old, new, stress)
+        if np.isfinite(wanted).all():
+            close(s, wanted)
+            close(d, 0.5 * (tangent + tangent.T))
+        else:
+            assert point.asked.value == 4001
+
+
+coordinates = st.floats(-0.05, 0.16)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(coordinates, coordinates, st.floats(-0.2, 0.2)), min_size=1, max_size=6))
+def test_any_path_of_the_published_material(libraries, path):
+    law, point = LAWS["cubic"], Point(libraries("cubic", own_state=True))
+    old, stress = np.zeros(3), np.zeros(3)
+    for new in map(np.array, path):
+        stress, _, tangent = expected(law, old, new, stress)
+        s, d = point.commit(new - old)
+        np.testing.assert_allclose(s, stress, rtol=1e-11, atol=1e-9)
+        # At zero and at the end of the range the tangent jumps; rounding decides on which side.
+        middle = np.abs(0.5 * (old + new))
+        smooth = ~((middle < 1e-9) | (np.abs(middle - law.strain_range) < 1e-9))
+        both = np.ix_(smooth, smooth)
+        symmetric = 0.5 * (tangent + tangent.T)
+        np.testing.assert_allclose(d[both], symmetric[both], rtol=1e-10, atol=1e-8)
+        old = new
+
+
+@pytest.mark.parametrize("name", ["cubic", "incompressible", "tri-linear", "spline"])
+def test_the_full_tangent_is_the_derivative_of_the_stress(libraries, name):
+    point = Point(libraries(name, symmetric=False))
+    first, second = strain_path(3, 2)
+    point.commit(first)
+    increment = second - first
+    _, d, _, _ = point.call(increment)
+    slope, step = np.empty((3, 3)), 1e-6
+    for j in range(3):
+        change = step * np.eye(3)[j]
+        slope[:, j] = (point.call(increment + change)[0] - point.call(increment - change)[0]) / (
+            2 * step
+        )
+    close(d, slope, 1e-7)
+
+
+def test_a_call_changes_nothing_that_the_next_one_needs(libraries):
+    """Marc calls at every recycle with the state at the start of the increment."""
+    point = Point(libraries("cubic"))
+    point.commit(reals(0.02, 0.01, -0.03))
+    first, _, _, state = point.call(reals(0.01, 0.0, 0.02))
+    point.call(reals(0.05, 0.02, -0.02))
+    again, _, _, same = point.call(reals(0.01, 0.0, 0.02))
+    assert np.array_equal(first, again) and np.array_equal(state, same)
+
+
+def test_thick_shells_have_linear_transverse_shear(libraries):
+    law, plane = LAWS["cubic"], Point(libraries("cubic"))
+    point = Point(libraries("cubic"), "thick shell")
+    for increment in np.diff(strain_path(1), axis=0, prepend=0):
+        s, d = point.commit(reals(*increment, 0.001, -0.002))
+        flat, stiffness = plane.commit(increment)
+        assert np.array_equal(s[:3], flat) and np.array_equal(d[:3, :3], stiffness)
+        assert not d[3:, :3].any() and not d[:3, 3:].any()
+        close(d[3:, 3:], law.G12(0.0) * np.eye(2))
+    close(s[3:], law.G12(0.0) * 9 * reals(0.001, -0.002))
+    assert not point.call(np.zeros(5))[2].any()
+
+
+def test_free_form_is_the_same_subroutine(libraries):
+    fixed = Point(libraries("tri-linear"))
+    free = Point(libraries("tri-linear", "-ffree-form"))
+    for increment in np.diff(strain_path(5), axis=0, prepend=0):
+        for one, other in zip(fixed.commit(increment), free.commit(increment), strict=True):
+            assert np.array_equal(one, other)
+
+
+def test_wide_integers(tmp_path):
+    """Marc compiles with 8-byte integers where its own are."""
+    law = LAWS["cubic"]
+    source = hypela2_source({1: law})
+    library = build(tmp_path, source, "-ffixed-form", "-fdefault-integer-8", beside=QUIT)
+    point = Point(library, integer=np.int64)
+    s, _ = point.commit(reals(0.02, 0.01, 0.03))
+    close(s, law.increment(np.zeros(3), [0.02, 0.01, 0.03], np.zeros(3))[0][0])
+    assert point.asked.value == 0
+
+
+def test_materials_by_their_number(tmp_path):
+    source = hypela2_source({3: LAWS["cubic"], 7: LAWS["tri-linear"]})
+    library = build(tmp_path, source, "-ffixed-form", beside=QUIT)
+    for number, name in ((3, "cubic"), (7, "tri-linear")):
+        s, _ = Point(library, number=number).commit(reals(0.02, 0.01, 0.03))
+        close(s, LAWS[name].increment(np.zeros(3), [0.02, 0.01, 0.03], np.zeros(3))[0][0])
+    stranger = Point(library, number=4)
+    s, *_ = stranger.call(reals(0.02, 0.01, 0.03))
+    assert stranger.asked.value == 4003 and np.isnan(s).all()
+
+
+def test_what_the_law_cannot_be_asked_ends_the_job(tmp_path, libraries):
+    solid = Point(libraries("cubic"))
+    solid.ndi = 3
+    solid.call(np.zeros(3))
+    assert solid.asked.value == 4002
+    # E1 is gone at 5 % strain.
+    gone = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
+    source = hypela2_source({1: gone})
+    assert "No stresses to check against" in source
+    library = build(tmp_path, source, "-ffixed-form", beside=QUIT)
+    point = Point(library)
+    point.commit(reals(0.04, 0.0, 0.0))
+    assert point.asked.value == 0
+    point.call(reals(0.04, 0.0, 0.0))
+    assert point.asked.value == 4001
+    point = Point(library)
+    point.call(reals(np.nan, 0.0, 0.0))
+    assert point.asked.value == 4001
+
+
+@pytest.mark.parametrize("name", ["cubic", "incompressible"])
+def test_the_check_in_the_heading_is_what_the_subroutine_answers(tmp_path, name):
+    """A bar as in the heading, its width found by Newton with the D that Marc would be given."""
+    text = hypela2(MaterialCard(LAWS[name], 0.5, "Valmex"), NoOptions()).files[".f"]
+    library = build(tmp_path, text, "-ffixed-form", beside=QUIT)
+    point = Point(library)
+    old, across = 0.0, 0.0
+    for end in np.log1p(0.1 * np.arange(1, 101) / 100):
+        width = 0.0
+        for _ in range(30):
+            s, d, _, _ = point.call(reals(end - old, width, 0.0))
+            width -= s[1] / d[1, 1]
+        s, _ = point.commit(reals(end - old, width, 0.0))
+        old, across = end, across + width
+    assert abs(s[1]) < 1e-9 and across < 0
+    assert f"must be {s[0]:.4f} MPa" in text
+    s, _ = Point(library).commit(reals(0.0, 0.0, 0.01))
+    assert f"tau12 = {s[2]:.6f} MPa" in text
+
+
+def test_every_line_fits_fixed_form():
+    text = hypela2(MaterialCard(LAWS["tri-linear"], 0.5, "n" * 200, "s" * 300), NoOptions())
+    for line in text.files[".f"].splitlines():
+        # Column 73 marks what the next line continues in free form; fixed form does not see it.
+        assert len(line) <= 72 or (line[72:] == "&" and line[:6].strip() in ("", "&")), line
+        assert line.isascii()

@@ -1,0 +1,394 @@
+"""Runs of Marc, each with a small program in its place: what ends well, and all that does not."""
+
+from __future__ import annotations
+
+import pickle
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel
+from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.solvers.bars import BARS, TOLERANCE
+from bubblefit.solvers.marc import proof
+from bubblefit.solvers.marc.solver import MarcSolver
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.strains import log_strain
+
+from ...marc_files import sts_text, t19_text
+from ...solvers.calculix.test_calculix_faults import gone
+
+LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
+#: Six digits of the .t19: half a unit in the last of them.
+ROUNDING = 5.1e-6
+
+
+def model():
+    return BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.81, (0.01, 0.03))
+
+
+@pytest.fixture
+def machine(tmp_path, monkeypatch):
+    """A machine without a Marc of its own."""
+    monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
+    return tmp_path
+
+
+@pytest.fixture
+def fake(machine):
+    """Makes a solver of a shell script, which runs in the scratch folder."""
+
+    def make(script, **options):
+        path = machine / "run_marc"
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+        (machine / "scratch").mkdir(exist_ok=True)
+        return MarcSolver(marc=path, scratch=str(machine / "scratch"), **options)
+
+    return make
+
+
+def files(folder, given, history, reactions=None, number=3004, times=None):
+    """What Marc leaves of a run that ended as `history` (of the embedded solver) says."""
+    folder.mkdir(exist_ok=True)
+    u = history.path
+    forces = np.zeros_like(u) if reactions is None else reactions
+    zero = np.zeros_like(u[0])
+    frames = [(0.0, {"Displacement": zero, "Reaction Force": zero})]
+    frames += [
+        (float(i + 1), {"Displacement": u[i], "Reaction Force": forces[i]}) for i in range(len(u))
+    ]
+    (folder / "job.t19").write_text(t19_text(given.mesh.points, given.mesh.quads, frames))
+    (folder / "job.sts").write_text(
+        sts_text(times or [float(i + 1) for i in range(len(u))], number)
+    )
+    (folder / "job.out").write_text("marc\n")
+    return folder
+
+
+@pytest.fixture
+def good(machine):
+    """Files of a bubble that ended well, and the embedded solver's own history of it."""
+    history = MembraneSolver().run(model(), LAW)
+    return files(machine / "good", model(), history), history
+
+
+def failure(solver, given=None, **options):
+    with pytest.raises(SolverFailure) as found:
+        solver.run(given or model(), LAW, **options)
+    assert found.value.solver == "marc"
+    assert (found.value.scratch / "job.dat").exists()
+    return found.value
+
+
+# What ends well
+
+
+def test_a_bubble_comes_back_to_six_digits(fake, good):
+    folder, expected = good
+    solver = fake(f'echo "$@" > {folder}/words; cp {folder}/job.* .; exit 1')
+    history = solver.run(model(), LAW)
+    np.testing.assert_allclose(history.load, expected.load)
+    np.testing.assert_allclose(history.displacement, expected.displacement, rtol=ROUNDING)
+    np.testing.assert_allclose(history.strain_max, expected.strain_max, rtol=1e-4, atol=1e-8)
+    assert history.iterations == 6 and set(history.reactions) >= {"rim"}
+    assert not list((folder.parent / "scratch").iterdir()), "a good run left something"
+    words = (folder / "words").read_text().split()
+    assert words == ["-j", "job", "-v", "no", "-b", "no", "-nte", "1", "-nts", "1"]
+
+
+def test_support_forces_are_sums_over_their_sets(machine, fake):
+    given, history = model(), MembraneSolver().run(model(), LAW)
+    forces = np.random.default_rng(1).normal(size=history.path.shape)
+    folder = files(machine / "good", given, history, forces)
+    found = fake(f"cp {folder}/job.* .").run(given, LAW)
+    for name in ("rim", "symmetry_x"):
+        expected = forces[given.reported][:, given.mesh.node_sets[name]].sum(axis=1)
+        np.testing.assert_allclose(found.reactions[name], expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("direction", ["warp", "fill"])
+def test_the_load_of_a_strip_is_what_its_end_is_pulled_with(machine, fake, direction):
+    given = straight_strip(direction, 50, 60, 0.81, increments=5)
+    expected = MembraneSolver().run(given, LAW)
+    forces = np.zeros_like(expected.path)
+    for name, total in expected.reactions.items():
+        nodes = given.mesh.node_sets[name]
+        forces[:, nodes] += (total / len(nodes))[:, None, :] if name == "bottom" else 0.0
+    folder = files(machine / "good", given, expected, forces)
+    found = fake(f"cp {folder}/job.* .").run(given, LAW)
+    np.testing.assert_allclose(found.load, expected.load, rtol=2 * ROUNDING)
+    np.testing.assert_allclose(found.displacement, expected.displacement, rtol=ROUNDING, atol=1e-12)
+    strain = log_strain(given.mesh, expected.path, given.warp)
+    np.testing.assert_allclose(found.strain_max, strain.max(axis=(0, 1, 2)).clip(0), atol=1e-6)
+
+
+def test_grips_beyond_the_gauge_are_interpolated(machine, fake, monkeypatch):
+    given = bias_strip(40.0, 46.0, 0.81, increments=8, across=4, along=12)
+    expected = MembraneSolver().run(given, LAW)
+    u = np.concatenate([expected.path, 1.02 * expected.path[-1:]])
+    forces = np.zeros_like(u)
+    forces[:, given.mesh.node_sets["bottom"][0], 1] = -np.append(
+        expected.load, 1.02 * expected.load[-1]
+    )
+    folder = files(machine / "good", given, expected)
+    frames = [
+        (float(i + 1), {"Displacement": u[i], "Reaction Force": forces[i]}) for i in range(len(u))
+    ]
+    (folder / "job.t19").write_text(t19_text(given.mesh.points, given.mesh.quads, frames))
+    (folder / "job.sts").write_text(sts_text([float(i + 1) for i in range(len(u))]))
+    found = fake(f"cp {folder}/job.* .").run(given, LAW)
+    assert found.load == pytest.approx(expected.load, rel=2 * ROUNDING)
+    gauge = found.displacement[:, given.mesh.node_sets["gauge"]]
+    opened = np.linalg.norm(
+        np.diff(given.mesh.points[given.mesh.node_sets["gauge"]] + gauge, axis=1)[:, 0], axis=1
+    )
+    np.testing.assert_allclose(opened - 40.0, given.elongations, atol=1e-4)
+
+
+def test_progress_is_told_once_an_increment(fake, good):
+    folder, _ = good
+    solver = fake(f"head -7 {folder}/job.sts > job.sts; sleep 0.4; cp {folder}/job.* .; sleep 0.3")
+    told = []
+    solver.progress = told.append
+    solver.run(model(), LAW)
+    assert [(i.increment, i.time) for i in told] == [(1, 1.0), (2, 2.0)]
+
+
+def test_repeated_increments_are_remarked(machine, fake):
+    history = MembraneSolver().run(model(), LAW)
+    folder = files(machine / "good", model(), history)
+    (folder / "job.sts").write_text(sts_text([1.0, 1.5, 2.0], increments=[1, 2, 2]))
+    found = fake(f"cp {folder}/job.* .").run(model(), LAW)
+    assert any("1 increments were repeated" in words for words in found.remarks)
+
+
+def test_a_run_is_kept_when_asked(fake, good):
+    folder, _ = good
+    fake(f"cp {folder}/job.* .", keep=True).run(model(), LAW)
+    (kept,) = (folder.parent / "scratch").iterdir()
+    assert (kept / "job.dat").exists() and (kept / "job.t19").exists()
+
+
+def test_the_subroutine_goes_along(fake, good):
+    folder, _ = good
+    solver = fake(f'echo "$@" > {folder}/words; cp hypela2.f {folder}; cp {folder}/job.* .',
+                  law="hypela2", options="older", processors=2, threads=3,
+                  arguments=["-q", "long"], environment={"MARC_X": "1"})  # fmt: skip
+    solver.run(model(), LAW)
+    assert "subroutine hypela2" in (folder / "hypela2.f").read_text()
+    words = (folder / "words").read_text()
+    assert words.split() == (
+        "-jid job -v no -b no -nprocd 2 -nthread 3 -u hypela2.f -q long".split()
+    )
+
+
+def test_environment_and_modules_come_before_marc(machine, good, monkeypatch):
+    folder, _ = good
+    # `module` of this machine: it puts a folder on the PATH.
+    home = machine / "home"
+    home.mkdir()
+    (home / ".bash_profile").write_text(
+        f'module() {{ [ "$2" = marc/2023 ] && export PATH="{machine}/bin:$PATH"; }}\n'
+    )
+    (machine / "bin" / "run_marc").write_text(
+        f'#!/bin/sh\necho "$SITE $@" > {folder}/words\ncp {folder}/job.* .\n'
+    )
+    (machine / "bin" / "run_marc").chmod(0o755)
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    monkeypatch.setenv("HOME", str(home))
+    solver = MarcSolver(modules=["marc/2023"], environment={"SITE": "here"})
+    assert solver.check().available
+    solver.run(model(), LAW)
+    with pytest.raises(SolverFailure, match="modules other give no run_marc"):
+        MarcSolver(modules=["other"]).run(model(), LAW)
+    assert (folder / "words").read_text().startswith("here -j job")
+
+
+# What does not
+
+
+def test_3015_is_told_with_marcs_own_words(fake):
+    solver = fake(
+        """cat > job.sts <<'EOF'
+     1       1     3    0    0      3    0    0    0 1.00000E+00 1.00000E+00 -1.0E-03 2.0E-01
+ Job ends with exit number :    3015
+EOF
+echo '  *** error - time step below minimum in   loadcase inflation' > job.out"""
+    )
+    error = failure(solver)
+    assert error.exit_number == 3015
+    assert "time step could not get smaller" in error.reason and "after increment 1" in error.reason
+    assert error.log_tail == "*** error - time step below minimum in loadcase inflation"
+
+
+def test_other_numbers_are_reported_as_they_are(fake):
+    error = failure(fake("echo ' Job ends with exit number :  13' > job.sts; exit 0"))
+    assert error.exit_number == 13 and "did not end well" in error.reason
+
+
+def test_a_subroutine_that_does_not_compile(fake):
+    error = failure(fake("echo 'Exit number 3'; exit 3", law="hypela2"))
+    assert error.exit_number == 3 and "compile or link" in error.reason
+
+
+def test_3004_is_not_enough(machine, fake, good):
+    folder, history = good
+    (folder / "job.sts").write_text(sts_text([0.5, 1.0]))
+    error = failure(fake(f"cp {folder}/job.* ."))
+    assert "ended at time 1 of 2" in error.reason and error.exit_number == 3004
+    files(folder, model(), history)
+    (folder / "job.out").write_text(" *** warning - element inside out at element    17\n")
+    assert "inside out (element 17)" in failure(fake(f"cp {folder}/job.* .")).reason
+
+
+def test_no_licence(fake):
+    error = failure(fake("echo 'License checkout failed: all licenses are in use'"))
+    assert "no licence: License checkout failed" in error.reason
+
+
+def test_a_licence_is_waited_for(fake, good):
+    folder, _ = good
+    script = f"""echo x >> {folder}/tries
+[ $(wc -l < {folder}/tries) -lt 3 ] && echo 'ERROR: license not available' && exit 1
+cp {folder}/job.* ."""
+    solver = fake(script, licence_wait=20.0, licence_retry=0.05)
+    solver.run(model(), LAW)
+    assert (folder / "tries").read_text().count("x") == 3
+    assert not list((folder.parent / "scratch").iterdir())
+    (folder / "tries").unlink()
+    solver = fake(script, licence_wait=0.12, licence_retry=0.1)
+    failure(solver)
+    # Only the last try is kept.
+    assert len(list((folder.parent / "scratch").iterdir())) == 1
+
+
+def test_talk_of_licences_in_a_good_run_is_no_failure(fake, good):
+    folder, _ = good
+    fake(f"echo 'license error, retried'; cp {folder}/job.* .").run(model(), LAW)
+
+
+def test_a_job_that_hangs_is_ended_with_all_it_started(machine, fake):
+    solver = fake(f"sleep 300 & echo $! > {machine}/pid; wait")
+    begun = time.monotonic()
+    error = failure(solver, timeout=0.5)
+    assert "did not end within 0.5 s" in error.reason and time.monotonic() - begun < 20
+    assert gone(int((machine / "pid").read_text()))
+
+
+def test_killed(fake):
+    assert "killed by SIGKILL" in failure(fake("kill -9 $$")).reason
+
+
+def test_what_is_no_marc(fake):
+    error = failure(fake("echo hello; exit 7"))
+    assert "wrote no job.sts" in error.reason and "returned 7" in error.reason
+    assert "hello" in error.log_tail
+    error = failure(fake("echo half > job.sts"))
+    assert "said no exit number" in error.reason
+
+
+def test_an_older_marc_says_its_number_elsewhere(fake, good):
+    folder, _ = good
+    text = (folder / "job.sts").read_text().replace("exit number", "number")
+    (folder / "job.sts").write_text(text)
+    fake(f"cp {folder}/job.* .; echo 'Exit number 3004' > job.log").run(model(), LAW)
+
+
+@pytest.mark.parametrize(
+    ("damage", "match"),
+    [
+        ("rm job.t19", "cannot be read"),
+        ("head -c 3000 {0}/job.t19 > job.t19", "truncated"),
+        ("echo garbage > job.t19", "not a formatted post file"),
+        ("sed 's/^Displacement/Velocity    /' {0}/job.t19 > job.t19", "time 1 of 2: holds no Disp"),
+        ("sed 's/ 0.200000E+01/ 0.150000E+01/' {0}/job.t19 > job.t19", "time 2 of 2"),
+    ],
+)
+def test_results_that_cannot_be_used(fake, good, damage, match):
+    folder, _ = good
+    error = failure(fake(f"cp {folder}/job.* .; {damage.format(folder)}"))
+    assert "no usable results" in error.reason
+    assert re.search(match, error.reason)
+
+
+def test_results_of_another_job_are_not_taken(machine, fake):
+    """Left by an earlier job in a place that a careless script copies from."""
+    other = BubbleModel(disk_mesh(120.0, 32, "quarter"), 0.81, (0.01, 0.03))
+    folder = files(machine / "other", other, MembraneSolver().run(other, LAW))
+    assert "of another job" in failure(fake(f"cp {folder}/job.* .")).reason
+    finer = BubbleModel(disk_mesh(100.0, 108, "quarter"), 0.81, (0.01, 0.03))
+    folder = files(machine / "finer", finer, MembraneSolver().run(finer, LAW))
+    assert "are not the deck's" in failure(fake(f"cp {folder}/job.* .")).reason
+
+
+def test_a_run_begins_in_an_empty_folder(fake, good):
+    folder, _ = good
+    solver = fake(f'[ "$(ls)" = "job.dat\nscreen.txt" ] && cp {folder}/job.* .')
+    solver.run(model(), LAW)
+    solver.run(model(), LAW)
+
+
+def test_a_strip_without_reactions_says_what_to_ask_for(machine, fake):
+    given = straight_strip("warp", 50, 60, 0.81, increments=2)
+    folder = files(machine / "good", given, MembraneSolver().run(given, LAW))
+    error = failure(fake(f"sed 's/^Reaction/Anything/' {folder}/job.t19 > job.t19; "
+                         f"cp {folder}/job.sts ."), given)  # fmt: skip
+    assert "Reaction Force" in error.reason and "post" in error.reason
+
+
+def test_no_marc_at_all(machine):
+    solver = MarcSolver()
+    with pytest.raises(SolverFailure, match="no run_marc on the PATH"):
+        solver.run(model(), LAW)
+    found = solver.check()
+    assert not found.available and "docs/how-to/marc.md" in found.advice
+
+
+@pytest.mark.parametrize("mode", [None, 0o644])
+def test_a_marc_that_cannot_be_run(machine, mode):
+    path = machine / "marc"
+    if mode is not None:
+        path.write_text("#!/bin/sh\n")
+        path.chmod(mode)
+    with pytest.raises(InputError, match=r"no such file|not executable"):
+        MarcSolver(marc=path).run(model(), LAW)
+
+
+def test_a_failure_crosses_process_borders(fake):
+    error = failure(fake("exit 1"))
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error) and again.scratch == error.scratch
+
+
+# The bars
+
+
+class Embedded(MarcSolver):
+    """The membrane in Marc's place, to the digits of a .t19."""
+
+    def run(self, model, law, scratch=None, timeout=None):
+        return MembraneSolver().run(model, law)
+
+
+def test_bars_that_carry_the_law_pass(machine):
+    stresses = proof.prove(Embedded())
+    np.testing.assert_allclose(stresses, [bar.stress for bar in BARS], rtol=TOLERANCE)
+
+
+def test_bars_of_another_law_do_not(machine, monkeypatch):
+    monkeypatch.setattr(proof, "bar_law", lambda _: LAW)
+    with pytest.raises(SolverFailure, match="does not carry the law"):
+        proof.prove(Embedded())
+
+
+def test_the_path_of_the_scratch_folder_is_said(fake):
+    error = failure(fake("exit 1"))
+    assert str(Path(error.scratch)) in str(error)

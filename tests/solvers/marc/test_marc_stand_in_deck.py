@@ -1,0 +1,257 @@
+"""The stand-in for Marc refuses decks that Marc would refuse, and takes every deck of ours."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.materials.exports.marc_hypela2 import hypela2_source
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.models.bubble import BubbleModel
+from bubblefit.models.uniaxial import straight_strip
+from bubblefit.solvers.marc.bubble import bubble_deck
+from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
+from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.strip import strip_deck
+
+from ...fortran_build import LAWS
+from ...marc_stand_in.bodies import collar_of, first_touch, support_of
+from ...marc_stand_in.fields import DeckError
+from ...marc_stand_in.hypela2 import compiled, law_of_subroutine
+from ...marc_stand_in.law import law_of_tables
+from ...marc_stand_in.reading import read_deck
+
+LINEAR = HypoelasticLaw.linear(800.0, 400.0, 60.0)
+SETTINGS = MarcSettings(increments=0)
+CYLINDER = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0, 40.0])
+
+
+def bubble(settings=SETTINGS, law=LINEAR):
+    return bubble_deck(
+        BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.81, (0.01, 0.03)), law, settings
+    )
+
+
+def strip(settings=SETTINGS, law=LINEAR):
+    model = straight_strip("fill", 50, 60, 0.81, increments=5)
+    return strip_deck(model, law, settings, np.array(model.elongations))
+
+
+def bending(settings=SETTINGS, law=LINEAR):
+    grown = CYLINDER.mesh.points * [0.05, 0.05, 0.0]
+    return bending_deck(CYLINDER, law, settings, grown)
+
+
+DECKS = {"bubble": bubble(), "strip": strip(), "bending": bending()}
+
+
+def read(folder: Path, text: str):
+    path = folder / "job.dat"
+    path.write_text(text)
+    return read_deck(path)
+
+
+@pytest.mark.parametrize("element", [139, 75, 18])
+@pytest.mark.parametrize("law", ["nlelast", "hypela2"])
+@pytest.mark.parametrize("deck", [bubble, strip, bending])
+def test_every_deck_of_ours_is_taken(tmp_path, deck, law, element):
+    content = read(tmp_path, deck(MarcSettings(element=element, law=law)))
+    assert content.parameters.type == element
+    assert sum(case.increments for case in content.cases) >= 100
+
+
+def test_inflation_alone_is_taken(tmp_path):
+    content = read(tmp_path, inflation_deck(CYLINDER, LINEAR, SETTINGS))
+    assert len(content.connectivity) == len(CYLINDER.mesh.quads) and not content.bodies
+
+
+def test_what_is_read_is_the_model(tmp_path):
+    content = read(tmp_path, DECKS["bending"])
+    np.testing.assert_allclose(content.coordinates, CYLINDER.mesh.points, atol=1e-9)
+    np.testing.assert_array_equal(content.connectivity - 1, CYLINDER.mesh.quads)
+    for name in ("symmetry_x", "symmetry_z", "support_bottom"):
+        np.testing.assert_array_equal(content.node_sets[name] - 1, CYLINDER.mesh.node_sets[name])
+    warp = np.zeros_like(CYLINDER.mesh.warp)
+    for name, along, _ in content.frames:
+        warp[content.element_sets[name] - 1] = along
+    np.testing.assert_allclose(warp, CYLINDER.mesh.warp, atol=1e-11)
+    assert content.gas == pytest.approx((0.101, 300.0, 1.2041e-12))
+
+
+@pytest.mark.parametrize(("diameter", "size"), [(150.0, 60.0), (200.0, 80.0), (250.0, 50.0)])
+def test_the_collar_touches_after_half_a_millimetre(tmp_path, diameter, size):
+    model = inflated_cylinder(diameter, 0.08, 0.81, size, deflections=[20.0])
+    grown = model.mesh.points * [0.04, 0.05, 0.0]
+    content = read(tmp_path, bending_deck(model, LINEAR, SETTINGS, grown))
+    support, collar = content.bodies[1:]
+    assert first_touch(collar, content.coordinates + grown) == pytest.approx(0.5, abs=1e-9)
+    assert content.tables[collar.table].y[-1] == pytest.approx(-20.5)
+    assert collar_of(collar).radius == pytest.approx(0.5 * model.collar.inner_diameter)
+    assert support_of(support).radius == pytest.approx(0.5 * model.supports.diameter)
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_the_law_is_found_in_tables_and_in_the_subroutine(tmp_path, name):
+    law = LAWS[name]
+    content = read(tmp_path, bubble(MarcSettings(law="hypela2"), law))
+    source = tmp_path / "hypela2.f"
+    source.write_text(hypela2_source({1: law}))
+    found = [law_of_subroutine(compiled(source, tmp_path), content.parameters.states)]
+    if law.thickness_change == "constant":
+        found.append(law_of_tables(read(tmp_path, bubble(law=law))))
+    ends = np.minimum(law.strain_range, 0.3)
+    for other in found:
+        assert other.thickness_change == law.thickness_change
+        assert other.nu12 == pytest.approx(law.nu12, rel=1e-10)
+        for i, modulus in enumerate(("E1", "E2", "G12")):
+            # Away from the breaks of a tri-linear law, where a table jumps over 1e-6.
+            strain = np.linspace(-0.05, 1.5 * ends[i], 173)
+            if law.strain_range[i] > 0.3:
+                strain = strain[strain < 0.3]
+            wanted = law.modulus(modulus, strain)
+            np.testing.assert_allclose(other.modulus(modulus, strain), wanted, rtol=1e-8)
+
+
+def first(pattern: str, text: str, new: str) -> str:
+    """`text` with the first match of `pattern` replaced by what `new` says."""
+    changed, count = re.subn(pattern, new, text, count=1, flags=re.MULTILINE)
+    assert count == 1 and changed != text, pattern
+    return changed
+
+
+SPOILED = {
+    # Columns
+    "an integer moved": (
+        "bubble", r"^         1       139", "        1        139", "columns 1 to"),
+    "an integer across two fields": (
+        "bubble", r"^         1       139         1", "         1       13 9         1", "columns"),
+    "a real moved": ("bubble", r"^(         1)  0\.000", r"\1 0.000", "columns|ends in column"),
+    "a real without a point": (
+        "bubble", r"^  8\.100000000000E-01", "       8100000000000", "is not a real"),
+    "a field too many": ("bubble", r"^(         3 .*)$", r"\1         7", "beyond column"),
+    "a tab": ("bubble", r"^         1       139", "\t1       139", "a tab"),
+    "a long line": ("bubble", r"^title .*$", "title               " + 150 * "x", "160 at most"),
+    "not ASCII": ("bubble", r"^title .*$", "title               Größe", "not ASCII"),
+    "parameters in other columns": (
+        "bubble", r"^alloc                       25", "alloc                  25", "fewer|columns"),
+    # Counts
+    "an element less": ("bubble", r"^         8       139 .*\n", "", "ends after 7 of 8"),
+    "an element more": (
+        "bubble", r"^(         8       139.*\n)", r"\1\1", "unknown model option"),
+    "another count of elements": ("bubble", r"         0         8(        \d\d)",
+                                  r"         0         9\1", "ends after 8 of 9"),
+    "another count of nodes": (
+        "bubble", r"^(coordinates\n         3        )\d\d", r"\g<1>99", "field 2 is 99"),
+    "a node less": ("bubble", r"^(        \d\d  .*\n)(\$?define|define)", r"\2", "ends after"),
+    "a point of a table less": (
+        "bubble", r"^  2\.000000000000E\+00  3.*\n(?=\$ unc)", "", "ends after 2 of 3"),
+    "a condition less": ("bubble", r"^(loadcase            inflation\n         )4", r"\g<1>3",
+                         "unknown history option"),
+    "no increments": ("bubble", r"^(auto load\n         )2", r"\g<1>0", "no increments"),
+    # Nodes, elements, sets
+    "a node outside": ("bubble", r"^(         2       139.{10}.{10}.{10}).{10}$", r"\1        99",
+                       "node 99, which does not exist"),
+    "a node twice": ("bubble", r"^(         1       139         1)(.{10})(.{10})",
+                     r"\1\2\2", "a node twice"),
+    "elements out of order": ("bubble", r"^         2       139", "         3       139",
+                              "element 3, expected 2"),
+    "another type": ("bubble", r"^         2       139", "         2        75", "is of type 75"),
+    "a type that is none": ("bubble", r"(elements            .{7})139", r"\g<1>138", "is none of"),
+    "a set twice": ("bubble", r"^(define .*symmetry_)y", r"\1x", "is defined twice"),
+    "a set with strangers": ("bubble", r"^(define +node +set +rim\n).*\n", "\\1        99\n",
+                             "node 99, which does not exist"),
+    "a set that goes on": ("bubble", r"^(define +node +set +rim\n.*)\n", "\\1 c\n", "no member"),
+    "a set without members": ("bubble", r"^(define +node +set +rim\n).*\n", "\\1\n", "members"),
+    "a run backwards": ("bubble", r"^(define +element .*\n) +1 to 8", r"\1         8 to 1",
+                        "not a run"),
+    "supports on an unknown set": ("bubble", r"^(         2\n)rim\n", "\\1rom\n",
+                                   "no node set 'rom'"),
+    "pressure on an unknown set": ("bubble", r"^(         1\n)fabric\n", "\\1fabrik\n",
+                                   "no element set 'fabrik'"),
+    "a name in capitals": ("bubble", r"^(define +node +set +)rim", r"\1Rim", "is not a name"),
+    "an element without thickness": ("bending", r"^(geometry\n(?:.*\n)+?)layer_2\n", "\\1layer_1\n",
+                                     "has its thickness"),
+    "an element inside out": (
+        "bubble", r"^(         4       139)(.{10})(.{10})(.{10})(.{10})", r"\1\2\4\3\5",
+        "element 4 is inside out"),
+    # Law, tables
+    "a table that goes back": ("bubble", r"^(         1         3 .*\n.*\n  )1\.0", r"\g<1>-1.0",
+                               "does not increase|not a real"),
+    "a table number twice": ("bubble", r"^(        1)2(         1         0)", r"\g<1>1\2",
+                             "defined twice"),
+    "an unknown table": ("bubble", r"^(        11        12         0        )13", r"\g<1>14",
+                         "there is no table 14"),
+    "a table of time for the law": (
+        "bubble", r"^        11(        12         0        13)", r"         1\1",
+        "table 1 is not of variable type 73"),
+    "another condition of the law": ("bubble", r"^nlelast", "nlelastic", "unknown model option"),
+    "a frame that is none": ("bubble", r"(3d aniso  .{20}  )1\.0", r"\g<1>9.0", "unit vectors"),
+    "a left-handed frame": ("bubble", r"(3d aniso.{82}) (.{19}) ( 1)", r"\1 \2 -1",
+                            "not a quarter turn"),
+    # Conditions and load cases
+    "an unknown condition": ("bubble", r"^(loadcase +inflation\n.*\n)fix_rim", r"\1fix_rum",
+                             "names the boundary condition 'fix_rum'"),
+    "a condition twice": ("bubble", r"^(loadcase +inflation\n.*\n)fix_rim\nfix_symmetry_x",
+                          "\\1fix_rim\nfix_rim", "twice in a load case"),
+    "two conditions of a name": ("bubble", r"fix_symmetry_y(\n  0)", r"fix_symmetry_x\1",
+                                 "is defined twice"),
+    "a seventh degree of freedom": ("bubble", r"^(         1         2         )3$", r"\g<1>7",
+                                    "no degree of freedom 7"),
+    "pulled and held": ("strip", r"^(         1\n         )2(\n         2\nbottom)", r"\g<1>3\2",
+                        "has two values"),
+    "a pressure that does not follow": ("bubble", r"^follow for.*\n", "", "follow for"),
+    "state variables for nothing": ("bubble", r"^end$", "state vars                   7\nend",
+                                    "state vars 7, expected 0"),
+    "no end option": ("bubble", r"^end option\n", "", "unknown model option"),
+    "no continue": ("bending", r"^continue\n", "", "is a continue missing"),
+    "no last continue": ("bubble", r"^continue\n", "", "the file ends here"),
+    "no control": ("bubble", r"^control\n(.*\n){3}", "", "without control"),
+    "no post": ("bubble", r"^post\n.*\n", "", "no post"),
+    "no formatted post file": ("bubble", r"^(post\n(?:.{10}){3}         )1", r"\g<1>0",
+                               "field 4 is 0"),
+    "no extended": ("bubble", r"^extended\n", "", "extended has to come before"),
+    "no end of parameters": ("bubble", r"^end\n", "", "unknown parameter"),
+    "a cavity in the model only": ("bending", r"^cavity  .*\n", "", "cavity has to be in"),
+    "a gas of no density": ("bending", r"  1\.204100000000E-12", "  0.000000000000E+00", "above 0"),
+    "a patch less": ("bending", r"^(         2         1 +)\d+(support)", r"\g<1>  0\2",
+                     "columns|body"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_a_spoiled_deck_is_refused(tmp_path, what):
+    deck, pattern, new, match = SPOILED[what]
+    with pytest.raises(DeckError, match=match) as found:
+        read(tmp_path, first(pattern, DECKS[deck], new))
+    assert found.value.number == (1005 if "inside out" in what else 13)
+
+
+def test_moduli_that_are_not_positive_or_on_no_curve_have_no_law(tmp_path):
+    spoiled = {
+        "is not above 0": first(r"  8\.000000000000E\+02", DECKS["bubble"], " -8.000000000000E+02"),
+        "wrong below zero": first(
+            r"  8\.000000000000E\+02", DECKS["bubble"], "  7.000000000000E+02"
+        ),
+        "on no cubics": first(r"(  5.0{11}\dE-03 )( 8)\.0", DECKS["bubble"], r"\1\2.1"),
+    }
+    for match, text in spoiled.items():
+        content = read(tmp_path, text)
+        with pytest.raises(DeckError, match=match):
+            law_of_tables(content)
+
+
+def test_the_parser_shares_no_code_with_what_writes_decks():
+    folder = Path(__file__).parents[2] / "marc_stand_in"
+    parser = {
+        "fields", "parameters", "content", "model", "blocks", "rows", "vessel", "history", "checks",
+        "reading",
+    }  # fmt: skip
+    for path in folder.glob("*.py"):
+        imports = re.findall(r"^\s*(?:from|import) (\S+)", path.read_text(), re.MULTILINE)
+        assert not [name for name in imports if "solvers.marc" in name or "exports" in name]
+        if path.stem in parser:
+            assert not [name for name in imports if name.startswith("bubblefit")], path

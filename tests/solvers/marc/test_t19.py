@@ -1,0 +1,254 @@
+"""Marc's post and status files: six digits, and nothing partial taken for whole."""
+
+import subprocess
+import sys
+
+import meshio
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.solvers.marc.sts import exit_number, increments, repeated
+from bubblefit.solvers.marc.t19 import T19File
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from ...marc_files import e13, sts_text, t19_text
+
+POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.5]], float)
+QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+#: Six digits: half a unit in the last of them.
+ROUNDING = 5.1e-6
+
+
+def frames(count=3):
+    random = np.random.default_rng(5)
+    return [
+        (float(i), {"Displacement": random.normal(size=(6, 3)),
+                    "Reaction Force": 1e3 * random.normal(size=(6, 3))})
+        for i in range(count)
+    ]  # fmt: skip
+
+
+def written(path, *arguments, **options):
+    path.write_text(t19_text(POINTS, QUADS, *arguments, **options))
+    return path
+
+
+def test_every_frame_comes_back_to_six_digits(tmp_path):
+    given = frames()
+    file = T19File(written(tmp_path / "job.t19", given))
+    np.testing.assert_array_equal(file.mesh.numbers, range(1, 7))
+    np.testing.assert_allclose(file.mesh.points, POINTS)
+    assert [kind for kind, _ in file.mesh.elements] == [139, 139]
+    np.testing.assert_array_equal(np.array([n for _, n in file.mesh.elements]), QUADS + 1)
+    for _ in range(2):  # and again
+        found = list(file.frames())
+        assert [(f.increment, f.time) for f in found] == [(0, 0.0), (1, 1.0), (2, 2.0)]
+        for frame, (_, fields) in zip(found, given, strict=True):
+            assert frame.fields.keys() == fields.keys()
+            for name, values in fields.items():
+                np.testing.assert_allclose(frame.fields[name], values, rtol=ROUNDING)
+
+
+def test_meshio_reads_mesh_and_last_frame(tmp_path):
+    given = frames()
+    mesh = meshio.read(written(tmp_path / "job.t19", given))
+    np.testing.assert_array_equal(mesh.cells_dict["quad"], QUADS)
+    assert mesh.field_data["time"][0] == 2.0 and mesh.field_data["increment"][0] == 2
+    last = given[-1][1]["Displacement"]
+    np.testing.assert_allclose(mesh.point_data["Displacement"], last, rtol=ROUNDING)
+
+
+def test_meshio_reads_it_in_whoever_imports_bubblefit(tmp_path):
+    path = written(tmp_path / "job.t19", frames())
+    code = f"import bubblefit, meshio; print(len(meshio.read({str(path)!r}).points))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "6", done.stderr
+
+
+def test_an_element_that_is_not_known_is_named(tmp_path):
+    path = written(tmp_path / "job.t19", frames(), element=999)
+    with pytest.raises(InputError, match="of type 999"):
+        meshio.read(path)
+
+
+NUMBERS = st.floats(-1e120, 1e120, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-120 else x)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    values=arrays(float, (6, 3), elements=NUMBERS),
+    time=st.floats(0, 1e4, allow_subnormal=False),
+    scalar=st.booleans(),
+)
+def test_any_numbers_come_back(tmp_path, values, time, scalar):
+    field = values[:, :1] if scalar else values
+    path = written(tmp_path / "job.t19", [(0.0, {}), (time, {"Displacement": field})])
+    empty, frame = T19File(path).frames()
+    assert not empty.fields
+    assert frame.time == pytest.approx(time, rel=ROUNDING, abs=1e-99)
+    np.testing.assert_allclose(frame.fields["Displacement"], field, rtol=ROUNDING)
+
+
+def test_exponents_of_three_digits_have_no_e():
+    assert e13(1.5e-120) == " 0.150000-119" and e13(-1.5) == "-0.150000E+01"
+
+
+def test_line_ends_of_windows_and_blanks_at_the_ends(tmp_path):
+    text = t19_text(POINTS, QUADS, frames())
+    path = tmp_path / "job.t19"
+    path.write_bytes(text.replace("\n", "  \r\n").encode())
+    assert len(list(T19File(path).frames())) == 3
+
+
+def test_older_files_have_no_count_before_the_time(tmp_path):
+    lines = t19_text(POINTS, QUADS, frames()).replace("51801", "51800").splitlines()
+    at = [i for i, line in enumerate(lines) if line.startswith("=beg=51800")]
+    # Six numbers, and no count.
+    for i in reversed(at):
+        del lines[i + 3 : i + 6]
+        del lines[i + 1]
+    path = tmp_path / "job.t19"
+    path.write_text("\n".join(lines) + "\n")
+    assert [f.time for f in T19File(path).frames()] == [0.0, 1.0, 2.0]
+
+
+def test_a_vector_that_is_only_announced_has_no_data(tmp_path):
+    lines = t19_text(POINTS, QUADS, frames(1)).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("Reaction Force"))
+    lines[at + 2] = lines[at + 2].replace("-1", " 0", 1)
+    del lines[at + 3 : at + 6]
+    path = tmp_path / "job.t19"
+    path.write_text("\n".join(lines) + "\n")
+    (frame,) = T19File(path).frames()
+    assert list(frame.fields) == ["Displacement"]
+
+
+def read(path):
+    return [frame.fields for frame in T19File(path).frames()]
+
+
+def test_every_truncation_is_refused(tmp_path):
+    whole = t19_text(POINTS, QUADS, frames(2)).encode()
+    path = tmp_path / "job.t19"
+    for size in range(len(whole)):
+        path.write_bytes(whole[:size])
+        with pytest.raises(InputError):
+            read(path)
+    path.write_bytes(whole)
+    assert len(read(path)) == 2
+
+
+def test_a_line_that_is_missing_is_refused(tmp_path):
+    lines = t19_text(POINTS, QUADS, frames(2)).splitlines(keepends=True)
+    # Without the title, and without what is skipped anyway, it is still a whole file.
+    skipped = ("job", "inflation")
+    for i, line in enumerate(lines):
+        if line.strip() in skipped or i == 0:
+            continue
+        path = tmp_path / "job.t19"
+        path.write_text("".join(lines[:i] + lines[i + 1 :]))
+        begun = "".join(lines[: i + 1]).rsplit("=beg=", 1)[-1]
+        of_sets = begun.startswith("513") and not line.startswith("=")
+        unused_header = begun.startswith("502") and begun.count("\n") > 3 and line != "=end=\n"
+        if of_sets or unused_header:
+            continue
+        with pytest.raises(InputError):
+            read(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        (" 0.100000E+01", " 0.1O0000E+01", "could not convert"),
+        (" 0.100000E+01", "          NaN", "not a finite number"),
+        (" 0.100000E+01", "*************", "could not convert"),
+        ("            6            2", "            7            2", "nodes|line"),
+        ("----", "++++", "without its end"),
+        ("=beg=52401", "=bog=52401", "beginning of a block"),
+    ],
+)
+def test_what_is_damaged_is_named(tmp_path, old, new, match):
+    text = t19_text(POINTS, QUADS, [(1.0, {"Displacement": np.ones((6, 3))})])
+    assert old in text
+    path = tmp_path / "job.t19"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=match) as found:
+        read(path)
+    assert str(path) in str(found.value)
+
+
+@settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.binary(max_size=300), where=st.integers(0, 3000), start=st.booleans())
+def test_garbage_is_refused_or_read_and_never_more(tmp_path, data, where, start):
+    whole = t19_text(POINTS, QUADS, frames(1)).encode()
+    where = min(where, len(whole))
+    path = tmp_path / "job.t19"
+    path.write_bytes(data if start else whole[:where] + data + whole[where:])
+    try:
+        read(path)
+    except InputError as error:
+        assert str(path) in str(error)
+
+
+def test_a_remeshed_increment_is_refused(tmp_path):
+    lines = t19_text(POINTS, QUADS, frames(1)).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("=beg=51701"))
+    lines[at + 1] = f"{1:13d}" + lines[at + 1][13:]
+    path = tmp_path / "job.t19"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match="new mesh"):
+        read(path)
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        T19File(tmp_path / "none.t19")
+
+
+# .sts
+
+
+def test_increments_as_they_appear(tmp_path):
+    text, path = sts_text([0.5, 1.0, 1.5]), tmp_path / "job.sts"
+    assert increments(path) == []
+    seen = []
+    for size in range(0, len(text) + 1, 7):
+        path.write_text(text[:size])
+        now = increments(path)
+        assert now[: len(seen)] == seen, "half a line was taken for one"
+        seen = now
+    path.write_text(text)
+    assert [(i.increment, i.time) for i in increments(path)] == [(1, 0.5), (2, 1.0), (3, 1.5)]
+    assert sum(i.iterations for i in increments(path)) == 9
+
+
+@pytest.mark.parametrize(
+    "line",
+    [" Job ends with exit number :    3004", "          job ends with exit number     3004",
+     "Exit number 3004"],
+)  # fmt: skip
+def test_exit_numbers_in_every_spelling(tmp_path, line):
+    (tmp_path / "job.sts").write_text(f"exit number 1\n{line}\n")
+    assert exit_number(tmp_path / "none", tmp_path / "job.sts") == 3004
+    assert exit_number(tmp_path / "none") is None
+
+
+def test_increments_that_were_tried_again(tmp_path):
+    path = tmp_path / "job.sts"
+    path.write_text(sts_text([0.5, 0.75, 1.0], increments=[1, 2, 2]))
+    assert repeated(increments(path)) == 1
+
+
+@given(st.binary(max_size=400))
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_garbage_is_no_status(tmp_path, data):
+    path = tmp_path / "job.sts"
+    path.write_bytes(data)
+    increments(path)
+    exit_number(path)

@@ -1,0 +1,326 @@
+"""Closed membranes: thickness by element, cavity, gas, slack start, tube and sphere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.strain import log_strain_of
+from bubblefit.models.gas import ClosedGas
+from bubblefit.models.inflated import InflatedModel
+from bubblefit.solvers.membrane.cavity import closed_cavity
+from bubblefit.solvers.membrane.closed_model import closed_membrane
+from bubblefit.solvers.membrane.element import GAUSS_POINTS, reference_elements
+from bubblefit.solvers.membrane.factorisation import tangent_for
+from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import Wall
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from ...closed_forms import capped_strain
+from ...closed_meshes import half_tube, sphere_octant, tube_warp
+
+# Thesis Table 4.2, "solution", GPa.
+TABLE_4_2 = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
+    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
+E, NU, THICKNESS, RADIUS = 300.0, 0.3, 0.8, 75.0
+ISOTROPIC = HypoelasticLaw.linear(E, E, 0.5 * E / (1 + NU), NU)
+OCTANT = {"symmetry_x": (0,), "symmetry_y": (1,), "symmetry_z": (2,)}
+
+
+def sphere(n: int, pressures, warp=(0.3, 0.2, 1.0)) -> InflatedModel:
+    return InflatedModel(sphere_octant(n, RADIUS), THICKNESS, warp, pressures, OCTANT, copies=8)
+
+
+def tube(across: int, along: int, length: float, pressures, caps=True) -> InflatedModel:
+    """Half of half a tube: x >= 0, z >= 0, its lowest node in the middle held up."""
+    mesh = half_tube(across, along, RADIUS, length, caps)
+    hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
+    mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
+    supports = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
+    if not caps:
+        supports["end"] = (2,)
+    warp = tube_warp(mesh, length)
+    return InflatedModel(mesh, THICKNESS, warp, pressures, supports, copies=4)
+
+
+def run(model: InflatedModel, law: HypoelasticLaw = ISOTROPIC, tolerance: float = 1e-9):
+    """History and the membrane with the strain and stress of the last increment."""
+    solver = MembraneSolver(tolerance)
+    history = solver.run(model, law)
+    return history, solver._prepared[1]
+
+
+def order(errors, factor: float = 2.0) -> float:
+    return float(np.log(abs(errors[-2] / errors[-1])) / np.log(factor))
+
+
+# Reference surface
+
+
+def twisted() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Facets that are not plane, and their warp directions, none of them in its facet."""
+    x, y = np.meshgrid(np.linspace(0, 30, 5), np.linspace(0, 20, 4), indexing="ij")
+    points = np.stack([x, y, 0.02 * x * y + 0.01 * x**2], axis=-1).reshape(-1, 3)
+    corner = (np.arange(4)[:, None] * 4 + np.arange(3)).ravel()
+    quads = np.stack([corner, corner + 4, corner + 5, corner + 1], axis=1)
+    warp = np.random.default_rng(3).normal(size=(len(quads), 3)) * [1, 1, 0.2] + [2, 0, 0.5]
+    return points, quads, warp
+
+
+def test_frames_of_twisted_facets_hold_the_projected_warp() -> None:
+    points, quads, warp = twisted()
+    e = reference_elements(points, quads, warp)
+    frame = np.einsum("mpan,mnk->mpak", e.slopes, points[quads])
+    # Images of unit warp and fill in the reference state: unit vectors, at right angles, and
+    # the warp direction has no part along fill.
+    assert np.einsum("mpak,mpbk->mpab", frame, frame) == pytest.approx(
+        np.broadcast_to(np.eye(2), (*frame.shape[:2], 2, 2)), abs=1e-12
+    )
+    assert np.einsum("mk,mpk->mp", warp, frame[:, :, 1]) == pytest.approx(0.0, abs=1e-12)
+    assert (np.einsum("mk,mpk->mp", warp, frame[:, :, 0]) > 0).all()
+
+
+def test_patch_of_a_curved_surface_in_an_even_deformation() -> None:
+    """Every point of twisted facets finds the strain of the gradient that all were moved by."""
+    points, quads, warp = twisted()
+    elements = reference_elements(points, quads, warp)
+    free = np.arange(points.size)
+    m = Membrane(
+        points, quads, elements, THICKNESS, ISOTROPIC, free,
+        tangent_for(quads, points.size, free), 1e-9, step_limit=1.0,
+    )  # fmt: skip
+    gradient = np.eye(3) + 0.1 * np.random.default_rng(7).uniform(-1, 1, (3, 3))
+    assert np.isfinite(m.unbalance(points @ gradient.T - points, 0.01, with_tangent=False))
+    corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    for e, facet in enumerate(quads):
+        for g, (a, b) in enumerate(GAUSS_POINTS):
+            # Tangents of the bilinear facet, by hand.
+            slopes = [[0.25 * i * (1 + j * b), 0.25 * j * (1 + i * a)] for i, j in corner]
+            normal = np.cross(*(np.array(slopes).T @ points[facet]))
+            normal /= np.linalg.norm(normal)
+            along = warp[e] - (warp[e] @ normal) * normal
+            along /= np.linalg.norm(along)
+            yarns = np.stack([along, np.cross(normal, along)], axis=1)
+            exact = log_strain_of(gradient @ yarns)
+            assert m.strain_new[e, g] == pytest.approx(exact, abs=1e-12)
+
+
+def test_rotation_of_a_stressed_tube_leaves_stress_and_balance() -> None:
+    model = tube(8, 4, 100.0, [0.02, 0.05])
+    history, m = run(model, LAW)
+    turn = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    assert m.unbalance(history.displacement[-1], 0.05, with_tangent=False) < 1e-9
+    before, stress, volume = m.residual.reshape(-1, 3).copy(), m.stress_new.copy(), m.volume
+    position = (m.reference + history.displacement[-1]) @ turn.T
+    m.unbalance(position - m.reference, 0.05, with_tangent=False)
+    assert m.stress_new == pytest.approx(stress, abs=1e-9)
+    assert m.residual.reshape(-1, 3) == pytest.approx(before @ turn.T, abs=1e-8)
+    assert volume > 0
+
+
+def test_thickness_by_element() -> None:
+    """Two thicknesses side by side in one tube wall carry the hoop force in equal strain."""
+    model = replace(tube(16, 1, 20.0, [0.01], caps=False))
+    thick = np.where(model.mesh.points[model.mesh.quads][..., 1].mean(axis=1) > 0, 1.6, 0.8)
+    _, m = run(replace(model, thickness=thick), ISOTROPIC)
+    hoop = m.stress_old[..., 1].mean(axis=1) * thick
+    _, even = run(model, ISOTROPIC)
+    # Without friction the hoop force is the same all around, p times the apothem.
+    assert hoop == pytest.approx(np.full(len(hoop), hoop.mean()), rel=1e-3)
+    assert hoop.mean() == pytest.approx(even.stress_old[..., 1].mean() * 0.8, rel=1e-2)
+    assert np.ptp(even.stress_old[..., 1]) < 1e-6
+
+
+# Cavity and gas
+
+
+def test_volume_of_a_box_and_its_derivative() -> None:
+    model = tube(8, 3, 60.0, [0.01])
+    mesh, fixed = model.mesh, model.fixed()
+    cavity = closed_cavity(mesh.points, mesh.quads, fixed)
+    volume, push = cavity.measure(mesh.points)
+    assert volume == pytest.approx(0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 60.0, rel=1e-12)
+    rng, free = np.random.default_rng(1), np.setdiff1d(np.arange(mesh.points.size), fixed)
+    bent = mesh.points.copy()
+    bent.reshape(-1)[free] += rng.uniform(-3, 3, len(free))
+    _, push = cavity.measure(bent)
+    for dof in rng.choice(free, 12, replace=False):
+        step = np.zeros(bent.size)
+        step[dof] = 1e-3
+        up, down = (cavity.measure(bent + s * step.reshape(-1, 3))[0] for s in (1, -1))
+        assert push[dof] == pytest.approx((up - down) / 2e-3, rel=1e-7, abs=1e-6)
+
+
+def test_slice_between_two_planes_has_the_same_volume() -> None:
+    model = tube(8, 2, 40.0, [0.01], caps=False)
+    cavity = closed_cavity(model.mesh.points, model.mesh.quads, model.fixed())
+    volume = 0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 40.0
+    assert cavity.measure(model.mesh.points)[0] == pytest.approx(volume, rel=1e-12)
+    assert cavity.symmetric.tolist() == [True, False, True]
+
+
+def test_open_cavity_is_refused() -> None:
+    model = tube(8, 2, 40.0, [0.01], caps=False)
+    supports = {k: v for k, v in model.supports.items() if k != "end"}
+    with pytest.raises(InputError, match="the cavity is open between nodes"):
+        run(replace(model, supports=supports))
+
+
+def test_gas_keeps_pressure_times_volume_when_the_tube_is_dented() -> None:
+    model = tube(8, 4, 100.0, [0.02, 0.05])
+    history, inflated = run(model)
+    dent = np.flatnonzero(
+        (model.mesh.points[:, 1] > RADIUS - 1e-6) & (model.mesh.points[:, 2] < 1e-6)
+    )
+    fixed = np.union1d(model.fixed(), 3 * dent + 1)
+    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed, Wall())
+    m.strain_old[:], m.stress_old[:] = inflated.strain_old, inflated.stress_old
+    u = history.displacement[-1].copy()
+    m.gas = ClosedGas((0.05 + 0.101) * history.cavity_volume[-1] / model.copies, 0.101)
+    u[dent, 1] -= 5.0
+    found = m.equilibrium(u, 0.0)
+    assert found is not None
+    assert (m.pressure + 0.101) * m.volume == pytest.approx(m.gas.amount, rel=1e-14)
+    assert m.volume < history.cavity_volume[-1] / model.copies
+    assert m.pressure > 0.05
+
+
+def test_tangent_with_gas_against_finite_differences() -> None:
+    """Stress, follower pressure and the rank-one term of the gas: J (K^-1 b) = b."""
+    model = tube(8, 3, 60.0, [0.02, 0.05])
+    history, m = run(model, LAW)
+    m.gas = ClosedGas(0.15 * m.volume, 0.101)
+    rng = np.random.default_rng(5)
+    u = history.displacement[-1].copy()
+    u.reshape(-1)[m.free] += rng.uniform(-0.05, 0.05, len(m.free))
+    m.unbalance(u, 0.0, with_tangent=True)
+    m.tangent.factor()
+    for _ in range(3):
+        rhs = rng.normal(size=len(m.free))
+        x = np.zeros(u.size)
+        x[m.free] = m.tangent.solve(rhs)
+        step = 1e-4 / np.abs(x).max()
+        sides = []
+        for sign in (1, -1):
+            m.unbalance(u + sign * step * x.reshape(-1, 3), 0.0, with_tangent=False)
+            sides.append(m.residual[m.free].copy())
+        assert (sides[0] - sides[1]) / (2 * step) == pytest.approx(rhs, abs=2e-6)
+
+
+# Closed forms
+
+
+def test_sphere_against_the_closed_form() -> None:
+    """Cauchy stress p r/(2 t) = E/(1 - nu) log(r/R), constant thickness; second order."""
+    pressures = [0.01, 0.1, 0.4, 0.8]
+    errors = []
+    for n in (4, 8, 12):
+        history, m = run(sphere(n, pressures))
+        exact = []
+        for p in pressures:
+            strain = brentq(
+                lambda e: E / (1 - NU) * e - p * RADIUS * np.exp(e) / (2 * THICKNESS),  # noqa: B023
+                0.0, 0.9,
+            )  # fmt: skip
+            exact.append((RADIUS * np.exp(strain), E / (1 - NU) * strain))
+        radius, stress = np.array(exact).T
+        found = np.linalg.norm(m.reference + history.displacement, axis=2).mean(axis=1)
+        growth = found / radius - 1
+        volume = history.cavity_volume / (4 / 3 * np.pi * radius**3) - 1
+        mean = m.stress_old[..., :2].mean() / stress[-1] - 1
+        errors.append((np.abs(growth).max(), np.abs(volume).max(), abs(mean)))
+    assert max(errors[-1]) < 5e-3
+    assert [order(e, 12 / 8) for e in np.array(errors).T] == pytest.approx([2.0] * 3, abs=0.15)
+
+
+def middle(model: InflatedModel, history, m) -> tuple[float, float, float]:
+    """Radius (mm), axial and hoop stress (MPa) in the middle of a tube."""
+    near = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
+    ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
+    height = (model.mesh.points + history.displacement[-1])[ring, 1]
+    axial, hoop, _ = m.stress_old[near].mean(axis=(0, 1))
+    return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
+
+
+@pytest.mark.parametrize(("law", "pressure"), [(ISOTROPIC, 0.02), (ISOTROPIC, 0.2), (LAW, 0.14)])
+def test_long_capped_tube_against_the_closed_form(law: HypoelasticLaw, pressure: float) -> None:
+    """Middle of a tube with flat caps, from the slack state: hoop p r/t, axial half of it."""
+    pressures = pressure * np.array([0.05, *np.arange(1, 11) / 10])
+    strain = capped_strain(law, pressure, RADIUS, THICKNESS)
+    radius = RADIUS * np.exp(strain[1])
+    hoop = pressure * radius / THICKNESS
+    errors = []
+    for across in (8, 16, 24):
+        model = tube(across, 12, 600.0, pressures)
+        history, m = run(model, law)
+        found = middle(model, history, m)
+        near = np.argmin(np.abs(model.mesh.points[:, 2] - 600.0 / 4))
+        stretch = np.log1p(history.displacement[-1, near, 2] / model.mesh.points[near, 2])
+        errors.append(
+            [*(np.array(found) / [radius, hoop / 2, hoop] - 1), np.expm1(stretch - strain[0])]
+        )
+    stresses = np.array(errors)[:, 1:3].T
+    assert [order(e, 24 / 16) for e in stresses] == pytest.approx([2.0, 2.0], abs=0.1)
+    assert np.abs(errors[-1]).max() < 5e-3
+
+
+def test_tube_between_planes_is_the_polygon_in_every_digit() -> None:
+    """Plane strain: N straight facets carry p times their apothem, as statics has it."""
+    model = tube(16, 1, 20.0, [0.01, 0.1], caps=False)
+    _, m = run(model, tolerance=1e-11)
+    strain = m.strain_old[..., 1].mean()
+    apothem = RADIUS * np.cos(np.pi / 32) * np.exp(strain)
+    assert np.ptp(m.strain_old[..., 1]) < 1e-8
+    assert m.stress_old[..., 1] == pytest.approx(0.1 * apothem / THICKNESS, rel=1e-7)
+
+
+# Failures
+
+
+def test_refusals() -> None:
+    model = sphere(2, [0.01])
+    with pytest.raises(InputError, match="expected positive, increasing"):
+        replace(model, pressures=[0.2, 0.1])
+    with pytest.raises(InputError, match="expected > 0 mm in every element"):
+        replace(model, thickness=np.zeros(12))
+    with pytest.raises(InputError, match="no node set 'rim' in the mesh"):
+        replace(model, supports={"rim": (0, 1, 2)})
+    with pytest.raises(InputError, match="takes no parameters"):
+        MembraneSolver().run_with_sensitivity(model, ISOTROPIC)
+
+
+def test_a_sphere_beyond_its_limit_pressure_is_a_failure() -> None:
+    """p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1."""
+    limit = 2 * THICKNESS * E / ((1 - NU) * RADIUS * np.e)
+    with pytest.raises(SolverFailure, match="no equilibrium at"):
+        MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
+
+
+def test_a_limit_pressure_is_passed_by_volume() -> None:
+    """Fill modulus that falls under the stress and rises again: p R/t has a maximum on the way."""
+    beta = 1e3 * np.array([0, 0, 0, 0.1, 81.7789, 15.6849, -4.03842, 0.181033, 0, 0, 0, 0.3])
+    law = HypoelasticLaw(beta, 0.24, [0.2, 0.2, 0.2])
+    model = tube(8, 1, 20.0, np.linspace(0.003, 0.09, 30), caps=False)
+    history, m = run(model, law)
+    assert any("snaps" in remark for remark in history.remarks)
+    strain = m.strain_old[..., 1].mean()
+    assert np.ptp(m.strain_old[..., 1]) < 1e-6
+    apothem = RADIUS * np.cos(np.pi / 16) * np.exp(strain)
+    assert m.stress_old[..., 1] == pytest.approx(0.09 * apothem / THICKNESS, rel=1e-6)
+    rigidity = lambda e: law.E2(e) / (1 - 0.24**2 * law.E2(e) / law.E1(0.0))  # noqa: E731
+    # The axial strain is zero, so that the stress is the integral of the modulus.
+    exact = quad(rigidity, 0, strain)[0]
+    assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
+    softest = min(rigidity(np.linspace(0, strain, 400)))
+    assert softest < exact  # there is a limit pressure

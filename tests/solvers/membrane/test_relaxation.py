@@ -1,0 +1,177 @@
+"""Tension field: conditions at a point, derivatives, a tube bent beyond its first wrinkle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.point_law import SLOPES
+from bubblefit.materials.relaxation import relaxed_update
+from bubblefit.meshes.mesh import Mesh
+from bubblefit.models.inflated import InflatedModel
+from bubblefit.solvers.membrane.closed_model import closed_membrane
+from bubblefit.solvers.membrane.wall import Wall
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq, newton
+
+from ...closed_meshes import half_tube, tube_warp
+from ...solvers.membrane.test_inflated import LAW
+
+strains = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.2, 0.2)).map(np.array)
+TAUT, WRINKLED, SLACK = 0, 1, 2
+
+
+def update(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
+    """State, strain and stress of the fabric, carried stress, its slope, that of the strain."""
+    he, s, carried = (np.empty(3) for _ in range(3))
+    tangent, slope, unused = np.empty((3, 3)), np.empty((3, 3)), np.empty(SLOPES)
+    state = relaxed_update(
+        law.pieces, law.nu12, share, np.array(h, float), np.array(h_old, float),
+        np.array(s_old, float), he, s, carried, tangent, unused, slope,
+    )  # fmt: skip
+    return state, he, s, carried, tangent, slope
+
+
+def principal(a: float, b: float, c: float) -> np.ndarray:
+    return np.linalg.eigvalsh([[a, c], [c, b]])
+
+
+@settings(max_examples=400, deadline=None)
+@given(strains, strains)
+def test_no_compression_and_no_work_on_a_wrinkle(first: np.ndarray, then: np.ndarray) -> None:
+    """Both increments: the second starts from whatever state the first one ended in."""
+    _, he, s, *_ = update(first)
+    for h, old, s_old in ((first, np.zeros(3), np.zeros(3)), (then, he, s)):
+        state, fabric, stress, *_ = update(h, old, s_old)
+        assert state >= 0
+        wrinkle = fabric - h
+        assert principal(*stress)[0] >= -1e-9
+        assert principal(*(wrinkle * [1, 1, 0.5]))[0] >= -1e-11
+        assert abs(stress @ wrinkle) < 1e-9
+        assert (state == TAUT) == (not wrinkle.any())
+        assert state != SLACK or not stress.any()
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_derivatives_of_stress_and_strain(seed: int) -> None:
+    """At strains off the axes, where moduli (held below zero strain) have kinks of their own.
+
+    The increment is small beside the range of strain: through a large one the midpoint's moduli
+    may know two wrinkled states, and a difference may reach from one to the other.
+    """
+    rng = np.random.default_rng(seed)
+    first = rng.normal(0.01, [0.04, 0.04, 0.08])
+    then = first + rng.normal(0.0, [0.015, 0.015, 0.03])
+    _, old, s_old, *_ = update(first)
+    state, _, _, _, tangent, slope = update(then, old, s_old)
+    step = 1e-7
+    stress, strain = np.empty((3, 3)), np.empty((3, 3))
+    for j in range(3):
+        up, down = (update(then + k * step * np.eye(3)[j], old, s_old) for k in (1, -1))
+        if {up[0], down[0]} != {state}:
+            return  # a kink within the difference
+        stress[:, j] = (up[3] - down[3]) / (2 * step)
+        strain[:, j] = (up[1] - down[1]) / (2 * step)
+    assert tangent == pytest.approx(stress, abs=2e-5 * np.abs(stress).max())
+    assert slope == pytest.approx(strain, abs=2e-5)
+
+
+@given(st.floats(0.001, 0.08), st.floats(0.001, 0.3))
+def test_a_strip_that_is_pulled_wrinkles_where_it_is_narrowed(
+    along: float, narrower: float
+) -> None:
+    """Fabric pulled along the fill and narrowed by more than nu: the stress of a free strip."""
+    law = HypoelasticLaw.linear(800.0, 140.0, 20.0, 0.24)
+    free = -0.24 * 140.0 / 800.0 * along
+    state, he, s, *_ = update([free - narrower, along, 0.0], law=law)
+    assert state == WRINKLED
+    assert s == pytest.approx([0.0, 140.0 * along, 0.0], rel=1e-12, abs=1e-10)
+    assert he == pytest.approx([free, along, 0.0], rel=1e-12, abs=1e-14)
+
+
+def test_what_is_left_to_wrinkles_vanishes_with_its_share() -> None:
+    _, _, s, *_ = update([-0.03, 0.05, 0.02])
+    excess = [np.abs(update([-0.03, 0.05, 0.02], share=k)[3] - s).max() for k in (1e-2, 1e-4, 0.0)]
+    assert excess[0] == pytest.approx(100 * excess[1], rel=1e-9)
+    assert excess[2] == 0.0
+
+
+# A tube under pressure p, its ends kept plane and turned against each other. Comer and Levy, AIAA
+# Journal 1 (1963) 1652: no stress at angles below t from the compressed side, where
+# cos t = (mean strain over strain by bending), and M/(pi p r^3) between 1/2 (first wrinkle) and 1.
+
+RADIUS, LENGTH, THICKNESS, MODULUS, PRESSURE = 100.0, 60.0, 1.0, 1000.0, 0.02
+
+
+def published_moment(curvature: float, radius: float) -> tuple[float, float]:
+    """Share of the circumference that wrinkles, and M/(pi p r^3)."""
+
+    def excess_force(t: float) -> float:
+        by_bending = 2.0 * radius**2 * THICKNESS * MODULUS * curvature
+        return by_bending * ((np.pi - t) * np.cos(t) + np.sin(t)) - np.pi * radius**2 * PRESSURE
+
+    t = brentq(excess_force, 0.0, 3.1)
+    moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
+    return t / np.pi, moment
+
+
+class PlaneEnds:
+    """Half of half a tube whose end at `LENGTH` stays plane, at a given turn and stretch."""
+
+    def __init__(self, across: int, share: float | None) -> None:
+        tube = half_tube(across, across // 8, RADIUS, LENGTH, caps=False)
+        self.points = tube.points
+        self.end = np.flatnonzero(tube.points[:, 2] > LENGTH - 1e-6)
+        low = np.array([np.argmin(tube.points @ [0.0, 1.0, 1e-3])])
+        sets = {**tube.node_sets, "end": self.end, "low": low}
+        mesh = Mesh(tube.points, tube.quads, sets)
+        supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
+        model = InflatedModel(mesh, THICKNESS, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4)
+        law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2.6, 0.3)
+        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
+        self.displacement = np.zeros_like(self.points)
+        self.stretched = 0.2 * PRESSURE * RADIUS / (THICKNESS * MODULUS)
+        self.displacement[self.end, 2] = LENGTH * self.stretched
+        found = self.membrane.equilibrium_from_slack(self.displacement, PRESSURE)
+        assert found is not None
+        self.displacement = found
+
+    def moment(self, curvature: float) -> tuple[float, float, float]:
+        """Share of the wall that wrinkles, M/(pi p r^3), r; the end carries what p pushes on it."""
+
+        def excess_force(stretch: float) -> float:
+            start = self.displacement.copy()
+            start[self.end, 2] = LENGTH * (stretch + curvature * self.points[self.end, 1])
+            found = self.membrane.equilibrium(start, PRESSURE)
+            assert found is not None
+            self.displacement = found
+            return float(self.pull().sum() - np.pi * self.radius() ** 2 * PRESSURE)
+
+        ahead = self.stretched - 0.05 * curvature * RADIUS
+        self.stretched = newton(excess_force, self.stretched, x1=ahead, tol=1e-11)
+        excess_force(self.stretched)
+        radius, height = self.radius(), (self.points + self.displacement)[self.end, 1]
+        middle = 0.5 * (height.max() + height.min())
+        wrinkled = float((self.membrane.wrinkle != 0).any(axis=2).mean())
+        return wrinkled, self.pull() @ (height - middle) / (np.pi * PRESSURE * radius**3), radius
+
+    def pull(self) -> np.ndarray:
+        return 2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2]
+
+    def radius(self) -> float:
+        return float(np.hypot(*(self.points + self.displacement)[self.end, :2].T).mean())
+
+
+def test_bent_tube_wrinkles_as_published() -> None:
+    """At multiples of the curvature of the first wrinkle; 1e-4 is left to wrinkles."""
+    first = 0.5 * PRESSURE / (THICKNESS * MODULUS)
+    tube, taut = PlaneEnds(32, 1e-4), PlaneEnds(32, None)
+    for times in (1.5, 2.5, 4.0):
+        wrinkled, moment, radius = tube.moment(times * first)
+        expected_wrinkled, expected = published_moment(times * first, radius)
+        assert moment == pytest.approx(expected, rel=2e-3)
+        assert wrinkled == pytest.approx(expected_wrinkled, abs=1.0 / 32)
+    # A membrane that carries compression goes on as it began.
+    assert taut.moment(1.5 * first)[1] == pytest.approx(0.75, rel=1e-2)

@@ -1,0 +1,98 @@
+"""Orders and limits of manufactured sequences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.studies.convergence import HIGHEST, convergence, observed_order, richardson
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+
+def manufactured(sizes, order: float, limit: float, constant: float) -> np.ndarray:
+    return limit + constant * np.asarray(sizes, dtype=float) ** order
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(
+    order=st.floats(0.3, 6.0),
+    limit=st.floats(-50.0, 50.0),
+    constant=st.sampled_from([-3.0, -0.2, 0.2, 3.0]),
+    first=st.floats(1.3, 3.0),
+    second=st.floats(1.3, 3.0),
+)
+def test_order_and_limit_of_pure_powers(
+    order: float, limit: float, constant: float, first: float, second: float
+) -> None:
+    """Whatever the ratios of the sizes, which need not be the same twice."""
+    sizes = [1.0, 1 / first, 1 / (first * second)]
+    values = manufactured(sizes, order, limit, constant)
+    found = observed_order(sizes, np.diff(values))
+    assert found == pytest.approx(order, rel=1e-4)
+    assert richardson(sizes[1:], values[1:], order) == pytest.approx(limit, abs=1e-8)
+
+
+def test_the_unit_of_size_does_not_matter() -> None:
+    sizes = np.array([12.75, 7.07, 3.5])
+    values = manufactured(sizes, 2.0, 39.8, 1e-3)
+    orders = [observed_order(scale * sizes, np.diff(values)) for scale in (1e-6, 1.0, 1e6)]
+    assert orders == pytest.approx([2.0] * 3)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [(1.0, -0.25), (-1.0, 0.25), (1.0, 1.0), (1.0, 1.2), (1.0, 0.0), (0.0, 1.0), (1.0, np.nan),
+     (1.0, 2.0 ** -(HIGHEST + 1))],
+)  # fmt: skip
+def test_changes_without_an_order(changes: tuple[float, float]) -> None:
+    assert observed_order([4.0, 2.0, 1.0], changes) is None
+
+
+@pytest.mark.parametrize("sizes", [[1.0, 1.0, 0.5], [1.0, 2.0, 3.0], [1.0, 0.5, 0.0], [1.0, 0.5]])
+def test_sizes_must_fall(sizes: list[float]) -> None:
+    with pytest.raises(ValueError, match="decreasing"):
+        observed_order(sizes, [1.0, 0.25])
+
+
+def test_a_sequence_that_has_settled_needs_no_remark() -> None:
+    sizes = [8.0, 4.0, 2.0, 1.0]
+    found = convergence(sizes, manufactured(sizes, 2.0, 40.0, 0.01).tolist())
+    assert (found.order, found.previous, found.limit) == pytest.approx((2.0, 2.0, 40.0))
+    assert found.remark == ""
+    assert found.error(40.4) == pytest.approx(0.01)
+
+
+def test_a_second_term_makes_the_order_move_and_is_said() -> None:
+    h = np.array([8.0, 4.0, 2.0, 1.0])
+    values = 40.0 + 0.01 * h**2 + 0.02 * h**4
+    found = convergence(h.tolist(), values.tolist())
+    assert found.order is not None and found.previous is not None
+    assert found.previous > found.order > 2.5
+    fine = 0.01 * h
+    settled = convergence(fine.tolist(), (40.0 + 0.01 * fine**2 + 0.02 * fine**4).tolist())
+    assert settled.order == pytest.approx(2.0, abs=0.01)
+    assert settled.remark == ""
+    moving = convergence(h.tolist(), (40.0 + 0.3 * h + 0.02 * h**4).tolist())
+    assert "still moves" in moving.remark
+
+
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ([1.0, 0.5], "three levels"),
+        ([1.0], "three levels"),
+        ([1.0, 0.5, 0.375], "one order only"),
+        ([9.0, 1.0, 0.5, 0.75], "up and down"),
+        ([9.0, 1.0, 0.5, 0.0], "do not get smaller"),
+        ([9.0, 1.0, 0.5, 0.5 + 1e-9], "accuracy of the solver"),
+        ([1.0, 1.5, 1.25, 1.125], "one order only"),
+        ([3.0, 2.0, 1.0, 1.0 - 1e-6], "no power"),
+        ([0.0, 1.0, 1.9], "no limit: refine further"),
+    ],
+)
+def test_limits_of_the_extrapolation_are_said(values: list[float], words: str) -> None:
+    sizes = [2.0**-k for k in range(len(values))]
+    found = convergence(sizes, values, noise=1e-8)
+    assert words in found.remark
+    assert (found.limit is None) == (found.order is None)
+    assert (found.error(1.0) is None) == (found.limit is None)

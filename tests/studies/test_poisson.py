@@ -1,0 +1,78 @@
+"""Responses over nu12: ratios, values that fail, closed forms."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.uniaxial import straight_strip
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.poisson import by_response, ratios, vary_nu12
+
+from ..bars import STRETCH, BarSolver, BarTest, project_of
+
+CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
+END = "load at the end, N"
+
+
+def test_ratios_leave_out_what_failed() -> None:
+    found = ratios([0.1, 0.2, 0.3], [2.0, np.nan, 4.0], 2.5)
+    assert found.to_base == pytest.approx([0.8, np.nan, 1.6], nan_ok=True)
+    assert found.to_mean == pytest.approx([2 / 3, np.nan, 4 / 3], nan_ok=True)
+    assert found.spread == pytest.approx((-0.2, 0.6))
+    assert np.isnan(ratios([0.1], [np.nan], 1.0).spread).all()
+    named = by_response([0.1, 0.2], [{"a": 1.0}, None], {"a": 2.0})
+    assert named["a"].to_base == pytest.approx([0.5, np.nan], nan_ok=True)
+    early = by_response([0.1, 0.2], [{"a": 1.0}, {"a": 2.0, "b": 1.0}], {"a": 2.0, "b": 4.0})
+    assert early["b"].to_base == pytest.approx([np.nan, 0.25], nan_ok=True)
+
+
+def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path) -> None:
+    study = vary_nu12(project_of(BarTest("a bar")), CARD, [0.4, 0.0, 0.4])
+    found = study.parts["a bar"].responses[END]
+    assert found.nu12.tolist() == [0.0, 0.4] and study.base == 0.24
+    eps = np.log1p(STRETCH)
+    assert found.to_base == pytest.approx(np.exp(-(found.nu12 - 0.24) * eps), rel=1e-9)
+    study.write(tmp_path)
+    table = pd.read_csv(tmp_path / "nu12.csv")
+    pd.testing.assert_frame_equal(table, study.table())
+    assert json.loads((tmp_path / "result.json").read_text()) == study.result
+    assert (tmp_path / "nu12.png").stat().st_size > 10_000
+    assert any(line.startswith(f"a bar, {END}") for line in study.lines())
+
+
+def test_a_value_that_fails_is_named(bars: BarSolver) -> None:
+    bars.law_fails = lambda law: law.nu12 > 0.4
+    study = vary_nu12(project_of(BarTest("a bar")), CARD)
+    assert study.parts["a bar"].failed == {"0.45": "the bar breaks"}
+    assert study.result["models"]["a bar"]["responses"][END]["to_base"][-1] is None
+    assert "note: a bar, nu12 = 0.45: the bar breaks" in study.lines()
+    with pytest.raises(SolverFailure):
+        vary_nu12(project_of(BarTest("a bar")), CARD, [0.45])
+    with pytest.raises(SolverFailure):  # the card as it is
+        vary_nu12(project_of(BarTest("a bar")), replace(CARD, law=replace(CARD.law, nu12=0.41)))
+
+
+def test_values_out_of_range() -> None:
+    with pytest.raises(InputError, match="--nu12: expected 0 <= nu12 < 1, got 1"):
+        vary_nu12(project_of(BarTest("a bar")), CARD, [1.5])
+
+
+def test_a_straight_strip_in_closed_form() -> None:
+    """Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps)."""
+    model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
+
+    def load(nu12: float) -> float:
+        law = HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=nu12)
+        return float(MembraneSolver().run(model, law).load[-1])
+
+    found = ratios([0.0, 0.4], [load(0.0), load(0.4)], load(0.24))
+    eps = np.log(1.1)
+    assert found.to_base == pytest.approx(np.exp(-(found.nu12 - 0.24) * eps), rel=1e-6)
