@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .frames import FrameOptions, read_frames
+from .frames import LOST, FrameOptions, FrameSource, read_frames
 
-#: What a file must hold: reference place and displacement; the names in the file may differ.
+#: What a file must hold: reference place and displacement; the names in the file may differ. The
+#: height z of the reference state is read where it is there.
 QUANTITIES = ("x", "y", "dx", "dy", "dz")
 #: How a table of exactly these columns is read.
 PLAIN = FrameOptions(QUANTITIES, holes=False)
@@ -25,15 +26,24 @@ class DisplacementField:
     Parameters
     ----------
     pressure : MPa.
-    points : (n, 2) mm, places in the flat reference state; x is warp, y is fill.
+    points : (n, 2) mm, places in the reference state; x is warp, y is fill.
     displacement : (n, 3) mm.
-    dropped : doubtful points that were left out.
+    dropped : how many rows of the file were left out, by why (`frames.FLAGGED` and others).
+    z : (n,) mm, height in the reference state; None where it was not measured.
+    sigma : (n,) what the correlation says of its own error, in the file's own measure, NaN where
+        it says nothing; None where it does so nowhere.
+    path : the file, None when the field did not come from one.
+    source : what of the file was read.
     """
 
     pressure: float
     points: NDArray[np.float64]
     displacement: NDArray[np.float64]
-    dropped: int
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    z: NDArray[np.float64] | None = None
+    sigma: NDArray[np.float64] | None = None
+    path: Path | None = None
+    source: FrameSource = field(default_factory=FrameSource)
 
 
 def read_fields(
@@ -52,7 +62,7 @@ def read_fields(
     files : each with one frame; columns that are not asked for are ignored.
     pressures : MPa, one a file.
     columns, flag_column, comment, length_scale : see `frames.FrameOptions`; quantities are `x`,
-        `y`, `dx`, `dy`, `dz`.
+        `y`, `dx`, `dy`, `dz`, and `z` where it is there.
     format : its name; found by the files' content unless given.
 
     Raises
@@ -89,12 +99,24 @@ def read_field(
     if len(frames) != 1:
         raise InputError(path, "", f"expected one frame, one a pressure; found {len(frames)}")
     (frame,) = frames
-    values = np.concatenate([frame.points[:, :2], frame.displacement], axis=1)
+    z = frame.points[:, 2]
+    # A height that no row has was not measured; one that some rows lack was lost there.
+    measured = bool(np.isfinite(z).any())
+    values = np.concatenate([frame.points[:, : 2 + measured], frame.displacement], axis=1)
     whole = np.isfinite(values).all(axis=1)
-    dropped = frame.dropped + int((~whole).sum())
+    lost = int((~whole).sum())
+    dropped = {**frame.dropped, **({LOST: frame.dropped.get(LOST, 0) + lost} if lost else {})}
     if not whole.any():
         why = f" ({options.flag_column!r} is not 0)" if options.flag_column is not None else ""
-        problem = f"all {dropped} rows are doubtful{why}; none is left to use"
+        problem = f"all {sum(dropped.values())} rows are doubtful{why}; none is left to use"
         raise InputError(path, "", problem)
-    values = values[whole]
-    return DisplacementField(pressure, values[:, :2], values[:, 2:], dropped)
+    return DisplacementField(
+        pressure,
+        frame.points[whole, :2],
+        frame.displacement[whole],
+        dropped,
+        z[whole] if measured else None,
+        None if frame.sigma is None else frame.sigma[whole],
+        Path(path),
+        frame.source,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,31 @@ from .registry import read_file
 
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
+
+#: Why rows of a file are not used: what a table of provenance calls it.
+FLAGGED = "flagged as doubtful"
+NEGATIVE_SIGMA = "sigma below zero"
+ALL_ZERO = "all zero"
+LOST = "without a value"
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """What was taken from a file, for the record.
+
+    Parameters
+    ----------
+    format : name of the file's format, "" where its reader does not say.
+    columns : for each quantity that was read, what the file calls it.
+    units : for each of them the unit that the file names; a quantity is missing where the file
+        names none.
+    notes : one sentence each: what was chosen where the file leaves a choice.
+    """
+
+    format: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,18 +52,25 @@ class Frame:
         asked for.
     displacement : (m, 3) mm; NaN where correlation was lost.
     path : the file, None when the frame did not come from one.
-    dropped : rows of the file that are not among the points: marked as doubtful.
+    dropped : how many rows of the file are not among the points, by why.
+    sigma : (m,) what the correlation says of its own error, in the file's own measure; None where
+        it says nothing.
+    source : what of the file was read.
     """
 
     points: NDArray[np.float64]
     displacement: NDArray[np.float64]
     path: Path | None = None
-    dropped: int = 0
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    sigma: NDArray[np.float64] | None = None
+    source: FrameSource = field(default_factory=FrameSource)
 
     def __post_init__(self) -> None:
         if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
             shapes = f"{self.points.shape} and {self.displacement.shape}"
             raise ValueError(f"expected (m, 3) points and displacements, got {shapes}")
+        if self.sigma is not None and self.sigma.shape != self.points.shape[:1]:
+            raise ValueError(f"expected (m,) sigma, got {self.sigma.shape}")
 
 
 @dataclass(frozen=True)
@@ -48,7 +80,8 @@ class FrameOptions:
     Parameters
     ----------
     quantities : of `QUANTITIES`, those that the file must hold.
-    columns : the file's own name of each of them; None where the format knows what they are called.
+    columns : the file's own name of each of them, and of others that are read where they are there;
+        None where the format knows what they are called.
     flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
     comment : lines that start so are skipped, where the format has no comments of its own.
     length_scale : mm in one unit of length of a file that does not name its unit.

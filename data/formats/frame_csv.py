@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..frames import QUANTITIES, Frame, FrameOptions
+from ..frames import FLAGGED, QUANTITIES, Frame, FrameOptions, FrameSource
 from ..registry import Format, register_format
 from ..tables import read_table
 
@@ -19,14 +19,25 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     if options.flag_column is not None:
         # Flags first: a doubtful row may hold anything.
         table = table.rows(table.numbers(options.flag_column) == 0)
-    names = options.columns or {}
+    names = _names(options, [str(name) for name in table.cells.columns])
     values = np.full((len(table.lines), len(QUANTITIES)), np.nan)
-    for quantity in options.quantities:
-        column = table.numbers(names.get(quantity, quantity), holes=options.holes)
+    for quantity, name in names.items():
+        column = table.numbers(name, holes=options.holes)
         values[:, QUANTITIES.index(quantity)] = column
     with np.errstate(over="ignore"):
         values *= options.length_scale
-    return [Frame(values[:, :3], values[:, 3:], path, total - len(values))]
+    flagged = total - len(values)
+    dropped = {FLAGGED: flagged} if flagged else {}
+    source = FrameSource("csv", names)
+    return [Frame(values[:, :3], values[:, 3:], path, dropped, source=source)]
+
+
+def _names(options: FrameOptions, there: list[str]) -> dict[str, str]:
+    """Names of the columns of what must be there, and of what else is there under its own name."""
+    if options.columns is not None:
+        return dict(options.columns)
+    names = {quantity: quantity for quantity in options.quantities}
+    return names | {name: name for name in QUANTITIES if there.count(name) == 1}
 
 
 register_format(Format("csv", "frame", "comma-separated columns x, y, z, dx, dy, dz", read))

@@ -41,7 +41,10 @@ def mirrored(field: DisplacementField) -> DisplacementField:
         moved.append(field.displacement * (sx, sy, 1))
     xy, u = np.concatenate(points), np.concatenate(moved)
     _, once = np.unique(np.round(xy, 6), axis=0, return_index=True)
-    return replace(field, points=xy[once], displacement=u[once])
+    z, sigma = (
+        None if value is None else np.tile(value, 4)[once] for value in (field.z, field.sigma)
+    )
+    return replace(field, points=xy[once], displacement=u[once], z=z, sigma=sigma)
 
 
 def at_nodes(

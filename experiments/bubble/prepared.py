@@ -63,7 +63,7 @@ class PreparedBubble:
     @property
     def dropped(self) -> int:
         """Doubtful points that were left out."""
-        return sum(f.dropped for f in self.fields)
+        return sum(sum(f.dropped.values()) for f in self.fields)
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
@@ -191,7 +191,7 @@ def _computed(
             failure.scratch,
         ) from None
     return tuple(
-        DisplacementField(p, source.mesh.points[:, :2], u, 0)
+        DisplacementField(p, source.mesh.points[:, :2], u)
         for p, u in zip(test.pressures, np.asarray(history.displacement), strict=True)
     )
 

@@ -24,10 +24,11 @@ class KnownSolutionSection(Section):
 
 
 class ColumnsSection(Section):
-    """Names in the files."""
+    """Names in the files; the height of the reference state may be missing."""
 
     x: str = "x"
     y: str = "y"
+    z: str | None = None
     dx: str = "dx"
     dy: str = "dy"
     dz: str = "dz"

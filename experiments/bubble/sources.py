@@ -36,9 +36,10 @@ class KnownSolution:
 class PointFiles:
     """Measured displacements, one file a pressure, in the order of the pressures.
 
-    columns : names in the files of x, y, dx, dy, dz, None where their format tells. flag_column :
-    rows where it is not zero are doubtful. comment : lines that start so are skipped. length_scale
-    : mm per unit of files that do not name theirs. format : its name, None where it is found.
+    columns : names in the files of x, y, dx, dy, dz, perhaps z, None where their format tells.
+    flag_column : rows where it is not zero are doubtful. comment : lines that start so are skipped.
+    length_scale : mm per unit of files that do not name theirs. format : its name, None where it
+    is found.
     """
 
     files: tuple[Path, ...]
@@ -111,7 +112,7 @@ def _known(
 
 def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
     names = _file_names(points, place)
-    columns = points.columns.model_dump()
+    columns = points.columns.model_dump(exclude_none=True)
     for name, column in columns.items():
         first = next(other for other in columns if columns[other] == column)
         if first != name:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.data.fields import read_fields
+from bubblefit.data.frames import FLAGGED
 from bubblefit.errors import InputError
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -27,11 +28,11 @@ def test_a_table_becomes_a_field(scratch):
     scratch.write_text("# DIC, frame 7\n\n" + GOOD)
     (field,) = read_fields([scratch], [0.3], flag_column="flag")
     assert field.pressure == 0.3
-    assert field.dropped == 1
+    assert field.dropped == {FLAGGED: 1}
     np.testing.assert_array_equal(field.points, [[1, 2], [7, 8]])
     np.testing.assert_array_equal(field.displacement, [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]])
     (everything,) = read_fields([str(scratch)], [0.3])
-    assert (len(everything.points), everything.dropped) == (3, 0)
+    assert (len(everything.points), everything.dropped) == (3, {})
 
 
 def test_names_units_and_comments_are_the_callers(scratch):
@@ -42,10 +43,31 @@ def test_names_units_and_comments_are_the_callers(scratch):
     np.testing.assert_array_equal(field.displacement, [[5000, 4000, 3000]])
 
 
+def test_the_height_of_the_reference_state_is_read_where_it_is_there(scratch):
+    assert read_fields([_written(scratch, GOOD)], [1.0])[0].z is None
+    high = "x,y,z,dx,dy,dz\n1,2,-0.5,0.1,0.2,0.3\n4,5,0.25,0.4,0.5,0.6\n"
+    (field,) = read_fields([_written(scratch, high)], [1.0], length_scale=10.0)
+    np.testing.assert_array_equal(field.z, [-5.0, 2.5])
+    # Under another name only where it is named; then it must be there.
+    other = high.replace("z,", "height,", 1)
+    columns = {name: name for name in NAMES} | {"z": "height"}
+    (field,) = read_fields([_written(scratch, other)], [1.0], columns)
+    np.testing.assert_array_equal(field.z, [-0.5, 0.25])
+    assert field.source.columns["z"] == "height" and field.path == scratch
+    assert "column 'height': this column is missing" in complaint(
+        read_fields, [_written(scratch, high)], [1.0], columns
+    )
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
 def test_a_doubtful_row_may_hold_anything(scratch):
     scratch.write_text(GOOD.replace("-4,5,0.4,0.5,0.6,1", "-4,5,nan,,speckle,1"))
     (field,) = read_fields([scratch], [1.0], flag_column="flag")
-    assert field.dropped == 1
+    assert field.dropped == {FLAGGED: 1}
     assert "line 3, column 'dx'" in complaint(read_fields, [scratch], [1.0])
 
 
@@ -71,7 +93,7 @@ def test_good_tables_come_back_exactly(scratch, rows, order, breaks, preamble, b
     (field,) = read_fields([scratch], [0.1], flag_column="flag")
     kept = np.array([row[:5] for row in rows if row[5] == 0])
     np.testing.assert_array_equal(np.hstack([field.points, field.displacement]), kept)
-    assert field.dropped == len(rows) - len(kept)
+    assert sum(field.dropped.values()) == len(rows) - len(kept)
 
 
 BAD_CELLS = ["", " ", "nan", "NaN", "inf", "-inf", "1e999", "9" * 400, "1;2", "1.2.3", "x", "0x1"]
@@ -181,7 +203,8 @@ def test_the_real_tests_are_read_whole(shared_data):
         for path, field in zip(files, fields, strict=True):
             rows = [line for line in path.read_text().splitlines() if line[:1] not in "#x"]
             flagged = sum(not line.endswith(",0") for line in rows)
-            assert (len(field.points), field.dropped) == (len(rows) - flagged, flagged)
+            assert len(field.points) == len(rows) - flagged
+            assert field.dropped == ({FLAGGED: flagged} if flagged else {})
         apex = [f.displacement[:, 2].max() for f in fields]
         assert (np.diff(apex) > 0).all()
         assert np.abs(fields[0].points).max() < 100

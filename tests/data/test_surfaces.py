@@ -47,7 +47,7 @@ def test_coefficients_stand_in_the_order_of_equation_4_4():
     c = random.standard_normal((3, 25))
     points = on_a_disk(300, 1, radius=1.5)
     u = np.stack([equation_4_4(row, *points.T) for row in c], axis=1)
-    surface = fit_surface(DisplacementField(0.3, points, u, 0), 4)
+    surface = fit_surface(DisplacementField(0.3, points, u), 4)
     np.testing.assert_allclose(surface.physical, c, atol=1e-10)
     np.testing.assert_allclose(surface.r_squared, 1.0, atol=1e-12)
     assert surface.scale == np.abs(points).max()
@@ -68,7 +68,7 @@ def test_a_polynomial_of_the_degree_is_met_exactly(degree, extra, seed, radius):
         return np.polynomial.polynomial.polyval2d(*(points / radius).T, terms.transpose(1, 2, 0)).T
 
     points = on_a_disk(600, seed, radius)
-    surface = fit_surface(DisplacementField(0.1, points, exact(points), 0), min(degree + extra, 8))
+    surface = fit_surface(DisplacementField(0.1, points, exact(points)), min(degree + extra, 8))
     elsewhere = on_a_disk(100, seed + 1, 0.9 * radius)
     np.testing.assert_allclose(surface.evaluate(elsewhere), exact(elsewhere), atol=1e-8)
     np.testing.assert_allclose(surface.r_squared, 1.0, atol=1e-10)
@@ -80,21 +80,21 @@ def test_r_squared_is_the_share_explained():
     x = points[:, 0]
     # Noise as large as the signal explains half; a constant direction is met; pure noise is not.
     u = np.stack([x + np.std(x) * random.standard_normal(2000), 0 * x + 3, 0 * x], axis=1)
-    surface = fit_surface(DisplacementField(0.1, points, u, 0), 1)
+    surface = fit_surface(DisplacementField(0.1, points, u), 1)
     assert surface.r_squared[0] == pytest.approx(0.5, abs=0.05)
     np.testing.assert_array_equal(surface.r_squared[1:], 1.0)
     u[:, 2] = random.standard_normal(2000)
-    assert fit_surface(DisplacementField(0.1, points, u, 0), 1).r_squared[2] < 0.02
+    assert fit_surface(DisplacementField(0.1, points, u), 1).r_squared[2] < 0.02
 
 
 def test_points_that_do_not_settle_the_coefficients():
     few = on_a_disk(24, 1)
-    field = DisplacementField(0.022, few, np.zeros((24, 3)), 0)
+    field = DisplacementField(0.022, few, np.zeros((24, 3)))
     message = complaint(fit_surface, field, 4)
     assert "degree 4 at 22 kPa" in message
     assert "25 coefficients need as many points, there are 24" in message
     line = np.stack([np.linspace(-1, 1, 100), np.zeros(100)], axis=1)
-    message = complaint(fit_surface, DisplacementField(0.022, line, np.zeros((100, 3)), 0), 4)
+    message = complaint(fit_surface, DisplacementField(0.022, line, np.zeros((100, 3))), 4)
     assert "5 of 25 coefficients" in message
     for degree in (-1, 13):
         assert complaint(fit_surface, field, degree).startswith("degree")
@@ -105,7 +105,7 @@ def surfaces() -> tuple[DisplacementSurface, ...]:
     random = np.random.default_rng(8)
     points = on_a_disk(400, 2)
     return tuple(
-        fit_surface(DisplacementField(p, points, random.standard_normal((400, 3)), 0), degree)
+        fit_surface(DisplacementField(p, points, random.standard_normal((400, 3))), degree)
         for p, degree in ((0.022, 4), (0.097, 0), (0.3, 8))
     )
 
@@ -167,7 +167,7 @@ def test_a_damaged_surface_file_is_refused(tmp_path, surfaces, old, new, words):
 def test_any_bad_cell_in_a_surface_file_is_refused_or_a_number(tmp_path_factory, column, cell):
     path = tmp_path_factory.getbasetemp() / "bad-surfaces.csv"
     points = on_a_disk(60, 2)
-    write_surfaces([fit_surface(DisplacementField(0.1, points, np.ones((60, 3)), 0), 4)], path)
+    write_surfaces([fit_surface(DisplacementField(0.1, points, np.ones((60, 3))), 4)], path)
     lines = [line.split(",") for line in path.read_text().splitlines()]
     lines[2][column] = cell
     path.write_text("\n".join(map(",".join, lines)))

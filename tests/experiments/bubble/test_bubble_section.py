@@ -141,7 +141,7 @@ def test_bad_input_names_file_and_field(edit, tmp_path: Path, old, new, words):
         ("{index:02d}", "{number}", ["data.points.pattern", "{index}"]),
         ("{index:02d}", "02", ["data.points.pattern", "same file"]),
         ("pattern =", 'files = ["a.csv"]\npattern =', ["data.points", "exactly one"]),
-        ('dz = "dz"', 'w = "dz"', ["data.points.columns.w", "allowed here: x, y, dx, dy, dz"]),
+        ('dz = "dz"', 'w = "dz"', ["data.points.columns.w", "allowed here: x, y, z, dx, dy, dz"]),
     ],
 )
 def test_bad_point_files(edit, old, new, words):
