@@ -16,14 +16,11 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from known_solution import known_model_and_law
 
 ROOT = Path(__file__).resolve().parent.parent
-DATA = ROOT.parent / "shared" / "data" / "benchmarks" / "marc_bubble_profiles.csv"
+DATA = ROOT / "tests" / "published" / "marc_bubble_profiles.csv"
 
 
 def main() -> None:
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else DATA
-    if not path.is_file():
-        print(f"skipped: no published profiles in {path}")
-        return
     published = pd.read_csv(path, comment="#")
     model, law = known_model_and_law()
     history = MembraneSolver().run(model, law)

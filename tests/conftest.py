@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
 import pytest
-from bubblefit.errors import BubblefitError
 from bubblefit.experiments import registry as experiments
 from bubblefit.solvers import registry as solvers
-from bubblefit.solvers.calculix.executable import Executable, find_ccx
+from bubblefit.solvers.calculix.executable import Executable
 from hypothesis import settings
 
+from . import needs
 from .bars import BarKind, BarSolver
 
 # The first call of a kernel compiles it, or reads it from the cache.
@@ -22,22 +21,14 @@ settings.load_profile("bubblefit")
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Folder of measured data beside the repository; tests that need it skip without."""
-    folder = Path(__file__).resolve().parents[2] / "shared" / "data"
-    if not folder.is_dir():
-        pytest.skip(f"no measured data: {folder} is not there")
-    return folder
+    """Folder of measured data beside the repository; see `needs`."""
+    return needs.measured_data()
 
 
 @pytest.fixture(scope="session")
 def ccx() -> Executable:
-    """A ccx that can load material libraries; without one tests skip, except in CI."""
-    try:
-        return find_ccx()
-    except BubblefitError as error:
-        if os.environ.get("CI"):
-            pytest.fail(f"CI needs CalculiX: {error}")
-        pytest.skip(str(error))
+    """A ccx that can load material libraries; see `needs`."""
+    return needs.calculix()
 
 
 @pytest.fixture

@@ -1,14 +1,13 @@
 """Fortran subroutines as their host programs would load them: compiled, called through ctypes."""
 
 import ctypes
-import shutil
 import subprocess
 
 import numpy as np
-import pytest
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 
+from . import needs
 from .marc_stand_in.piecewise import piecewise_law
 
 # Table 4.2, MPa.
@@ -61,13 +60,8 @@ LAWS = {
 
 
 def build(folder, source, *flags, beside=""):
-    """Compile the text `source` (and `beside`, what the host program has) into a library.
-
-    Skips where there is no gfortran.
-    """
-    compiler = shutil.which("gfortran")
-    if compiler is None:
-        pytest.skip("no Fortran compiler: install gfortran")
+    """Compile the text `source` (and `beside`, what the host program has) into a library."""
+    compiler = needs.fortran()
     folder.mkdir(parents=True, exist_ok=True)
     names = []
     for name, text in (("law.f", source), ("host.f", beside)):

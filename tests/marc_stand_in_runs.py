@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from bubblefit.solvers.marc.solver import MarcSolver
 
+from . import needs
+
 HERE = Path(__file__).resolve().parent
 
 
@@ -34,6 +36,8 @@ class StandIn:
 
     def solver(self, **settings) -> MarcSolver:
         """Marc's adapter on it; increments as the model has them unless said."""
+        if settings.get("law") == "hypela2":
+            needs.fortran()
         scratch = self.folder / "scratch"
         scratch.mkdir(exist_ok=True)
         return MarcSolver(marc=self.program, **{

@@ -7,5 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"
+#: Tables of published numbers, with their sources.
+PUBLISHED = ROOT / "tests" / "published"
 #: Measured data beside the repository.
 SHARED = ROOT.parent / "shared" / "data"

@@ -15,15 +15,14 @@ from bubblefit.data.load_polynomials import fit_load_polynomial, specimen_scatte
 from bubblefit.data.published_polynomials import read_published_polynomials
 
 from ..complaints import complaint
+from ..places import PUBLISHED
 
 EXAMPLE = Path(__file__).parents[2] / "examples/uniaxial-valmex7318/curves.csv"
 
 
-def test_our_copy_is_the_published_file(shared_data):
+def test_the_examples_have_the_published_polynomials():
     ours = read_published_polynomials(EXAMPLE)
-    theirs = read_published_polynomials(
-        shared_data / "benchmarks/published_uniaxial_polynomials.csv"
-    )
+    theirs = read_published_polynomials(PUBLISHED / "published_uniaxial_polynomials.csv")
     assert list(ours) == list(theirs) == ["warp", "fill", "bias"]
     for direction, one in ours.items():
         other = theirs[direction]

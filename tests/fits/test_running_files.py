@@ -18,6 +18,8 @@ from bubblefit.fits.store import RESULT, RUN, Store
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from .. import needs
+
 COLUMNS = ["beta_3_GPa", "beta_7_GPa", "beta_11_GPa"]
 SCALE = [1000.0] * 3
 
@@ -227,7 +229,7 @@ def test_a_path_under_a_file(tmp_path: Path) -> None:
 
 def test_a_folder_that_takes_no_files() -> None:
     if not Path("/proc/self").is_dir():
-        pytest.skip("no /proc here: nothing that is read-only even to root")
+        needs.missing("no /proc here: nothing that is read-only even to root")
     with pytest.raises(OutputError, match="--out") as caught:
         begin(Folder(Path("/proc/self/out")))
     assert caught.value.exit_code == 2 and "\n" not in str(caught.value)

@@ -3,7 +3,6 @@
 import dataclasses
 import io
 import json
-import shutil
 import subprocess
 
 import numpy as np
@@ -19,6 +18,7 @@ from bubblefit.solvers.calculix.library import SOURCE, constants
 from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner
 
+from .. import needs
 from ..fortran_build import BETA, LAWS
 from ..solvers.calculix.test_calculix_law import expected, patch_deck, tensor, voigt
 
@@ -284,13 +284,12 @@ def test_calculix_text_holds_the_constants_and_the_source():
 
 def test_ccx_runs_the_exported_card(ccx, tmp_path, monkeypatch):
     """As its heading says: the C file compiled by that line, the material included in a deck."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    assert compiler is not None  # there is a ccx that needs one
+    compiler = needs.c_compiler()
     made = export("calculix")
     (tmp_path / "FILE.c").write_text(made.files[".c"])
     (line,) = [text for text in made.files[".inp"].splitlines() if text.startswith("**   cc ")]
     command = line.removeprefix("**   cc ").split()
-    subprocess.run([compiler, *command], cwd=tmp_path, check=True)
+    subprocess.run([*compiler, *command], cwd=tmp_path, check=True)
     (tmp_path / "card.inp").write_text(made.files[".inp"])
     (tmp_path / "any name.law").write_text(made.files[".law"])
     gradient = np.eye(3)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +16,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import logm, polar, sqrtm
+
+from ..places import PUBLISHED
 
 # Thesis Table 4.2, "solution", GPa.
 TABLE_4_2 = [
@@ -128,9 +129,9 @@ def test_only_what_couples_warp_and_fill_depends_on_the_increments() -> None:
 
 
 @pytest.mark.parametrize("increments", [1, 7, 500])
-def test_marc_uniaxial_end_stresses(shared_data: Path, increments: int) -> None:
+def test_marc_uniaxial_end_stresses(increments: int) -> None:
     """Composite Structures 2017 preprint (digitised): four digits, all four models."""
-    table = shared_data / "benchmarks" / "marc_uniaxial_end_stress.csv"
+    table = PUBLISHED / "marc_uniaxial_end_stress.csv"
     lines = [line for line in table.read_text().splitlines() if not line.startswith("#")]
     rows = list(csv.DictReader(lines))
     assert len(rows) == 4

@@ -16,6 +16,7 @@ from bubblefit.meshes.mesh import Mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from .. import needs
 from ..mesh_quality import scaled_jacobian
 
 RADIUS = 100.0
@@ -154,10 +155,7 @@ def test_scaled_jacobian_of_known_shapes(corners, wanted):
 
 
 def test_gmsh_makes_a_sound_mesh_too():
-    try:
-        import gmsh
-    except (ImportError, OSError) as missing:
-        pytest.skip(f"gmsh cannot be loaded: {missing}")
+    gmsh = needs.library("gmsh")
     for symmetry in ("full", "quarter"):
         mesh = disk_mesh(RADIUS, 800, symmetry, "gmsh")
         check_sound(mesh, symmetry)

@@ -27,6 +27,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from ..places import PUBLISHED
+
 U = np.linspace(0.0, 4.0, 41)
 STRAINS = np.linspace(0, [0.15, 0.2, 0.6], 20).T
 MODULI = np.array([[800.0], [150.0], [20.0]]) * (1 + STRAINS)
@@ -154,13 +156,13 @@ def test_many_names_stay_apart() -> None:
 def test_measured_loads(tmp_path: Path, drawn: list[Figure], shared_data: Path) -> None:
     """The published polynomials lie on the published points, to their scatter."""
 
-    def rows(name: str) -> list[dict[str, str]]:
-        with (shared_data / name).open() as text:
+    def rows(path: Path) -> list[dict[str, str]]:
+        with path.open() as text:
             return list(csv.DictReader(line for line in text if not line.startswith("#")))
 
     curves = []
-    points = rows("uniaxial/valmex7318_load_gauge.csv")
-    for row in rows("benchmarks/published_uniaxial_polynomials.csv"):
+    points = rows(shared_data / "uniaxial/valmex7318_load_gauge.csv")
+    for row in rows(PUBLISHED / "published_uniaxial_polynomials.csv"):
         own = [p for p in points if p["series"] == row["direction"]]
         x, y = (np.array([float(p[k]) for p in own]) for k in ("gauge_disp_mm", "load_N"))
         u = np.linspace(0.0, x.max(), 2001)  # to the last point, as they were fitted

@@ -22,6 +22,8 @@ from bubblefit.solvers.calculix.reasons import collapsed, increments
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 
+from ... import needs
+
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 STA = """SUMMARY OF JOB INFORMATION
   STEP      INC     ATT  ITRS     TOT TIME     STEP TIME      INC TIME
@@ -241,7 +243,7 @@ def test_a_full_file_system(ccx, tmp_path):
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place]
     if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
-        pytest.skip("a small file system can only be mounted by root")
+        needs.missing("a small file system can only be mounted by root")
     try:
         with pytest.raises(
             (SolverFailure, OutputError), match=r"No space left|disk full|truncated"

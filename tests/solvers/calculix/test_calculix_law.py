@@ -3,7 +3,6 @@
 import ctypes
 import math
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from bubblefit.solvers.calculix import library
 from bubblefit.solvers.calculix.law_file import law_files, law_number
 from bubblefit.solvers.calculix.library import STATE_VARIABLES, material_library
 
+from ... import needs
 from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -25,9 +25,7 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    if not os.environ.get("CC") and not (shutil.which("cc") or shutil.which("gcc")):
-        stop = pytest.fail if os.environ.get("CI") else pytest.skip
-        stop("no C compiler: install gcc")
+    needs.c_compiler()
     return tmp_path_factory.mktemp("cache")
 
 

@@ -1,4 +1,4 @@
-"""Our decks and post files by a reader that is not ours: meshioplusplus, where it is installed."""
+"""Our decks and post files by a reader that is not ours: meshioplusplus."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from bubblefit.solvers.marc.cylinder import bending_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.t19 import T19File
 
+from ... import needs
 from ...marc_files import t19_text
 
-other = pytest.importorskip("meshioplusplus", reason="pip install meshioplusplus to compare")
+other = needs.library("meshioplusplus")
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 
 

@@ -18,6 +18,7 @@ from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.strip import strip_deck
 
+from ... import needs
 from ...fortran_build import LAWS
 from ...marc_stand_in.bodies import collar_of, first_touch, support_of
 from ...marc_stand_in.fields import DeckError
@@ -96,6 +97,7 @@ def test_the_collar_touches_after_half_a_millimetre(tmp_path, diameter, size):
 
 @pytest.mark.parametrize("name", sorted(LAWS))
 def test_the_law_is_found_in_tables_and_in_the_subroutine(tmp_path, name):
+    needs.fortran()
     law = LAWS[name]
     content = read(tmp_path, bubble(MarcSettings(law="hypela2"), law))
     source = tmp_path / "hypela2.f"

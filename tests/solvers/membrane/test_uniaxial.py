@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +20,8 @@ from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import newton
 from bubblefit.solvers.membrane.driven import Pull
 from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ...places import PUBLISHED
 
 # Thesis Table 3.2, GPa.
 TABLE_3_2 = [
@@ -540,13 +541,13 @@ def test_a_modulus_that_turns_negative_on_the_way_fails_there() -> None:
     ],
 )
 def test_table_3_2_on_the_published_curves(
-    shared_data: Path, direction: str, thickness_change: str, error: float
+    direction: str, thickness_change: str, error: float
 ) -> None:
     """RMS in N (Eqs 3.4-3.6), as measured here: a change of model or mesh shows.
 
     The thesis has 50.1 N for the sum; ours is 172.8 N, nearly all of it in the bias strip.
     """
-    path = shared_data / "benchmarks" / "published_uniaxial_polynomials.csv"
+    path = PUBLISHED / "published_uniaxial_polynomials.csv"
     with path.open() as lines:
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     row = next(row for row in rows if row["direction"] == direction)

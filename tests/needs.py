@@ -1,0 +1,79 @@
+"""What tests need that is not there everywhere: programs, libraries, measured data.
+
+The one place where a test is left out. Without the thing it skips and says why; in CI, where
+`.ci/run` sets `CI`, it fails: a green run there has run everything.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import NoReturn
+
+import pytest
+from bubblefit.errors import BubblefitError
+from bubblefit.solvers.calculix.executable import Executable, find_ccx
+from bubblefit.solvers.calculix.library import compiler
+
+from .places import SHARED
+
+
+def missing(what: str) -> NoReturn:
+    """Skip the test, in CI fail it; `what` is not there, and how to get it."""
+    if os.environ.get("CI"):
+        pytest.fail(f"CI runs every test: {what}", pytrace=False)
+    pytest.skip(what, allow_module_level=True)
+
+
+def program(*names: str, package: str) -> str:
+    """Path of the first of these programs that there is; `package` brings one."""
+    for name in names:
+        if path := shutil.which(name):
+            return path
+    missing(f"there is no {' or '.join(names)}: install {package}")
+
+
+def fortran() -> str:
+    """The Fortran compiler."""
+    return program("gfortran", package="gfortran")
+
+
+def c_compiler() -> list[str]:
+    """The C compiler as a command, as the CalculiX adapter looks for it."""
+    try:
+        return compiler()
+    except BubblefitError as error:
+        missing(str(error))
+
+
+def library(name: str) -> ModuleType:
+    """A Python library, or one that cannot be loaded here."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError) as error:
+        missing(f"{name} cannot be loaded: {error}")
+
+
+def linux(what: str) -> None:
+    """`what` is tried on Linux only."""
+    if sys.platform != "linux":
+        missing(f"{what}: tried on Linux")
+
+
+def calculix() -> Executable:
+    """A ccx that can load material libraries."""
+    try:
+        return find_ccx()
+    except BubblefitError as error:
+        missing(str(error))
+
+
+def measured_data() -> Path:
+    """Folder of the measured data beside the repository."""
+    if not SHARED.is_dir():
+        missing(f"no measured data: {SHARED} is not there")
+    return SHARED
