@@ -3,8 +3,6 @@
 import csv
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +21,7 @@ from bubblefit.solvers.decks import OURS, render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
+from ...commands import bubblefit
 from ...fortran_build import LAWS
 from ...places import PUBLISHED
 
@@ -246,13 +245,6 @@ tolerance = 1e-6
 [solver.calculix]
 element = "S4"
 """
-
-
-def bubblefit(*arguments, cwd, code=0):
-    command = [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)]
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
-    assert done.returncode == code, done.stderr + done.stdout
-    return done
 
 
 def test_commands(ccx, tmp_path):
