@@ -22,12 +22,18 @@ from .cases import CUBIC, LAW, MODEL, single, targets
 
 
 class Thicker:
-    """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes."""
+    """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes.
+
+    fails : numbers of the runs that do. unstable_from : the first whose equilibrium is not stable.
+    """
 
     name, external, progress, identity = "thicker", True, None, "thicker"
 
-    def __init__(self, digits: int = 12, fails: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self, digits: int = 12, fails: tuple[int, ...] = (), unstable_from: int = 1000
+    ) -> None:
         self.digits, self.fails, self.runs = digits, fails, 0
+        self.unstable_from = unstable_from
         self.membrane = MembraneSolver()
 
     def run(self, model: BubbleModel, law: HypoelasticLaw, *unused: object) -> History:
@@ -35,7 +41,8 @@ class Thicker:
         if self.runs in self.fails:
             raise SolverFailure("on purpose", self.name)
         history = self.membrane.run(replace(model, thickness=1.02 * model.thickness), law)
-        return replace(history, displacement=np.round(history.displacement, self.digits))
+        displacement = np.round(history.displacement, self.digits)
+        return replace(history, displacement=displacement, stable=self.runs < self.unstable_from)
 
     def check(self) -> SolverCheck:
         return SolverCheck(self.name, True, "1", True)
@@ -83,6 +90,17 @@ def test_a_failed_run_shortens_the_step_and_the_fit_goes_on() -> None:
     never = led(Thicker(fails=tuple(range(1, 20))))
     assert fit_from(never, feasible_start(never, 1, 0), FitOptions()) is None
     assert never.solver.runs == 4
+
+
+def test_an_unstable_run_is_never_the_result() -> None:
+    """From the second run on equilibria are unstable, and fit better and better."""
+    fit = led(Thicker(unstable_from=2))
+    heard: list[tuple[float | None, str]] = []
+    fit.watch = lambda y, value, status, solver: heard.append((value, status))
+    optimum = fit_from(fit, feasible_start(fit, 1, 0), FitOptions())
+    assert [status for _, status in heard[:2]] == ["ok", "unstable equilibrium"]
+    assert min(value for value, _ in heard[1:]) < heard[0][0]
+    assert optimum.best.stable and optimum.value == heard[0][0]
 
 
 def test_the_best_run_is_returned_when_runs_are_used_up() -> None:

@@ -1,0 +1,32 @@
+"""What fits to noisy data scatter by, for the tests of what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from bubblefit.identification.problem import Evaluation, FitProblem
+
+Array = np.ndarray
+
+
+def noise_of(fit: FitProblem, each: Mapping[str, float], random: np.random.Generator) -> Array:
+    """(m,) white noise of each comparison's data, as it stands in the residual."""
+    sizes = {c.name: sum(c.objective.sizes) for c in fit.comparisons}
+    drawn = [each[name] * random.standard_normal(size) for name, size in sizes.items()]
+    return np.concatenate(drawn) / fit.scale
+
+
+def follows(point: Evaluation, noise: Array) -> Array:
+    """Where the least squares go (unknowns,) that began at `point`, to first order."""
+    assert point.jacobian is not None
+    return np.asarray(np.linalg.lstsq(point.jacobian, noise, rcond=None)[0])
+
+
+def scatter_of(
+    fit: FitProblem, point: Evaluation, each: Mapping[str, float], draws: int = 4000
+) -> Array:
+    """Standard deviation of the unknowns (n,) over drawn noise: sure to 1.1 % with 4000 draws."""
+    random = np.random.default_rng(11)
+    noise = np.array([noise_of(fit, each, random) for _ in range(draws)])
+    return np.asarray(np.std(follows(point, noise.T), axis=1))
