@@ -78,6 +78,29 @@ def test_tables(fitted: bf.Fit, tmp_path: Path):
     assert result_in(tmp_path)["valid_strain"]["warp"] == pytest.approx(card.law.strain_range[0])
 
 
+def test_the_listed_uncertainty_is_one_standard_deviation(fitted: bf.Fit):
+    """In the table and on the page as in the numbers that were reckoned."""
+    sure, moduli = fitted.best.certainty, fitted.moduli()
+    assert sure is not None
+    for name, sigma in sure.sigma.items():
+        own = moduli[moduli["modulus"] == name]
+        assert own["sigma_relative"].to_numpy() == pytest.approx(sigma)
+        said = fitted.result["uncertainty"]
+        assert said["largest_relative_sigma"][name] == pytest.approx(float(sigma.max()))
+        assert said["median_relative_sigma"][name] == pytest.approx(float(np.median(sigma)))
+
+
+def test_the_card_holds_for_the_strains_that_were_reached(fitted: bf.Fit):
+    """Less than the range that the law was given: beyond, its moduli are nobody's finding."""
+    (history,) = fitted.best.point.histories
+    reached = np.maximum(history.strain_max, np.abs(history.strain_min) * [0, 0, 1])
+    assert (reached < 0.95 * fitted.law.strain_range).any()
+    assert fitted.best.reached == pytest.approx(reached)
+    expected = np.minimum(reached, fitted.law.strain_range)
+    assert fitted.card.law.strain_range == pytest.approx(expected)
+    assert list(fitted.result["valid_strain"].values()) == pytest.approx(expected.tolist())
+
+
 def test_progress_is_told_of_everything(fitted: bf.Fit):
     heard: list[object] = []
     again = bf.fit(fitted.project, starts=1, jobs=1, progress=heard.append)
@@ -116,6 +139,23 @@ def test_a_best_fit_that_gives_another_objective_is_a_failure(fitted: bf.Fit):
     only = [r for r in others if r.number == first.number]
     with pytest.raises(SolverFailure, match="from the unloaded state"):
         best.best_fit(fitted.problem, only, fitted.project.fit.tolerance)
+
+
+def test_the_best_start_is_the_one_run_again(fitted: bf.Fit):
+    """Whatever its number; one that found no start at all is no candidate."""
+    good = fitted.best.ranked[0]
+    unknowns = tuple(1.02 * u for u in good.unknowns)
+    others = [
+        best.replace(good, objective=good.objective + 0.1, unknowns=unknowns),
+        best.replace(good, objective=None, unknowns=()),
+    ]
+    for k in range(3):
+        records = [*others[:k], good, *others[k:]]
+        records = [best.replace(r, number=number) for number, r in enumerate(records)]
+        again = best.best_fit(fitted.problem, records, fitted.project.fit.tolerance)
+        assert again.ranked[0].number == k
+        np.testing.assert_array_equal(again.law.beta, fitted.law.beta)
+        assert again.objective == pytest.approx(fitted.objective, abs=1e-9)
 
 
 def test_two_bubbles_with_offsets_of_their_own(tmp_path: Path):

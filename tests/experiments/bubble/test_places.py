@@ -1,13 +1,40 @@
-"""Fields folded onto a quarter, and mirrored from it."""
+"""Fields folded onto the quarter that is fitted, and mirrored from it."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from bubblefit.data.fields import DisplacementField
 from bubblefit.experiments.bubble.places import folded, mirrored
 
 POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])
 MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])
+
+
+def inflated(points: np.ndarray) -> np.ndarray:
+    """Displacement of a doubly symmetric bubble, another along x than along y."""
+    x, y = points.T
+    height = 1.0 - 0.6 * x**2 - 0.8 * y**2
+    return np.stack([0.3 * x * height, -0.2 * y * height**2, height], axis=1)
+
+
+def test_a_field_is_turned_as_it_is_folded() -> None:
+    """Every place lies in the quarter, and shows there what the quarter itself shows."""
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (40, 2))
+    assert {tuple(s) for s in np.sign(points)} == {(1, 1), (1, -1), (-1, 1), (-1, -1)}
+    field = folded(DisplacementField(0.1, points, inflated(points)))
+    assert (field.points == np.abs(points)).all()
+    assert field.displacement == pytest.approx(inflated(np.abs(points)), abs=1e-15)
+
+
+def test_a_quarter_mirrored_is_the_whole_and_folds_back() -> None:
+    points = np.random.default_rng(2).uniform(0.0, 1.0, (10, 2))
+    points[0], points[1] = (0.0, 0.5), (0.4, 0.0)  # on the axes once, not twice
+    whole = mirrored(DisplacementField(0.1, points, inflated(points)))
+    assert len(whole.points) == 4 * 8 + 2 * 2
+    assert whole.displacement == pytest.approx(inflated(whole.points), abs=1e-15)
+    again = folded(whole)
+    assert again.displacement == pytest.approx(inflated(again.points), abs=1e-15)
 
 
 def test_each_point_keeps_its_height_and_sigma():

@@ -108,6 +108,14 @@ def test_its_own_error_message_is_the_reason(fake):
     assert len(found.log_tail.splitlines()) == 25 and "line 30" in str(found)
 
 
+def test_its_exit_code_counts_whatever_it_says(fake):
+    """A log that ends well, results and all, and then an exit code that does not."""
+    script = f"cat > job.sta <<'.'\n{STA}.\necho ' Job finished'; touch job.frd; exit 3"
+    found = failure(fake(script))
+    assert found.reason == "ended badly after step 1, increment 2"
+    assert found.exit_number == 3
+
+
 def test_killed_in_the_middle(fake):
     found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\nkill -9 $$"))
     assert found.reason == "killed by SIGKILL after step 1, increment 2"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,13 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane import bending, closed_model
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.contact import brought_to_touch, contact_forces, gaps
+from bubblefit.solvers.membrane.flexure import flexure_of
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.wall import Wall
 
 from ...closed_meshes import half_tube, tube_warp
 
@@ -176,6 +180,45 @@ def test_work_of_the_collar_is_what_gas_and_fabric_store() -> None:
         volume[-1] - volume[0]
     )
     assert work == pytest.approx(model.copies * stored + gas, rel=0.01)
+
+
+def test_a_wall_bends_with_all_of_its_stiffness_unless_told_otherwise() -> None:
+    """D = E t^3/12 along every line, not none of it."""
+    membranes = [
+        closed_model.prepare(beam(), LINEAR, 1e-9, solver.wall)
+        for solver in (MembraneSolver(), MembraneSolver(bending_stiffness=1.0))
+    ]
+    model = beam()
+    planes = np.zeros(model.mesh.points.shape, dtype=bool)
+    for name, axis in (("symmetry_x", 0), ("symmetry_z", 2)):
+        planes[model.mesh.node_sets[name], axis] = True
+    whole = flexure_of(model.mesh.points, model.mesh.quads, model.warp, model.thickness, planes)
+    for membrane in membranes:
+        assert membrane.flexure is not None
+        assert membrane.flexure.shares == pytest.approx(whole.shares)
+    none = closed_model.prepare(beam(), LINEAR, 1e-9, Wall(bending_stiffness=0.0))
+    assert none.flexure is None
+
+
+def test_a_jump_between_frames_is_remarked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every frame but the first two jumps, where no node may leave its line."""
+    moves = (2.0, 4.0, 6.0, 8.0)
+    assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
+    monkeypatch.setattr(bending, "SNAP", 1e-6)
+    (remark,) = [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
+    assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
+
+
+def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three N mm in the quarter's every step: most of the load where the step is shortest."""
+    monkeypatch.setattr(ClosedMembrane, "wrinkle_work", lambda *_: 3.0)
+    solver = MembraneSolver(1e-9, wrinkle_stiffness=0.01)
+    history = solver.run(beam((2.0, 6.0)), LINEAR)
+    (remark,) = [r for r in history.remarks if "left to wrinkles" in r]
+    said = re.search(r"\(0\.01 of the taut fabric's\) carries (\S+) % of the largest load", remark)
+    assert said is not None
+    carried = 4 * 3.0 / 2.0  # of the whole beam, N
+    assert float(said[1]) == pytest.approx(100 * carried / history.load.max(), rel=0.05)
 
 
 def test_mistakes_in_the_plan() -> None:

@@ -154,7 +154,7 @@ class PlaneEnds:
         excess_force(self.stretched)
         radius, height = self.radius(), (self.points + self.displacement)[self.end, 1]
         middle = 0.5 * (height.max() + height.min())
-        wrinkled = float((self.membrane.wrinkle != 0).any(axis=2).mean())
+        wrinkled = self.membrane.wrinkled_share(np.ones(len(self.membrane.quads), dtype=bool))
         return wrinkled, self.pull() @ (height - middle) / (np.pi * PRESSURE * radius**3), radius
 
     def pull(self) -> np.ndarray:
