@@ -1,4 +1,4 @@
-# make demo, make test, make lint, make bench, make docs: each does all the set-up it needs.
+# make demo, make test, make lint, make bench, make docs, make mutants: each does all the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test lint bench docs calculix clean
+.PHONY: demo test lint bench docs mutants calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -32,6 +32,14 @@ bench: $(READY)
 # Pages of the Python interface, from the docstrings.
 docs: $(READY)
 	$(BIN)/python docs/make_api.py
+
+# Small faults put into a copy of the code, and which of them no test notices: all of them, or
+# CHANGED=1 (or =COMMIT) of the files that changed, MINUTES=5 at most, NUMBER=100 drawn by SEED=2,
+# FILES="fits/store.py".
+mutants: $(READY)
+	$(BIN)/python -m tests.mutants $(if $(CHANGED),--changed $(CHANGED)) \
+	    $(if $(MINUTES),--minutes $(MINUTES)) $(if $(NUMBER),--number $(NUMBER)) \
+	    $(if $(SEED),--seed $(SEED)) $(FILES)
 
 calculix:
 	@sh .ci/calculix

@@ -1,0 +1,95 @@
+"""What becomes of a mutant: the tests that run its line, on the copy with the change in it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from . import server
+from .drawing import Mutant
+from .house import environment, instead
+from .measured import Measured
+
+#: A test that takes this many times its own time, and so many seconds, runs for ever.
+PATIENCE = (8.0, 30.0)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """outcome: caught, survived, or unrun (no test runs the line); by: the test that caught it;
+    tests: how many there were to catch it"""
+
+    mutant: Mutant
+    outcome: str
+    by: str = ""
+    tests: int = 0
+
+
+class Judge:
+    """Tests run by a process of its own (`server`) in the copy `house`."""
+
+    def __init__(self, house: Path, measured: Measured, limit: float) -> None:
+        self.house, self.measured, self.limit = house, measured, limit
+        self.unfit: set[str] = set()
+        self.process: subprocess.Popen[str]
+
+    def __enter__(self) -> Judge:
+        self.process = subprocess.Popen(
+            [sys.executable, server.__file__],
+            cwd=self.house,
+            env=environment(self.house),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    def run(self, tests: list[str]) -> dict[str, str]:
+        """outcome and test as `server.outcome` has them."""
+        factor, least = PATIENCE
+        seconds = least + factor * sum(map(self.measured.cost, tests))
+        into: IO[Any] | None = self.process.stdin
+        out: IO[Any] | None = self.process.stdout
+        assert into is not None and out is not None
+        into.write(json.dumps({"tests": tests, "seconds": seconds}) + "\n")
+        into.flush()
+        return json.loads(out.readline())
+
+    def judge(self, mutant: Mutant) -> Verdict:
+        """A test that fails without the change, too, catches nothing and is left out."""
+        while True:
+            tests = self.measured.tests(mutant.file, mutant.first, mutant.last, self.limit)
+            tests = [test for test in tests if test not in self.unfit]
+            if not tests:
+                return Verdict(mutant, "unrun")
+            with instead(self.house / mutant.file, mutant.source):
+                done = self.run(tests)
+            by = done["test"]
+            if done["outcome"] == "survived":
+                return Verdict(mutant, "survived", tests=len(tests))
+            if by not in self.measured.seconds or self.fit(by):
+                return Verdict(mutant, "caught", by or done["outcome"], len(tests))
+
+    def fit(self, test: str) -> bool:
+        """Whether a test passes on the code as it is, alone in this process."""
+        if self.run([test])["outcome"] != "survived":
+            self.unfit.add(test)
+        return test not in self.unfit
+
+
+@contextmanager
+def judge(house: Path, measured: Measured, limit: float) -> Iterator[Judge]:
+    """A judge whose process ends with the block."""
+    with Judge(house, measured, limit) as one:
+        yield one

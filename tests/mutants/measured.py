@@ -1,0 +1,130 @@
+"""Which tests run which line of a file, measured by running them once on the code as it is."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import xml.etree.ElementTree as xml
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from coverage import CoverageData
+
+from .house import environment
+
+#: The processes that a test starts count as the test (tests/commands.py hands its name on).
+SETTINGS = """
+[run]
+source = {house}
+omit = */tests/*
+context = ${{PYTEST_CURRENT_TEST-}}
+data_file = {folder}/coverage
+parallel = true
+patch = subprocess
+"""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """lines: file -> line -> tests (name as pytest has it); seconds: that a test takes."""
+
+    lines: dict[str, dict[int, set[str]]]
+    seconds: dict[str, float]
+
+    def tests(self, file: str, first: int, last: int, limit: float) -> list[str]:
+        """Those that run a line of a statement, for a line that runs at import those of the file.
+
+        Tests of the module's own name first, then the quick ones, for `limit` seconds in all.
+        """
+        known = self.lines.get(file, {})
+        found = set().union(*(known.get(line, set()) for line in range(first, last + 1)))
+        if found <= {""}:
+            at_import = any(line in known for line in range(first, last + 1))
+            found = set().union(*known.values()) if at_import else set()
+        own = f"test_{Path(file).stem}"
+        order = sorted(found & {*self.seconds}, key=lambda test: (own not in test, self.cost(test)))
+        total, chosen = 0.0, []
+        for test in order:
+            total += self.cost(test)
+            if chosen and total > limit:
+                break
+            chosen.append(test)
+        return chosen
+
+    def cost(self, test: str) -> float:
+        return self.seconds.get(test, 0.0)
+
+
+def near(house: Path, file: str) -> list[str]:
+    """Test files of a module: all in the folder that mirrors its own, and what imports it."""
+    inside = Path(file)
+    module = "bubblefit." + ".".join(inside.with_suffix("").parts).removesuffix(".__init__")
+    found = set()
+    for path in (house / "tests").rglob("test_*.py"):
+        here = path.relative_to(house)
+        mirrored = inside.parent != Path(".") and here.parent == "tests" / inside.parent
+        if mirrored or module in _imports(path, inside.stem):
+            found.add(here.as_posix())
+    return sorted(found)
+
+
+def _imports(path: Path, word: str) -> set[str]:
+    """Modules that a test file imports, `from x import y` as x and as x.y; none without `word`."""
+    found, text = set(), path.read_text()
+    for node in ast.walk(ast.parse(text if word in text else "")):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return found
+
+
+def measure(
+    house: Path, tests: Iterable[str], folder: Path, processes: int, seconds: float | None = None
+) -> Measured:
+    """Run test files (not what is marked slow); raises TimeoutExpired after `seconds`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    settings = folder / "settings"
+    settings.write_text(SETTINGS.format(house=house, folder=folder))
+    spread = ["-n", str(processes), "--dist", "worksteal"] if processes > 1 else []
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *spread]
+    command += ["-m", "not slow", "-o", "junit_family=xunit1", f"--junitxml={folder}/times.xml"]
+    command += ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
+    with (folder / "log").open("w") as log:
+        subprocess.run(
+            [*command, *tests],
+            cwd=house,
+            env=environment(house),
+            stdout=log,
+            stderr=log,
+            timeout=seconds,
+        )
+    return Measured(_lines(house, folder / "coverage"), _seconds(folder / "times.xml"))
+
+
+def _lines(house: Path, path: Path) -> dict[str, dict[int, set[str]]]:
+    data, found = CoverageData(str(path)), {}
+    data.read()
+    for name in data.measured_files():
+        lines: dict[int, set[str]] = defaultdict(set)
+        for line, contexts in data.contexts_by_lineno(name).items():
+            lines[line] |= {_test(context) for context in contexts}
+        found[Path(name).relative_to(house).as_posix()] = dict(lines)
+    return found
+
+
+def _test(context: str) -> str:
+    """The test's name: `a.py::b|run` of a test, `a.py::b (call)` of a process it started."""
+    return context.rpartition("|")[0] or context.rpartition(" (")[0]
+
+
+def _seconds(path: Path) -> dict[str, float]:
+    """Of the tests that passed."""
+    return {
+        f"{case.get('file')}::{case.get('name')}": float(case.get("time") or 0.0)
+        for case in xml.parse(path).iter("testcase")
+        if not {child.tag for child in case} & {"failure", "error", "skipped"}
+    }

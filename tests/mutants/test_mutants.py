@@ -1,0 +1,180 @@
+"""`make mutants`: what it draws, which tests it runs on it, and what it leaves behind."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from ..places import ROOT
+from . import house, listing, rooms
+from .drawing import draw, places
+from .judging import Verdict, judge
+from .measured import Measured, measure, near
+
+SOURCE = '''"""Pressure in kPa."""
+from dataclasses import dataclass
+
+
+@dataclass
+class Reading:
+    label: str | None = None
+
+
+def shown(value: float | None, **given):
+    """Text of MPa, kPa."""
+    if value >= 2.5:
+        return f"{1e3 * value:g} kPa"
+    return plot(value, linewidth=3, **given)
+'''
+
+
+def drawn(seed=0, number=None, source=SOURCE):
+    return list(draw({"a.py": source}, seed, number))
+
+
+def test_what_is_drawn():
+    changed = {mutant.line for mutant in drawn()}
+    assert changed == {12, 13}  # no annotation, docstring, decorator, look
+    every = {mutant.after for seed in range(60) for mutant in drawn(seed)}
+    assert {
+        "if value > 2.5:", "if value < 2.5:", "if not value >= 2.5:",
+        'return f"{1e3 * value:g} MPa"', 'return f"{1e3 / value:g} kPa"',
+    } <= every  # fmt: skip
+    assert not any(" is " in after or "<<" in after for after in every)
+
+
+def test_a_seed_draws_the_same_and_another_seed_others():
+    source = (ROOT / "identification" / "assessment.py").read_text()
+    one, again, other = (drawn(seed, 12, source) for seed in (1, 1, 2))
+    assert one == again != other and len(one) >= 11
+    for mutant in one:
+        assert mutant.source != source and mutant.first <= mutant.line <= mutant.last
+        compile(mutant.source, "a.py", "exec")
+
+
+def test_every_place_has_the_same_chance():
+    """However many changes there are of it."""
+    at = [place.position for place in places("a.py", SOURCE)]
+    assert len(at) == len(set(at)) and {line for line, _ in at} == {12, 13}
+    share = sum(line == 12 for line, _ in at) / len(at)
+    found = [drawn(seed, 1)[0].line == 12 for seed in range(100)]
+    assert sum(found) / len(found) == pytest.approx(share, abs=0.15)
+
+
+def test_all_rooms_have_files():
+    assert len(rooms.files()) > 100
+    for pattern in rooms.ROOMS:
+        assert rooms.files([pattern]), pattern
+
+
+def test_tests_of_a_line():
+    lines = {"fits/store.py": {1: {""}, 2: {"t::slow", "t::quick"}, 3: {"test_store.py::own"}}}
+    known = Measured(lines, {"t::slow": 9.0, "t::quick": 0.1, "test_store.py::own": 5.0})
+    assert known.tests("fits/store.py", 2, 2, 60.0) == ["t::quick", "t::slow"]
+    assert known.tests("fits/store.py", 2, 3, 60.0)[0] == "test_store.py::own"
+    assert known.tests("fits/store.py", 2, 3, 6.0) == ["test_store.py::own", "t::quick"]
+    assert len(known.tests("fits/store.py", 1, 1, 60.0)) == 3  # runs when the module is loaded
+    assert known.tests("fits/store.py", 7, 7, 60.0) == []
+
+
+def test_tests_near_a_module():
+    found = near(ROOT, "experiments/strips/findings.py")
+    assert "tests/experiments/strips/test_objective.py" in found
+    assert "tests/materials/test_law.py" not in found
+    assert "tests/test_ci.py" not in near(ROOT, "writing.py")
+
+
+@pytest.fixture
+def little(tmp_path: Path) -> Path:
+    """A repository with one module and its tests."""
+    texts = {
+        "__init__.py": "",
+        "rooms/__init__.py": "",
+        "rooms/scale.py": "def kpa(mpa):\n    return 1e3 * mpa\n\n\n"
+        "def large(mpa):\n    return mpa > 2\n\n\ndef unused(mpa):\n    return mpa * 5\n",
+        "tests/rooms/test_scale.py": "import sys\n\nfrom bubblefit.rooms.scale import kpa, large\n"
+        "\n\ndef test_kpa():\n    assert kpa(2) == 2000\n"
+        "\n\ndef test_large():\n    assert large(5)\n"
+        "\n\ndef test_alone():\n    assert 'pytest_cov' in sys.modules and kpa(0) == 0\n",
+        "pyproject.toml": '[tool.pytest.ini_options]\naddopts = "--import-mode=importlib"\n'
+        'markers = ["slow: slow"]\n',
+    }
+    root = tmp_path / "little"
+    for name, text in texts.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    subprocess.run(["git", "init", "-q", root], check=True)
+    return root
+
+
+#: What becomes of a change of the little repository.
+WANTED = {
+    "return 1e3 / mpa": "caught",
+    "return mpa > 3": "survived",
+    "return mpa < 2": "caught",
+    "return mpa // 5": "unrun",
+}
+
+
+def test_caught_survived_and_unrun(little: Path):
+    """`test_alone` passes beside the coverage only: it fails without a change, too."""
+    before = {path: path.read_bytes() for path in little.rglob("*") if path.is_file()}
+    file = "rooms/scale.py"
+    source = (little / file).read_text()
+    mutants = {mutant.after: mutant for seed in range(60) for mutant in draw({file: source}, seed)}
+    with house.copy(little) as copy:
+        known = measure(copy, near(copy, file), copy.parent / "run", processes=1)
+        with judge(copy, known, 60.0) as one:
+            found = {after: one.judge(mutants[after]) for after in WANTED}
+            assert one.fit("tests/rooms/test_scale.py::test_kpa")
+            assert not one.fit("tests/rooms/test_scale.py::test_alone")
+        assert (copy / file).read_text() == source
+    assert not copy.parent.exists()
+    after = {path: path.read_bytes() for path in little.rglob("*") if path.is_file()}
+    assert after == before
+    assert {after: verdict.outcome for after, verdict in found.items()} == WANTED
+    assert found["return 1e3 / mpa"].by == "tests/rooms/test_scale.py::test_kpa"
+    verdicts = list(found.values())
+    assert listing.summary(verdicts) == (
+        "4 mutants: 2 caught, 1 survived, 1 in lines that no test runs"
+    )
+    assert listing.survivors(verdicts) == (
+        "rooms/scale.py:6\n  - return mpa > 2\n  + return mpa > 3\n  (1 tests run it and pass)\n"
+        "rooms/scale.py:10\n  - return mpa * 5\n  + return mpa // 5\n  (no test runs it)"
+    )
+
+
+def test_an_interrupted_run_leaves_the_code_as_it_was(tmp_path: Path):
+    path = tmp_path / "a.py"
+    path.write_text("a = 1\n")
+    date = path.stat().st_mtime_ns
+    with pytest.raises(KeyboardInterrupt), house.instead(path, "a = 2\n"):
+        assert path.read_text() == "a = 2\n"
+        raise KeyboardInterrupt
+    assert path.read_text() == "a = 1\n" and path.stat().st_mtime_ns == date
+
+
+def test_changed_files(little: Path):
+    def git(*arguments: str) -> None:
+        names = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        subprocess.run(["git", *names, *arguments], cwd=little, check=True, capture_output=True)
+
+    (little / "reports").mkdir()
+    for number in (1, 2, 3):
+        (little / "reports" / f"{number}.py").write_text("a = 1\n")
+        git("add", "-A")
+        git("commit", "-q", "-m", str(number))
+    (little / "reports" / "4.py").write_text("a = 1\n")
+    (little / "rooms" / "scale.py").write_text("a = 1\n")  # not in the rooms
+    assert rooms.changed("1", little) == ["reports/3.py", "reports/4.py"]
+    assert 0 < rooms.commit_number(little) < 16**6
+    assert rooms.changed("HEAD~2", little) == ["reports/2.py", "reports/3.py", "reports/4.py"]
+
+
+def test_no_verdict_is_lost_in_the_list():
+    (mutant, *_) = drawn()
+    verdicts = [Verdict(mutant, "caught", "tests/a.py::b", 3), Verdict(mutant, "unrun")]
+    assert listing.caught(verdicts).endswith("(tests/a.py::b)")
+    assert listing.survivors(verdicts).count("a.py:") == 1
