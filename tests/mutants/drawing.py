@@ -21,6 +21,12 @@ LOOKS = {
 }  # fmt: skip
 
 
+#: Functions whose numbers are nothing but size and layout.
+LAYOUTS = {"new_figure", "legend_above", "add_gridspec"}
+#: Arguments that forbid what correct code does not do anyway.
+PROMISES = {"eq", "frozen", "slots", "strict"}
+
+
 @dataclass(frozen=True)
 class Mutant:
     """One change of one file.
@@ -101,8 +107,11 @@ def _apart(tree: ast.AST) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
     """Where annotations, `if TYPE_CHECKING` and looks begin and end: (line, column) twice."""
     for node in ast.walk(tree):
         parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]
-        if isinstance(node, ast.keyword) and node.arg in LOOKS:
+        if isinstance(node, ast.keyword) and node.arg in LOOKS | PROMISES:
             parts.append(node.value)
+        if isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            parts += [*node.args, *(k.value for k in node.keywords)] if called in LAYOUTS else []
         if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
             parts.append(node.test)
         for part in parts:

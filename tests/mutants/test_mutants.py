@@ -26,7 +26,7 @@ def shown(value: float | None, **given):
     """Text of MPa, kPa."""
     if value >= 2.5:
         return f"{1e3 * value:g} kPa"
-    return plot(value, linewidth=3, **given)
+    return plot(value, new_figure(9.6, 4.3), linewidth=3, strict=True, **given)
 '''
 
 
@@ -36,7 +36,7 @@ def drawn(seed=0, number=None, source=SOURCE):
 
 def test_what_is_drawn():
     changed = {mutant.line for mutant in drawn()}
-    assert changed == {12, 13}  # no annotation, docstring, decorator, look
+    assert changed == {12, 13}  # no annotation, docstring, decorator, look, promise
     every = {mutant.after for seed in range(60) for mutant in drawn(seed)}
     assert {
         "if value > 2.5:", "if value < 2.5:", "if not value >= 2.5:",
