@@ -15,15 +15,14 @@ from coverage import CoverageData
 
 from .house import environment
 
-#: The processes that a test starts count as the test (tests/commands.py hands its name on).
+#: What a copy of the test's process runs counts, too (tests/commands.py): it ends with `_exit`.
 SETTINGS = """
 [run]
 source = {house}
 omit = */tests/*
-context = ${{PYTEST_CURRENT_TEST-}}
 data_file = {folder}/coverage
 parallel = true
-patch = subprocess
+patch = _exit
 """
 
 
@@ -111,14 +110,9 @@ def _lines(house: Path, path: Path) -> dict[str, dict[int, set[str]]]:
     for name in data.measured_files():
         lines: dict[int, set[str]] = defaultdict(set)
         for line, contexts in data.contexts_by_lineno(name).items():
-            lines[line] |= {_test(context) for context in contexts}
+            lines[line] |= {context.rpartition("|")[0] for context in contexts}
         found[Path(name).relative_to(house).as_posix()] = dict(lines)
     return found
-
-
-def _test(context: str) -> str:
-    """The test's name: `a.py::b|run` of a test, `a.py::b (call)` of a process it started."""
-    return context.rpartition("|")[0] or context.rpartition(" (")[0]
 
 
 def _seconds(path: Path) -> dict[str, float]:

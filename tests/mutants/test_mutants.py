@@ -93,8 +93,12 @@ def little(tmp_path: Path) -> Path:
         "__init__.py": "",
         "rooms/__init__.py": "",
         "rooms/scale.py": "def kpa(mpa):\n    return 1e3 * mpa\n\n\n"
-        "def large(mpa):\n    return mpa > 2\n\n\ndef unused(mpa):\n    return mpa * 5\n",
-        "tests/rooms/test_scale.py": "import sys\n\nfrom bubblefit.rooms.scale import kpa, large\n"
+        "def large(mpa):\n    return mpa > 2\n\n\n"
+        "def copied(mpa):\n    return mpa + 7\n\n\ndef unused(mpa):\n    return mpa * 5\n",
+        "tests/rooms/test_scale.py": "import os\nimport sys\n\n"
+        "from bubblefit.rooms.scale import copied, kpa, large\n"
+        "\n\ndef test_copy():\n    child = os.fork()\n    if not child:\n"
+        "        os._exit(copied(1))\n    assert os.waitpid(child, 0)[1] == 8 * 256\n"
         "\n\ndef test_kpa():\n    assert kpa(2) == 2000\n"
         "\n\ndef test_large():\n    assert large(5)\n"
         "\n\ndef test_alone():\n    assert 'pytest_cov' in sys.modules and kpa(0) == 0\n",
@@ -114,6 +118,7 @@ WANTED = {
     "return 1e3 / mpa": "caught",
     "return mpa > 3": "survived",
     "return mpa < 2": "caught",
+    "return mpa - 7": "caught",
     "return mpa // 5": "unrun",
 }
 
@@ -138,11 +143,11 @@ def test_caught_survived_and_unrun(little: Path):
     assert found["return 1e3 / mpa"].by == "tests/rooms/test_scale.py::test_kpa"
     verdicts = list(found.values())
     assert listing.summary(verdicts) == (
-        "4 mutants: 2 caught, 1 survived, 1 in lines that no test runs"
+        "5 mutants: 3 caught, 1 survived, 1 in lines that no test runs"
     )
     assert listing.survivors(verdicts) == (
         "rooms/scale.py:6\n  - return mpa > 2\n  + return mpa > 3\n  (1 tests run it and pass)\n"
-        "rooms/scale.py:10\n  - return mpa * 5\n  + return mpa // 5\n  (no test runs it)"
+        "rooms/scale.py:14\n  - return mpa * 5\n  + return mpa // 5\n  (no test runs it)"
     )
 
 
