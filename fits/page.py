@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identification.assessment import PRIOR
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
@@ -194,7 +195,7 @@ def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
     ]
     note = (
         "white noise of every test, its misfit or its scatter, whichever is larger; before the "
-        "tests every modulus is taken to be known to 1000 %"
+        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
     )
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
     return [Table("What each test pins down", header, rows, note)] if rows else []

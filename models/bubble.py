@@ -30,7 +30,7 @@ class BubbleModel:
     pressures : MPa, strictly increasing: the frames to report.
     increments : MPa, strictly increasing, containing every pressure: the steps over which the
         hypoelastic law is integrated; the pressures unless given. They hardly matter to the
-        result: with seven the apex is within 0.001 % of 350 (benchmarks/bench_increments.py).
+        result (benchmarks/bench_increments.py).
     supports : degrees of freedom held at zero, by node set.
 
     Raises

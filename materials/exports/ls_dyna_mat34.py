@@ -64,8 +64,8 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
         confirm=(
             "the measure of the curves: public sources disagree (the manual names "
             "Green-Lagrange strain for FORM 2, 4, 12 and 14, a converter true strain); "
-            "--measure green, nominal or true writes another; a strip of one element pulled by "
-            "10 % tells",
+            "--measure green, nominal or true writes another; a strip of one element that is "
+            "stretched far tells",
             "that LCAB is taken as odd in the shear strain",
         ),
     )

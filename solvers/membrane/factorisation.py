@@ -1,9 +1,8 @@
 """The tangent matrix and its factorisation, by a library.
 
 Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into
-band storage (measured at 200 quads: half of SuperLU's time). Large ones: SuperLU. Both are
-unsymmetric, because the hypoelastic tangent is (1 to 5 % of it), and exact sensitivities want it
-whole.
+band storage, which is faster there (benchmarks/bench_growth.py). Large ones: SuperLU. Both are
+unsymmetric, because the hypoelastic tangent is, and exact sensitivities want it whole.
 """
 
 from __future__ import annotations

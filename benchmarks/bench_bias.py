@@ -1,0 +1,57 @@
+"""What biases the moduli of the known solution: data of another model, polynomial surfaces.
+
+Usage: bench_bias.py [STARTS]. STARTS of the example each (3 unless given): data of the model that
+fits, data of a finer mesh with other load steps (the lines to uncomment in the example), and
+matching by surfaces of degree 4, 6 and 8. Printed: e, the largest error of each modulus over the
+strain reached, and that of G12 over the first half of it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import bubblefit as bf
+import numpy as np
+from bubblefit.experiments.bubble.sources import KnownSolution
+from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.fits.project import Project
+from bubblefit.identification.assessment import moduli_error
+from known_solution import known_project
+
+#: The lines to uncomment: quads of the full disk, load steps in kPa beside the pressures.
+ELEMENTS, STEPS = 1800, (4, 11, 40, 78, 115, 160, 220, 275)
+DEGREES = (4, 6, 8)
+
+
+def main() -> None:
+    starts = int(sys.argv[1]) if len(sys.argv) > 1 else 3
+    base = known_project()
+    (test,) = base.tests.values()
+    assert isinstance(test, BubbleTest) and isinstance(test.data, KnownSolution)
+    steps = np.unique([*test.pressures, *(1e-3 * np.array(STEPS))])
+    other = replace(test.data, elements=ELEMENTS, increments=tuple(map(float, steps)))
+    cases: dict[str, BubbleTest] = {"the same model": test}
+    cases["data of a finer mesh, other load steps"] = replace(test, data=other)
+    for degree in DEGREES:
+        words = f"surfaces of degree {degree}"
+        cases[words] = replace(test, match_by="surfaces", match_degree=degree)
+    print(f"{'':40s}{'e':>9s}{'E1, %':>8s}{'E2, %':>8s}{'G12, %':>8s}{'half way':>10s}")
+    for words, case in cases.items():
+        fit = bf.fit(_with(base, case), starts=starts)
+        known = fit.law.with_beta(test.data.beta)
+        errors = moduli_error(fit.law, known, fit.best.reached)
+        half = moduli_error(fit.law, known, 0.5 * fit.best.reached)["G12"]
+        row = "".join(f"{100 * errors[name]:8.2g}" for name in ("E1", "E2", "G12"))
+        print(f"{words:40s}{fit.objective:9.2g}{row}{100 * half:10.2g}", flush=True)
+
+
+def _with(project: Project, test: BubbleTest) -> Project:
+    changed: Mapping[str, Any] = {test.name: test}
+    return replace(project, tests=changed)
+
+
+if __name__ == "__main__":
+    main()
