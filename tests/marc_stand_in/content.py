@@ -68,14 +68,25 @@ class Body:
 
 
 @dataclass
+class Control:
+    """When an increment has converged: relative residual AND relative correction, and most
+    iterations of one."""
+
+    residual: float
+    correction: float
+    iterations: int
+
+
+@dataclass
 class LoadCase:
-    """A block of history: increments (of `step`) and what holds in it."""
+    """A block of history: increments (of `step`), what holds in it, when they have converged."""
 
     title: str
     conditions: list[str]
     increments: int
     step: float
     line: int = 0
+    control: Control | None = None
 
 
 @dataclass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .blocks import loadcase
-from .content import Content, LoadCase
+from .content import Content, Control, LoadCase
 from .fields import Deck, Line
 
 #: Convergence is judged by residual AND displacement (5), full Newton-Raphson (1).
@@ -46,11 +46,14 @@ def _block(deck: Deck, line: Line, word: str, case: LoadCase) -> None:
         row.expect(values, CONTROL)
         if values[0] < 1 or values[1] < 1:
             raise row.fail("control without increments or iterations")
+        tolerances = []
         for _ in range(2):
             row = deck.next()
             tolerance, *rest = row.reals(8)
             if not 0 < tolerance < 1 or any(rest):
                 raise row.fail("expected a tolerance between 0 and 1, and seven zeros")
+            tolerances.append(tolerance)
+        case.control = Control(*tolerances, iterations=values[1])
     elif word == "auto load":
         row = deck.next()
         values = row.integers(5)

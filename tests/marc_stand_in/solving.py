@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .analysis import model_of
 from .command import Command
 from .content import Content
+from .convergence import control_of, converging
 from .endings import NO_SMALLER_STEP, NORMAL, Ended, NotCompiled
 from .faults import Fault
 from .fields import DeckError
@@ -26,15 +27,16 @@ from .schedule import Schedule, schedule_of
 def solve(content: Content, command: Command, journals: Journals, fault: Fault) -> None:
     """Run it to its end, or raise what ended it."""
     law = _law(content, command, fault)
-    schedule = schedule_of(content)
-    model, rests = model_of(content, schedule, law)
+    schedule, control = schedule_of(content), control_of(content)
+    with converging(control):
+        model, rests = model_of(content, schedule, law)
     if fault.is_("inside out"):
         journals.out(" *** warning - element inside out at element 1, integration point 1")
     post = PostFile(command.folder / f"{command.job}.t19", content, content.parameters.title)
     running = Running(content, schedule, rests, journals, post, fault)
     running.begin()
     try:
-        with recording(running.found):
+        with converging(control), recording(running.found):
             history = MembraneSolver().run(model, law)
         journals.out(" " + "; ".join(history.remarks))
         if running.increment < len(schedule.times):

@@ -1,0 +1,99 @@
+"""The stand-in converges as far as the deck's control block says, and no further."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bending import inflated_cylinder
+from bubblefit.solvers.marc.bubble import bubble_deck
+from bubblefit.solvers.marc.deck import TOLERANCE
+from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ...fortran_build import BETA
+from ...marc_stand_in.content import Control
+from ...marc_stand_in.convergence import control_of, converging
+from ...marc_stand_in.fields import DeckError
+from ...marc_stand_in.reading import read_deck
+from ...marc_stand_in_runs import marc
+from .test_marc_stand_in_results import bubble
+
+__all__ = ["marc"]
+
+LAW = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
+MODELS = {
+    "bubble": bubble(),
+    "cylinder": inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(2.0,)),
+}
+
+
+def error(found, expected) -> float:
+    """Largest difference of displacements over the largest displacement of the frame."""
+    size = np.abs(expected.displacement).max(axis=(1, 2), keepdims=True)
+    return float((np.abs(found.displacement - expected.displacement) / size).max())
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return {name: MembraneSolver().run(model, LAW) for name, model in MODELS.items()}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_loose_tolerance_is_worse_and_a_tight_one_better(name, exact):
+    errors = []
+    for tolerance in (0.9, TOLERANCE, 1e-7):
+        with converging(Control(tolerance, tolerance, 30)):
+            errors.append(error(MembraneSolver().run(MODELS[name], LAW), exact[name]))
+    loose, ours, tight = errors
+    print(name, errors)
+    assert loose > 3e-4
+    assert ours < 5e-6  # six digits: Newton's method doubles them in the last iteration
+    assert tight < 0.01 * ours
+
+
+def test_residual_and_displacement_both_count(exact):
+    """Measured: 5e-4 by the residual alone, 9e-2 by neither, rounding of six digits by both."""
+
+    def found(residual: float, correction: float) -> float:
+        with converging(Control(residual, correction, 30)):
+            return error(MembraneSolver().run(bubble(), LAW), exact["bubble"])
+
+    assert found(1e-3, 0.9) > 1e-4
+    assert found(1e-1, 1e-1) > 1e-3
+    assert found(0.9, 1e-3) < 5e-6
+
+
+def test_the_membrane_solver_is_left_as_it_was(exact):
+    before = Membrane.unbalance, Membrane.accept, Membrane.equilibrium
+    with converging(Control(0.9, 0.9, 30)):
+        assert Membrane.equilibrium is not before[2]
+    assert (Membrane.unbalance, Membrane.accept, Membrane.equilibrium) == before
+    assert CHORD_BELOW > 0
+    np.testing.assert_array_equal(
+        MembraneSolver().run(bubble(), LAW).displacement, exact["bubble"].displacement
+    )
+
+
+def test_the_tolerance_is_the_deck_s(tmp_path):
+    path = tmp_path / "job.dat"
+    path.write_text(bubble_deck(bubble(), LAW, MarcSettings()))
+    content = read_deck(path)
+    assert control_of(content) == Control(TOLERANCE, TOLERANCE, 30)
+    content.cases.append(replace(content.cases[0], control=Control(1e-3, 1e-4, 30)))
+    with pytest.raises(DeckError, match="one control for all"):
+        control_of(content)
+
+
+def test_a_deck_with_a_loose_tolerance_is_solved_loosely(marc, tmp_path, exact):
+    """A site's own control block: of the residual 0.1, of the displacement 0.1."""
+    rows = [[99999, 30, 0, 5, 0, 1, 0, 0, 1, *[0] * 7], *[[0.1, *[0.0] * 7]] * 2]
+    text = "".join(f"{n:10d}" for n in rows[0]) + "\n"
+    text += "".join("".join(f"{v:20.12E}" for v in row) + "\n" for row in rows[1:])
+    (tmp_path / "control.dat").write_text(f"control\n{text}")
+    loose = marc.solver(include={"control": str(tmp_path / "control.dat")}).run(bubble(), LAW)
+    assert error(loose, exact["bubble"]) > 1e-3
+    assert error(marc.solver().run(bubble(), LAW), exact["bubble"]) < 5e-6
