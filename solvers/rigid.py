@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,11 @@ class RigidBody:
     points: Array
     elements: Numbers
 
+    @property
+    def faces(self) -> Array:
+        """(m, 4, 3) mm: corners of the faces that meet the cylinder, as seen from there."""
+        return np.asarray(self.points[self.elements[:, 4:]], dtype=float)
+
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
     """The upper part of the support at z = span / 2, its crest at height `top` (mm).
@@ -49,8 +54,41 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
     return _body(around, across, place)
 
 
-def collar_body(collar: Collar, crown: float) -> RigidBody:
-    """The upper part of the collar on the side x, z >= 0, its inside at height `crown` (mm)."""
+def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
+    """The upper part of the collar on the side x, z >= 0, `above` (mm) the inflated cylinder.
+
+    It goes down that far until one of its faces meets the cylinder. They are flat, chords of the
+    ring, and meet it earlier than the ring would at the same height.
+
+    Parameters
+    ----------
+    cylinder : (n, 3) mm, points of the inflated cylinder.
+    """
+    body = _ring(collar)
+    up = above - way_down(body.faces, cylinder)
+    return replace(body, points=body.points + np.array([0.0, up, 0.0]))
+
+
+def way_down(faces: Array, points: Array) -> float:
+    """How far (mm) a ring of flat faces around the z axis goes down until it meets a point.
+
+    Parameters
+    ----------
+    faces : (n, 4, 3) mm, corners counter-clockwise seen from inside. points : (m, 3) mm, inside.
+    """
+    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    least = np.inf
+    for face, n in zip(faces, normal, strict=True):
+        beside = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
+        # Across its axis the ring is convex: who passes no face's plane is inside.
+        if n[1] < 0.0 and beside.any():
+            least = min(least, float(((points[beside] - face.mean(axis=0)) @ n).min() / -n[1]))
+    return least
+
+
+def _ring(collar: Collar) -> RigidBody:
+    """The collar with its axis at height 0."""
     radius, half = 0.5 * collar.inner_diameter, 0.5 * collar.length
     straight = np.linspace(-OVER, half - collar.fillet, 6)
     turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
@@ -64,8 +102,7 @@ def collar_body(collar: Collar, crown: float) -> RigidBody:
         edge = half - collar.fillet
         z = along if face else edge + behind * (along - edge)
         r = radius + flare + (0.0 if face else THICK + 5.0)
-        y = crown - radius + r[number] * np.cos(angle)
-        return np.stack([r[number] * np.sin(angle), y, z[number]], axis=-1)
+        return np.stack([r[number] * np.sin(angle), r[number] * np.cos(angle), z[number]], axis=-1)
 
     around = np.radians(np.linspace(*COLLAR_ARC, COLLAR_COUNT + 1))
     return _body(around, np.arange(len(along), dtype=float), place)

@@ -51,17 +51,11 @@ def bending_context(
     """
     if model.copies != 4:
         raise InputError(None, "symmetry", "CalculiX bends a quarter; mesh it as 'quarter'")
-    mesh, top = model.mesh, solids.node_sets["top_line"]
-    radius = float(np.abs(mesh.points[:, 1]).max())
-    under = solids.node_sets["support_bottom"]
-    # A slice of the cylinder as long as half the collar may touch it.
-    near = top[solids.points[top, 2] <= 0.5 * model.collar.length]
-    crown = float((solids.points + inflated)[near, 1].max()) + ABOVE
+    radius = float(np.abs(model.mesh.points[:, 1]).max())
+    at, under = solids.points + inflated, solids.node_sets["support_bottom"]
     bodies = {
-        "SUPPORT_BODY": support_body(
-            model.supports, radius, float((solids.points + inflated)[under, 1].min()) + INTO
-        ),
-        "COLLAR_BODY": collar_body(model.collar, crown),
+        "SUPPORT_BODY": support_body(model.supports, radius, float(at[under, 1].min()) + INTO),
+        "COLLAR_BODY": collar_body(model.collar, at, ABOVE),
     }
     may_touch = _may_touch(model, radius)
     listed, node, element = [], len(solids.points), len(solids.elements)

@@ -18,7 +18,7 @@ from bubblefit.models.cylinder import CylinderModel
 from bubblefit.models.gas import Gas
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import cylinder_decks
-from bubblefit.solvers.calculix.cylinder_bending import bending_context, body_nodes
+from bubblefit.solvers.calculix.cylinder_bending import ABOVE, bending_context, body_nodes
 from bubblefit.solvers.calculix.cylinder_gas import (
     GasCurve,
     better_pressure,
@@ -301,6 +301,38 @@ def test_bending_goes_in_increments_of_its_own():
     assert not any("TIME POINTS" in line for line in step if line.startswith("*NODE"))
     fine = replace(model, increments=np.arange(1.0, 41.0).tolist())
     assert bending_context(fine, solids, flat)["longest"] == 1.0
+
+
+@pytest.mark.parametrize(("diameter", "size"), [(150.0, 60.0), (200.0, 80.0), (250.0, 50.0)])
+def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, size):
+    """Its faces are chords of the ring: 0.15 mm lower than that, or the load is 0.7 % too high."""
+    model = inflated_cylinder(diameter, PRESSURE, THICKNESS, size, deflections=[20.0])
+    solids = solid_mesh(model)
+    grown = solids.points * [0.05, 0.05, 0.0]
+    _, collar = bending_context(model, solids, grown)["bodies"]
+    points = np.array(collar["points"])
+    faces = points[np.array(collar["elements"])[:, 4:] - 1 - collar["first_node"]]
+    # Its section at z = 0, through the faces' corners: straight between them.
+    section = faces.reshape(-1, 3)
+    section = section[section[:, 2] < 0]
+    assert np.hypot(*(section[:, :2] - circle_centre(section)).T) == pytest.approx(
+        0.5 * model.collar.inner_diameter, abs=1e-9
+    )
+    x, first = np.unique(section[:, 0].round(9), return_index=True)
+    at = solids.points + grown
+    met = at[(at[:, 1] > 0) & (at[:, 2] <= 0.5 * model.collar.length - model.collar.fillet)]
+    between = np.interp(met[:, 0], x, section[first, 1]) - met[:, 1]
+    assert between.min() == pytest.approx(ABOVE, abs=1e-9)
+    # As early as the ring would have met it: at the same place chords lie below by this much.
+    ring = circle_centre(section)[1] + 0.5 * model.collar.inner_diameter
+    assert 0.1 < ring - met[:, 1].max() - ABOVE < 0.25
+
+
+def circle_centre(section: np.ndarray) -> np.ndarray:
+    """(x, y) of the circle around the z axis through three of its corners."""
+    a, b, c = section[np.argsort(section[:, 0])][[0, len(section) // 2, -1], :2]
+    rows = 2 * np.array([b - a, c - a])
+    return np.linalg.solve(rows, [b @ b - a @ a, c @ c - a @ a])
 
 
 def test_a_whole_cylinder_is_not_bent():

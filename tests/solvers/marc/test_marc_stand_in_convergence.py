@@ -49,7 +49,6 @@ def test_a_loose_tolerance_is_worse_and_a_tight_one_better(name, exact):
         with converging(Control(tolerance, tolerance, 30)):
             errors.append(error(MembraneSolver().run(MODELS[name], LAW), exact[name]))
     loose, ours, tight = errors
-    print(name, errors)
     assert loose > 3e-4
     assert ours < 5e-6  # six digits: Newton's method doubles them in the last iteration
     assert tight < 0.01 * ours
