@@ -16,9 +16,10 @@ Numbers = NDArray[np.intp]
 #: mm that a body reaches over a plane of symmetry, and that it is thick.
 OVER, THICK = 20.0, 10.0
 #: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
-#: top; elements around and across of a support, around of a collar, and along its fillet.
+#: top; elements around and across of a support, around and along a collar, and along its fillet:
+#: few where a body is straight, many where it is round (benchmarks/bench_collar.py).
 SUPPORT_ARC, COLLAR_ARC = (165.0, 15.0), (60.0, -9.0)
-SUPPORT_COUNTS, COLLAR_COUNT, FILLET_COUNT = (24, 6), 12, 4
+SUPPORT_COUNTS, COLLAR_COUNTS, FILLET_COUNT = (48, 3), (24, 2), 6
 #: Degrees that the fillet turns, short of a face across the axis.
 FILLET_TURN = 75.0
 
@@ -90,10 +91,10 @@ def way_down(faces: Array, points: Array) -> float:
 def _ring(collar: Collar) -> RigidBody:
     """The collar with its axis at height 0."""
     radius, half = 0.5 * collar.inner_diameter, 0.5 * collar.length
-    straight = np.linspace(-OVER, half - collar.fillet, 6)
+    straight = np.linspace(-OVER, half - collar.fillet, COLLAR_COUNTS[1] + 1)
     turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
     along = np.concatenate([straight, half - collar.fillet * (1 - np.sin(turn))])
-    flare = np.concatenate([np.zeros(6), collar.fillet * (1 - np.cos(turn))])
+    flare = np.concatenate([np.zeros_like(straight), collar.fillet * (1 - np.cos(turn))])
 
     def place(angle: Array, row: Array, face: int) -> Array:
         number = row.astype(int)
@@ -104,7 +105,7 @@ def _ring(collar: Collar) -> RigidBody:
         r = radius + flare + (0.0 if face else THICK + 5.0)
         return np.stack([r[number] * np.sin(angle), r[number] * np.cos(angle), z[number]], axis=-1)
 
-    around = np.radians(np.linspace(*COLLAR_ARC, COLLAR_COUNT + 1))
+    around = np.radians(np.linspace(*COLLAR_ARC, COLLAR_COUNTS[0] + 1))
     return _body(around, np.arange(len(along), dtype=float), place)
 
 

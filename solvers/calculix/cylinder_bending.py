@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...models.cylinder import CylinderModel
-from ..rigid import SUPPORT_COUNTS, collar_body, support_body
+from .. import rigid
 from .cylinder_gas import GasCurve
 from .solids import SolidMesh
 
@@ -54,8 +54,10 @@ def bending_context(
     radius = float(np.abs(model.mesh.points[:, 1]).max())
     at, under = solids.points + inflated, solids.node_sets["support_bottom"]
     bodies = {
-        "SUPPORT_BODY": support_body(model.supports, radius, float(at[under, 1].min()) + INTO),
-        "COLLAR_BODY": collar_body(model.collar, at, ABOVE),
+        "SUPPORT_BODY": rigid.support_body(
+            model.supports, radius, float(at[under, 1].min()) + INTO
+        ),
+        "COLLAR_BODY": rigid.collar_body(model.collar, at, ABOVE),
     }
     may_touch = _may_touch(model, radius)
     listed, node, element = [], len(solids.points), len(solids.elements)
@@ -93,7 +95,8 @@ def bending_context(
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
     """Nodes of the support and of the collar in a result, after those of the `solids` (count)."""
-    support = 2 * (SUPPORT_COUNTS[0] + 1) * (SUPPORT_COUNTS[1] + 1)
+    around, across = rigid.SUPPORT_COUNTS
+    support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
 
 

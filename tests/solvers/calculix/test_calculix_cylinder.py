@@ -16,6 +16,7 @@ from bubblefit.models.bending import inflated_cylinder
 from bubblefit.models.bodies import RigidSupports
 from bubblefit.models.cylinder import CylinderModel
 from bubblefit.models.gas import Gas
+from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import cylinder_decks
 from bubblefit.solvers.calculix.cylinder_bending import ABOVE, bending_context, body_nodes
@@ -37,7 +38,10 @@ from bubblefit.solvers.calculix.library import material_library
 from bubblefit.solvers.calculix.reasons import increments
 from bubblefit.solvers.calculix.solids import solid_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve
+
+from ...fortran_build import BETA
 
 THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
 WARP, FILL, SHEAR = 400.0, 150.0, 30.0  # MPa
@@ -213,6 +217,31 @@ def test_the_crown_follows_the_collar(bent):
     np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.3)
 
 
+def test_a_bent_cylinder_is_the_membrane_s(ccx):
+    """As docs/validation/results.md states it: inflated within 0.5 %, loads within 3 %.
+
+    60 mm elements, 2000 mm span, to 20 mm: measured -0.5 % in radius and volume, -0.4 and -2.7 % in
+    load. A collar that touches 0.15 mm early would make that -3.4 %.
+    """
+    model = inflated_cylinder(150.0, PRESSURE, THICKNESS, 60.0, deflections=[10.0, 20.0])
+    law = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
+    found, expected = CalculixSolver(ccx=ccx.path).run(model, law), MembraneSolver().run(model, law)
+    side = model.mesh.node_sets["side_line"]
+    for ours, theirs in zip(inside(model, expected, side), inside(model, found, side), strict=True):
+        assert ours == pytest.approx(theirs, rel=5e-3)
+    np.testing.assert_allclose(expected.load[1:], found.load[1:], rtol=0.03)
+    absolute = found.cavity_pressure + model.gas.ambient
+    np.testing.assert_allclose(
+        absolute * found.cavity_volume, absolute[0] * found.cavity_volume[0], rtol=3e-4
+    )
+
+
+def inside(model: CylinderModel, history: History, side: np.ndarray) -> tuple[float, float, float]:
+    """Radius and half length of the inflated tube along its side, mm, and its volume, mm^3."""
+    at = model.mesh.points[side] + history.displacement[0, side]
+    return float(at[0, 0]), float(at[:, 2].max()), float(history.cavity_volume[0])
+
+
 def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path):
     model, history = bent
     solids, results = solid_mesh(model), last_run(scratch) / "job.frd"
@@ -305,7 +334,7 @@ def test_bending_goes_in_increments_of_its_own():
 
 @pytest.mark.parametrize(("diameter", "size"), [(150.0, 60.0), (200.0, 80.0), (250.0, 50.0)])
 def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, size):
-    """Its faces are chords of the ring: 0.15 mm lower than that, or the load is 0.7 % too high."""
+    """Its faces are chords of the ring, lower than that; 0.15 mm are 0.7 % of the load at 20 mm."""
     model = inflated_cylinder(diameter, PRESSURE, THICKNESS, size, deflections=[20.0])
     solids = solid_mesh(model)
     grown = solids.points * [0.05, 0.05, 0.0]
@@ -323,9 +352,12 @@ def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, s
     met = at[(at[:, 1] > 0) & (at[:, 2] <= 0.5 * model.collar.length - model.collar.fillet)]
     between = np.interp(met[:, 0], x, section[first, 1]) - met[:, 1]
     assert between.min() == pytest.approx(ABOVE, abs=1e-9)
-    # As early as the ring would have met it: at the same place chords lie below by this much.
-    ring = circle_centre(section)[1] + 0.5 * model.collar.inner_diameter
-    assert 0.1 < ring - met[:, 1].max() - ABOVE < 0.25
+    # The ring itself would come later by what a chord lies below it, which is little.
+    radius = 0.5 * model.collar.inner_diameter
+    chord = np.hypot(*np.diff(section[first, :2], axis=0).T).max()
+    below = radius - np.sqrt(radius**2 - 0.25 * chord**2)
+    late = circle_centre(section)[1] + radius - met[:, 1].max() - ABOVE
+    assert 0 < late <= below < 0.05
 
 
 def circle_centre(section: np.ndarray) -> np.ndarray:
