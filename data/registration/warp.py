@@ -1,0 +1,105 @@
+"""The warp direction from the measured field: its axes of symmetry, and which of them is stiffer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ..frames import Frame
+from .symmetry import symmetry_axes
+
+Array = NDArray[np.float64]
+
+#: Points within this share of the radius tell the strain at the centre.
+WITHIN = 0.5
+#: Powers of the displacement's polynomial about the centre, each up to a total of four.
+POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))
+#: Standard error of the axes (degrees) above which the field does not tell them, and how clear
+#: they must be at least.
+UNSURE, CLEAR = 5.0, 0.5
+
+
+@dataclass(frozen=True)
+class WarpDirection:
+    """Where the warp lies, by the fields of all frames.
+
+    angle : degrees from x towards y, from -90 to 90. error : standard error of their mean, degrees.
+    clear : of the axes, see `symmetry.Axes`. strains : Green-Lagrange at the centre in the highest
+    frame less those of the lowest, warp and fill.
+    """
+
+    angle: float
+    error: float
+    clear: float
+    strains: tuple[float, float]
+
+
+def warp_of_field(
+    frames: Sequence[Frame], radius: float, warp_is_stiff: bool = True
+) -> WarpDirection:
+    """The axis of symmetry along which the centre is strained less (warp stiff), or more.
+
+    Parameters
+    ----------
+    frames : in coordinates about the rim's centre, in its plane; by rising pressure.
+    warp_is_stiff : whether the warp is the direction that is strained less.
+
+    Raises
+    ------
+    InputError : too few points about the centre, or a field whose axes cannot be told.
+    """
+    axes = symmetry_axes(frames, radius)
+    if axes.error > UNSURE or axes.clear < CLEAR:
+        problem = (
+            f"the field does not tell warp from fill (axes at {axes.angle:.0f} +- {axes.error:.1f}"
+            f" degrees, {axes.clear:.0%} clear); give the angle"
+        )
+        raise InputError(None, "warp", problem)
+    strain = centre_strain(frames[-1], radius)
+    if len(frames) > 1:
+        strain = strain - centre_strain(frames[0], radius)
+    turn = np.radians(axes.angle)
+    first, second = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    along, across = float(first @ strain @ first), float(second @ strain @ second)
+    angle = axes.angle
+    if (along > across) == warp_is_stiff:
+        angle, along, across = angle + 90.0, across, along
+    angle = (angle + 90.0) % 180.0 - 90.0
+    return WarpDirection(float(angle), axes.error, axes.clear, (along, across))
+
+
+def centre_strain(frame: Frame, radius: float) -> Array:
+    """Green-Lagrange strain (2, 2) of the surface at the centre.
+
+    Raises
+    ------
+    InputError : too few points about the centre.
+    """
+    x = frame.points[:, :2] / radius
+    whole = np.isfinite(frame.displacement).all(axis=1) & (np.hypot(*x.T) < WITHIN)
+    x, moved = x[whole], frame.displacement[whole]
+    if len(x) < 2 * len(POWERS):
+        problem = f"expected {2 * len(POWERS)} points about the centre, got {len(x)}"
+        raise InputError(None, "warp", problem)
+    terms = np.stack([x[:, 0] ** i * x[:, 1] ** j for i, j in POWERS], axis=1)
+    solution, *_ = np.linalg.lstsq(terms, moved, rcond=None)
+    gradient = np.stack([solution[POWERS.index((1, 0))], solution[POWERS.index((0, 1))]]) / radius
+    tangents = np.eye(3)[:2] + gradient
+    return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
+
+
+def warp_of_points(first: Array, second: Array) -> float:
+    """Angle (degrees, -90 to 90) of the line through two marked points (2,) in the plane.
+
+    Raises
+    ------
+    InputError : the points are the same.
+    """
+    x, y = np.asarray(second, dtype=float) - np.asarray(first, dtype=float)
+    if np.hypot(x, y) < 1e-9:
+        raise InputError(None, "warp", "expected two different points along the warp")
+    return float((np.degrees(np.arctan2(y, x)) + 90.0) % 180.0 - 90.0)
