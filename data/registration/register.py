@@ -147,16 +147,12 @@ def _centred(
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
         return shifted(place[0], place[1]).after(placement), None
-    moved = all_applied(placement, frames)
-    last = moved[-1]
-    whole = np.isfinite(np.concatenate([[f.displacement[:, 2]] for f in moved if _same(f, last)]))
-    seen = whole.all(axis=0) & np.isfinite(last.points).all(axis=1)
-    points = last.points[seen, :2]
-    top = last.displacement[seen, 2]
-    high = [f for f in moved if _same(f, last) and np.nanmax(f.displacement[:, 2]) > HIGH * top.max()]
-    weight = np.clip(top, 0.0, None)
+    surfaces = [_surface(frame) for frame in all_applied(placement, frames)]
+    top = surfaces[-1][1].max()
+    surfaces = [one for one in surfaces if one[1].max() > HIGH * top]
+    points, rise = surfaces[-1]
+    weight = np.clip(rise, 0.0, None)
     start = (weight[:, None] * points).sum(axis=0) / weight.sum()
-    rises = [f.displacement[seen, 2] for f in high]
     angle = options.rim_angle
     if angle is not None and options.warp is not None:
         angle += options.warp
@@ -164,16 +160,15 @@ def _centred(
         angle = None
     # The first centre decides which points lie on the disk.
     for _ in range(2):
-        rim = rim_of_motion(points, rises, semi_axes, (start[0], start[1]), angle)
+        rim = rim_of_motion(surfaces, semi_axes, (start[0], start[1]), angle)
         start = np.array([rim.x, rim.y])
     return shifted(rim.x, rim.y).after(placement), rim
 
 
-def _same(frame: Frame, other: Frame) -> bool:
-    """Whether two frames have the same reference points, as most exports do."""
-    return frame.points.shape == other.points.shape and bool(
-        np.allclose(frame.points, other.points, equal_nan=True)
-    )
+def _surface(frame: Frame) -> tuple[Array, Array]:
+    """Places (n, 2) and rises (n,) where both were correlated."""
+    whole = np.isfinite(frame.points).all(axis=1) & np.isfinite(frame.displacement).all(axis=1)
+    return frame.points[whole, :2], frame.displacement[whole, 2]
 
 
 def _rim_points(

@@ -20,6 +20,8 @@ ODD = ((1, 0), (0, 1), (3, 0), (2, 1), (1, 2), (0, 3))
 POINTS, FRAMES = 2000, 4
 #: Points nearer to the rim than this share of its radius say where it is.
 NEAR = 0.8
+#: Points up to this share of the radius from a first guess of the centre are taken.
+INSIDE = 1.02
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,7 @@ class Rim:
 
 
 def rim_of_motion(
-    points: Array,
-    rises: Sequence[Array],
+    surfaces: Sequence[tuple[Array, Array]],
     semi_axes: tuple[float, float],
     start: tuple[float, float] = (0.0, 0.0),
     angle: float | None = None,
@@ -51,8 +52,8 @@ def rim_of_motion(
 
     Parameters
     ----------
-    points : (n, 2) mm, reference places in the plane. rises : (n,) mm each, along its normal;
-        by rising pressure: the last few are taken.
+    surfaces : reference places (n, 2) mm in the plane and rises (n,) mm along its normal, by rising
+        pressure: the last few are taken.
     semi_axes : mm; equal for a circle. start : mm, about where the centre is.
     angle : degrees, of the first semi-axis; found unless given where the axes differ.
 
@@ -60,43 +61,53 @@ def rim_of_motion(
     ------
     InputError : points that do not come near the rim all around it, too few of them.
     """
-    circle = semi_axes[0] == semi_axes[1]
-    free = not circle and angle is None
-
-    def local(place: Array, of: Array = points) -> Array:
-        turn = np.radians(place[2] if free else (angle or 0.0))
-        c, s = np.cos(turn), np.sin(turn)
-        x, y = (of - place[:2]).T
-        return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
-
-    inside = np.hypot(*local(np.array([*start, angle or 0.0]))) < 1.0 + 0.02
-    on_disk = points[inside]
-    count = len(EVEN) + len(ODD) + 1
-    if len(on_disk) < 3 * count:
-        problem = f"expected at least {3 * count} points on the disk, got {len(on_disk)}"
-        raise InputError(None, "centre", f"{problem}; are the length unit and the radius right?")
-    _all_around(local(np.array([*start, angle or 0.0]), on_disk))
-    few = slice(None, None, -(-len(on_disk) // POINTS))
-    on_disk = on_disk[few]
-    data = np.stack([rise[inside][few] for rise in rises[-FRAMES:]], axis=1)
-    data = data / np.abs(data).max(axis=0)
+    free = semi_axes[0] != semi_axes[1] and angle is None
+    fixed = 0.0 if angle is None else angle
+    guess = np.array([*start, fixed])
+    few = [_on_disk(*one, guess, semi_axes) for one in surfaces[-FRAMES:]]
+    turns = (0.0, 45.0, 90.0, 135.0) if free else ()
+    guesses = [np.array([*start, turn]) for turn in turns] or [np.array(start, dtype=float)]
 
     def left(place: Array) -> Array:
-        terms = _terms(*local(place, on_disk))
-        orthogonal, _ = np.linalg.qr(terms)
-        return np.asarray((data - orthogonal @ (orthogonal.T @ data)).ravel())
+        at = place if free else np.array([*place, fixed])
+        parts = []
+        for points, rise in few:
+            orthogonal, _ = np.linalg.qr(_terms(*_local(points, at, semi_axes)))
+            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
+        return np.concatenate(parts)
 
-    guesses: list[Array] = [np.array(start, dtype=float)]
-    if free:
-        guesses = [np.array([*start, turn]) for turn in (0.0, 45.0, 90.0, 135.0)]
-    scale = [semi_axes[0], semi_axes[0], 60.0][: 3 if free else 2]
-    fits = [least_squares(left, guess, x_scale=scale) for guess in guesses]
+    scale = [semi_axes[0], semi_axes[0], 60.0][: len(guesses[0])]
+    fits = [least_squares(left, one, x_scale=scale) for one in guesses]
     best = min(fits, key=lambda fit: fit.cost)
-    variance = 2 * best.cost / max(data.size - len(best.x), 1)
+    variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
-    turn = float(best.x[2]) % 180.0 if free else (angle or 0.0)
+    turn = float(best.x[2]) % 180.0 if free else fixed
     return Rim(float(best.x[0]), float(best.x[1]), turn, error)
+
+
+def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:
+    """Coordinates (2, n) about a centre x, y and along axes turned by degrees: 1 on the rim."""
+    turn = np.radians(place[2])
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = (points - place[:2]).T
+    return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
+
+
+def _on_disk(
+    points: Array, rise: Array, place: Array, semi_axes: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Some of the points within the rim, and their rises over the largest of them."""
+    local = _local(points, place, semi_axes)
+    inside = np.hypot(*local) < INSIDE
+    least = 3 * (len(EVEN) + len(ODD) + 1)
+    if inside.sum() < least:
+        problem = f"expected at least {least} points on the disk, got {int(inside.sum())}"
+        raise InputError(None, "centre", f"{problem}; are the length unit and the radius right?")
+    _all_around(local[:, inside])
+    every = slice(None, None, -(-int(inside.sum()) // POINTS))
+    rise = rise[inside][every]
+    return points[inside][every], rise / np.abs(rise).max()
 
 
 def _terms(u: Array, v: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The warp direction from the measured field: its axes of symmetry, and which of them is stiffer."""
+"""The warp direction from the measured field: which of its axes of symmetry is stiffer."""
 
 from __future__ import annotations
 
