@@ -20,6 +20,7 @@ from .optima import plot_optima
 from .orders import OrderErrors, plot_orders
 from .pinned import plot_pinned
 from .profiles import plot_profiles
+from .registration import plot_registration
 from .scatter import plot_heights
 from .strip import plot_strip
 from .vtu import write_vtu
@@ -52,6 +53,7 @@ __all__ = [
     "plot_orders",
     "plot_pinned",
     "plot_profiles",
+    "plot_registration",
     "plot_strip",
     "write_report",
     "write_vtu",

@@ -37,12 +37,14 @@ class RigidMotion:
 UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), float("nan"), 0)
 
 
-def clamp_points(points: Array, semi_axes: tuple[float, float], angle: float = 0.0) -> Array:
+def clamp_points(
+    points: Array, semi_axes: tuple[float, float], angle: float = 0.0
+) -> NDArray[np.bool_]:
     """Which of the points (n, 3), about the rim's centre in its plane, are beyond the rim."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     x, y = points[:, 0], points[:, 1]
     along, across = (c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]
-    return np.asarray(np.hypot(along, across) > BEYOND)
+    return np.asarray(np.hypot(along, across) > BEYOND, dtype=bool)
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:

@@ -15,7 +15,7 @@ from .clamp import LEAST, UNKNOWN, RigidMotion, clamp_motion, clamp_points, with
 from .placement import Placement, all_applied, shifted, turned
 from .plane import plane_through
 from .rim import Rim, rim_of_motion
-from .warp import WarpDirection, warp_of_points, warp_of_field
+from .warp import WarpDirection, warp_of_field, warp_of_points
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -58,6 +58,10 @@ class RegistrationOptions:
             raise InputError(None, "warp", problem)
 
 
+#: Nothing is given.
+ALL_FOUND = RegistrationOptions()
+
+
 @dataclass(frozen=True, eq=False)
 class Registration:
     """What was found, and how.
@@ -85,7 +89,7 @@ class Registration:
 def register(
     frames: Sequence[Frame],
     semi_axes: tuple[float, float],
-    options: RegistrationOptions = RegistrationOptions(),
+    options: RegistrationOptions = ALL_FOUND,
 ) -> tuple[tuple[Frame, ...], Registration]:
     """The frames in the test's coordinates, and what they are.
 

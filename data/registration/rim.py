@@ -63,10 +63,8 @@ def rim_of_motion(
     """
     free = semi_axes[0] != semi_axes[1] and angle is None
     fixed = 0.0 if angle is None else angle
-    guess = np.array([*start, fixed])
+    guess = np.array([*start, _long_axis(*surfaces[-1], semi_axes) if free else fixed])
     few = [_on_disk(*one, guess, semi_axes) for one in surfaces[-FRAMES:]]
-    turns = (0.0, 45.0, 90.0, 135.0) if free else ()
-    guesses = [np.array([*start, turn]) for turn in turns] or [np.array(start, dtype=float)]
 
     def left(place: Array) -> Array:
         at = place if free else np.array([*place, fixed])
@@ -76,14 +74,23 @@ def rim_of_motion(
             parts.append(rise - orthogonal @ (orthogonal.T @ rise))
         return np.concatenate(parts)
 
-    scale = [semi_axes[0], semi_axes[0], 60.0][: len(guesses[0])]
-    fits = [least_squares(left, one, x_scale=scale) for one in guesses]
-    best = min(fits, key=lambda fit: fit.cost)
+    count = 3 if free else 2
+    scale = [semi_axes[0], semi_axes[0], 60.0][:count]
+    best = least_squares(left, guess[:count], x_scale=scale)
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
     turn = float(best.x[2]) % 180.0 if free else fixed
     return Rim(float(best.x[0]), float(best.x[1]), turn, error)
+
+
+def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
+    """About the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
+    weight = np.clip(rise, 0.0, None)
+    x, y = (points - (weight[:, None] * points).sum(axis=0) / weight.sum()).T
+    xx, yy, xy = (float((weight * a).sum()) for a in (x * x, y * y, x * y))
+    along = np.degrees(0.5 * np.arctan2(2 * xy, xx - yy))
+    return float(along if semi_axes[0] > semi_axes[1] else along + 90.0)
 
 
 def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:

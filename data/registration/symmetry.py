@@ -33,7 +33,7 @@ class Axes:
     """angle : degrees from x towards y of one axis, 0 to 90; the other is 90 degrees from it.
 
     error : standard error, degrees, from frame to frame and between parts of the points.
-    clear : 1 where the field is wholly symmetric about the axes, 0 where about none more than others.
+    clear : 1 where the field is wholly symmetric about the axes, 0 where no axes are better.
     """
 
     angle: float

@@ -8,6 +8,7 @@ from ...reports import plot_heights, plot_profiles, write_vtu
 from ..base import Exhibit, Findings, FittedTest, Output, Shown
 from .findings import objective_of
 from .objective import displacement_offset
+from .registration import registration_picture, registration_table
 from .tables import misfit_table, surface_tables, write_surface_table
 
 if TYPE_CHECKING:
@@ -26,10 +27,15 @@ def exhibit(
     ]
     model = fitted.comparisons[0].model
     write_vtu(model.mesh, fitted.histories[0].displacement[-1], out.path(SURFACE))
+    figures = _figures(prepared, fitted, out)
+    tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
+    if prepared.registration is not None:
+        figures.append(registration_picture(prepared.fields, prepared.test.radius, out))
+        tables.insert(0, registration_table(prepared.registration))
     return Exhibit(
         facts=_facts(prepared, findings),
-        figures=_figures(prepared, fitted, out),
-        tables=[misfit_table(prepared, fitted), *surface_tables(prepared)],
+        figures=figures,
+        tables=tables,
         files=files,
     )
 

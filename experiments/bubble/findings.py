@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...identification.assessment import moduli_error
 from ..base import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
+from .registration import registration_line, registration_numbers
 
 if TYPE_CHECKING:
     from .prepared import PreparedBubble
@@ -50,6 +51,9 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         numbers["moduli_error"] = errors
         said = ", ".join(f"{name} {_percent(value)}" for name, value in errors.items())
         lines.append(f"largest error of the moduli over the strain reached: {said}")
+    if prepared.registration is not None:
+        numbers["registration"] = registration_numbers(prepared.registration)
+        lines.append(registration_line(prepared.registration))
     lines += _offset_words(prepared, fitted)
     return Findings(
         numbers,

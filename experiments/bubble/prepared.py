@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from ...data.fields import DisplacementField, read_fields
+from ...data.registration.fields import register_fields
+from ...data.registration.register import Registration
 from ...data.surfaces import DisplacementSurface, fit_surface
 from ...errors import InputError, SolverFailure
 from ...identification.comparison import Comparison, Nuisance
@@ -38,13 +40,15 @@ PRESSURE = "pressure_offset"
 class PreparedBubble:
     """The test, what was measured (or computed) as read, and polynomial surfaces of it.
 
-    known : the law behind computed data. surfaces : for the match or the report.
+    known : the law behind computed data. surfaces : for the match or the report. registration :
+    of the fields, None where the files were in the test's coordinates.
     """
 
     test: BubbleTest
     fields: tuple[DisplacementField, ...]
     surfaces: tuple[DisplacementSurface, ...]
     known: HypoelasticLaw | None
+    registration: Registration | None = None
 
     @property
     def objective_is(self) -> str:
@@ -137,13 +141,14 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     ------
     InputError : in the data. SolverFailure : the known solution cannot be run.
     """
-    known = None
+    known, registration = None, None
     if isinstance(test.data, KnownSolution):
         known = _known_law(test, test.data, law)
         fields = _computed(test, test.data, known, make_solver())
     else:
-        fields = _measured(test, test.data)
-    return PreparedBubble(test, fields, _surfaces(test, fields, known is not None), known)
+        fields, registration = _measured(test, test.data)
+    surfaces = _surfaces(test, fields, known is not None)
+    return PreparedBubble(test, fields, surfaces, known, registration)
 
 
 def _known_law(test: BubbleTest, data: KnownSolution, law: HypoelasticLaw) -> HypoelasticLaw:
@@ -196,8 +201,10 @@ def _computed(
     )
 
 
-def _measured(test: BubbleTest, data: PointFiles) -> tuple[DisplacementField, ...]:
-    return read_fields(
+def _measured(
+    test: BubbleTest, data: PointFiles
+) -> tuple[tuple[DisplacementField, ...], Registration | None]:
+    fields = read_fields(
         data.files,
         test.pressures,
         columns=data.columns,
@@ -206,3 +213,10 @@ def _measured(test: BubbleTest, data: PointFiles) -> tuple[DisplacementField, ..
         length_scale=data.length_scale,
         format=data.format,
     )
+    if data.registration is None:
+        return fields, None
+    try:
+        return register_fields(fields, (test.radius, test.radius), data.registration)
+    except InputError as error:
+        field = f"data.points.registration.{error.field}".rstrip(".")
+        raise test.place.error(field, error.problem) from None

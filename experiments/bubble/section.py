@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
+from .registration_section import RegistrationSection
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
@@ -46,6 +47,7 @@ class PointsSection(Section):
     flag_column: str | None = None
     comment: str = "#"
     length_unit: LengthUnit | None = None
+    registration: RegistrationSection | None = None
 
 
 class DataSection(Section):

@@ -10,10 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data.registration.register import RegistrationOptions
 from ...errors import InputError
 from ...sections import LENGTH_UNITS
 from ..base import Place
 from ..formats import named_format
+from .registration_section import registration_options
 from .section import BubbleSection, KnownSolutionSection, PointsSection
 
 
@@ -48,6 +50,7 @@ class PointFiles:
     comment: str
     length_scale: float
     format: str | None = None
+    registration: RegistrationOptions | None = None
 
 
 def data_source(
@@ -136,6 +139,7 @@ def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
         points.comment,
         LENGTH_UNITS[unit],
         named_format(place, "data.points.format", "frame", points.format),
+        registration_options(points.registration, place, LENGTH_UNITS[unit]),
     )
 
 

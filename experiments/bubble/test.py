@@ -110,6 +110,8 @@ class BubbleTest:
             "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
         )  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
+        if isinstance(self.data, PointFiles) and self.data.registration is not None:
+            said["registration"] = asdict(self.data.registration)
         if isinstance(self.data, KnownSolution):
             known = asdict(self.data)
             said["known_solution"] = {**known, "beta": self.data.beta.tolist()}

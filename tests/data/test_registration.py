@@ -1,0 +1,244 @@
+"""Registration: a test anywhere in the camera's view comes back into its own coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.data.frames import Frame
+from bubblefit.data.registration.clamp import UNKNOWN, clamp_motion, without
+from bubblefit.data.registration.placement import Placement, turned
+from bubblefit.data.registration.plane import plane_through
+from bubblefit.data.registration.register import RegistrationOptions, register
+from bubblefit.data.registration.rim import rim_of_motion
+from bubblefit.data.registration.symmetry import symmetry_axes
+from bubblefit.data.registration.warp import centre_strain, warp_of_points
+from bubblefit.errors import InputError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+RADIUS = 100.0
+
+
+def rotation(axes: str, angles) -> np.ndarray:
+    return Rotation.from_euler(axes, angles, degrees=True).as_matrix()
+
+
+def grid(step: float = 10.0, reach: float = 1.0) -> np.ndarray:
+    """Points on a square grid up to `reach` radii from the centre, off it by a third of a step."""
+    line = np.arange(-reach * RADIUS, reach * RADIUS + step, step) + step / 3
+    x, y = (axis.ravel() for axis in np.meshgrid(line, line))
+    near = np.hypot(x, y) < reach * RADIUS
+    return np.stack([x[near], y[near], np.zeros(near.sum())], axis=1)
+
+
+def bubble(points: np.ndarray, rise: float) -> Frame:
+    """An orthotropic shape: symmetric about x and y, still on the rim and beyond."""
+    x, y = points[:, :2].T / RADIUS
+    on = np.clip(1 - x**2 - y**2, 0.0, None)
+    square = (rise / RADIUS) ** 2
+    moved = np.stack(
+        [
+            RADIUS * square * on * x * (0.3 + 0.1 * y**2),
+            RADIUS * square * on * y * (0.5 - 0.2 * x**2),
+            rise * on * (1 - 0.1 * x**2 + 0.05 * y**2 + 0.1 * x**2 * y**2),
+        ],
+        axis=1,
+    )
+    return Frame(points, moved)
+
+
+def seen(frame: Frame, turn: np.ndarray, shift) -> Frame:
+    """The frame in the coordinates of a camera."""
+    return Frame(frame.points @ turn.T + np.asarray(shift), frame.displacement @ turn.T)
+
+
+FRAMES = [bubble(grid(), rise) for rise in (8.0, 20.0, 30.0)]
+BEYOND = [bubble(grid(10.0, 1.2), rise) for rise in (8.0, 20.0, 30.0)]
+
+
+@settings(max_examples=5)
+@given(
+    warp=st.floats(-80, 80),
+    tilt=st.floats(-25, 25),
+    x=st.floats(-50, 50),
+    y=st.floats(-50, 50),
+    z=st.floats(-700, 700),
+)
+def test_a_test_anywhere_comes_back(warp, tilt, x, y, z):
+    turn = rotation("zx", [warp, tilt])
+    moved, found = register([seen(f, turn, (x, y, z)) for f in FRAMES], (RADIUS, RADIUS))
+    for ours, true in zip(moved, FRAMES, strict=True):
+        # Warp and fill have no sense: a half turn is the same test.
+        sense = np.sign(found.placement.axes[0] @ turn[:, 0])
+        flip = np.array([sense, sense, 1.0])
+        np.testing.assert_allclose(ours.points * flip, true.points, atol=0.1)
+        np.testing.assert_allclose(ours.displacement * flip, true.displacement, atol=0.03)
+    assert found.placement.tilt == pytest.approx(abs(tilt), abs=1e-6)
+    np.testing.assert_allclose(found.placement.origin, (x, y, z), atol=0.02)
+    assert found.plane_of == "edge" and found.warp is not None and found.rim is not None
+    assert found.warp.error < 0.1 and found.rim.error < 0.01
+
+
+def test_a_sheet_that_rises_away_from_the_camera_is_turned_not_mirrored():
+    turn = rotation("x", 180.0)
+    frames = [seen(f, turn, (0.0, 0.0, 500.0)) for f in FRAMES]
+    moved, found = register(frames, (RADIUS, RADIUS), RegistrationOptions(warp=0.0))
+    np.testing.assert_allclose(moved[-1].displacement, FRAMES[-1].displacement, atol=0.02)
+    assert found.placement.tilt == pytest.approx(180.0, abs=1e-6)
+    assert np.linalg.det(found.placement.axes) == pytest.approx(1.0)
+
+
+def test_the_plane_goes_through_the_clamp_where_it_was_seen_and_its_motion_is_removed():
+    """A sheet that bulges by 4 mm before the test does not tilt the plane; the clamp moves."""
+    first = BEYOND[0].points.copy()
+    x, y = first[:, :2].T / RADIUS
+    first[:, 2] = np.clip(1 - x**2 - y**2, 0, None) * (4.0 + 2.0 * x)
+    frames = []
+    for k, frame in enumerate(BEYOND):
+        after = first + frame.displacement
+        moved = after @ rotation("xyz", [0.2 * k, -0.1 * k, 0.3 * k]).T + (0.5 * k, -0.2, 0.7 * k)
+        frames.append(Frame(first, moved - first))
+    registered, found = register(frames, (RADIUS, RADIUS))
+    assert found.plane_of == "clamp" and found.placement.tilt < 1e-4
+    for ours, true in zip(registered, BEYOND, strict=True):
+        np.testing.assert_allclose(ours.displacement, true.displacement, atol=0.02)
+    np.testing.assert_allclose(registered[0].points[:, 2], first[:, 2], atol=1e-3)
+    shift = [float(np.linalg.norm(m.shift)) for m in found.motions]
+    assert shift[0] == pytest.approx(0.2, abs=1e-6) and found.motions[2].points > 100
+    # The vector of the turn by xyz angles of 0.4, -0.2 and 0.6 degrees.
+    assert found.motions[2].angle == pytest.approx(
+        np.degrees(Rotation.from_euler("xyz", [0.4, -0.2, 0.6], degrees=True).magnitude()), abs=1e-3
+    )
+    options = RegistrationOptions(remove_clamp_motion=False)
+    left, found = register(frames, (RADIUS, RADIUS), options)
+    assert np.abs(left[2].displacement - BEYOND[2].displacement).max() > 1.0
+    assert found.motions[2].angle > 0.5
+
+
+def test_what_is_given_is_taken():
+    """The marks lie along 30 degrees, beyond which the shape itself has its axes at 0."""
+    marks = ((0.0, 0.0, 0.0), (np.cos(np.pi / 6), 0.5, 0.0))
+    options = RegistrationOptions(plane="camera", centre=(3.0, -2.0, 0.0), warp_points=marks)
+    moved, found = register(FRAMES, (RADIUS, RADIUS), options)
+    assert found.warp is None and found.rim is None and found.plane_of == "camera"
+    assert found.warp_angle == pytest.approx(30.0)
+    expected = turned(30.0).places(FRAMES[0].points - (3.0, -2.0, 0.0))
+    np.testing.assert_allclose(moved[0].points, expected, atol=1e-9)
+    with pytest.raises(InputError, match="not both"):
+        RegistrationOptions(warp=1.0, warp_points=marks)
+
+
+def test_the_warp_is_the_stiff_or_the_soft_direction_as_said():
+    stiff = register(FRAMES, (RADIUS, RADIUS))[1]
+    soft = register(FRAMES, (RADIUS, RADIUS), RegistrationOptions(warp_is_stiff=False))[1]
+    assert stiff.warp is not None and stiff.warp.strains[0] < stiff.warp.strains[1]
+    assert abs(stiff.warp_angle - soft.warp_angle) == pytest.approx(90.0, abs=0.2)
+
+
+def test_noise_shows_in_the_errors_that_are_said():
+    """Over eight draws of noise, the errors said are those made, within a factor of two."""
+    rng, angles, centres, said = np.random.default_rng(4), [], [], []
+    for _ in range(8):
+        noisy = [
+            Frame(f.points, f.displacement + 0.05 * rng.standard_normal(f.points.shape))
+            for f in FRAMES
+        ]
+        found = register(noisy, (RADIUS, RADIUS))[1]
+        assert found.warp is not None and found.rim is not None
+        angles.append(found.warp_angle)
+        centres.append(found.placement.origin[:2])
+        said.append((found.warp.error, found.rim.error))
+    made = np.sqrt(np.mean(np.square(angles))), np.sqrt(np.mean(np.sum(np.square(centres), axis=1)))
+    ratio = np.mean(said, axis=0) / made
+    assert ((0.5 < ratio) & (ratio < 2.0)).all(), (made, np.mean(said, axis=0))
+
+
+def test_a_shape_without_direction_asks_for_the_angle():
+    points = grid()
+    r2 = (points[:, :2] ** 2).sum(axis=1) / RADIUS**2
+    on = np.clip(1 - r2, 0.0, None)
+    rng = np.random.default_rng(1)
+    frames = []
+    for rise in (10.0, 20.0, 30.0):
+        moved = np.stack([on * points[:, 0] * 0.02, on * points[:, 1] * 0.02, rise * on], axis=1)
+        frames.append(Frame(points, moved + 0.02 * rng.standard_normal(moved.shape)))
+    with pytest.raises(InputError, match="give the angle"):
+        register(frames, (RADIUS, RADIUS))
+
+
+def test_points_on_one_side_ask_for_the_centre():
+    half = [Frame(f.points[f.points[:, 0] > 0], f.displacement[f.points[:, 0] > 0]) for f in FRAMES]
+    with pytest.raises(InputError, match="directions only; give the centre"):
+        register(half, (RADIUS, RADIUS))
+    with pytest.raises(InputError, match=r"length unit and the radius"):
+        register(FRAMES, (5.0, 5.0))
+    with pytest.raises(InputError, match="nothing moves"):
+        register([Frame(grid(), np.zeros_like(grid()))], (RADIUS, RADIUS))
+    with pytest.raises(InputError, match="too few points beyond the rim"):
+        register(FRAMES, (RADIUS, RADIUS), RegistrationOptions(plane="clamp"))
+
+
+def test_an_ellipse_is_found_with_its_direction():
+    turn = np.radians(35.0)
+    points = grid()[:, :2]
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = points[:, 0] - 4.0, points[:, 1] + 3.0
+    u, v = (c * x + s * y) / 100.0, (c * y - s * x) / 70.0
+    on = np.clip(1 - u**2 - v**2, 0.0, None)
+    inside = on > 0
+    rise = 20.0 * on[inside] * (1 + 0.1 * u[inside] ** 2)
+    rim = rim_of_motion([(points[inside], rise)], (100.0, 70.0), (3.0, -2.0))
+    assert (rim.x, rim.y) == pytest.approx((4.0, -3.0), abs=1e-3)
+    assert rim.angle == pytest.approx(35.0, abs=1e-3)
+
+
+def test_strain_at_the_centre_is_that_of_the_gradient():
+    points = grid()
+    gradient = np.array([[0.02, 0.01], [0.03, -0.01], [0.1, 0.05]])
+    frame = Frame(points, points[:, :2] @ gradient.T)
+    tangents = np.eye(3)[:2] + gradient.T
+    expected = 0.5 * (tangents @ tangents.T - np.eye(2))
+    np.testing.assert_allclose(centre_strain(frame, RADIUS), expected, atol=1e-12)
+
+
+def test_the_plane_leaves_out_what_is_far_from_it():
+    rng = np.random.default_rng(2)
+    points = np.column_stack([rng.uniform(-100, 100, (200, 2)), rng.normal(0, 0.05, 200)])
+    points[:20, 2] += 30.0
+    placement, deviation = plane_through(points @ rotation("y", 10.0).T, np.array([0, 0, 1.0]))
+    assert placement.tilt == pytest.approx(10.0, abs=0.05)
+    assert deviation == pytest.approx(0.05, rel=0.3)
+    with pytest.raises(InputError, match="line"):
+        plane_through(np.column_stack([np.arange(9.0), np.zeros((9, 2))]), np.array([0, 0, 1.0]))
+
+
+def test_placements_follow_one_another():
+    a = Placement(np.array([1.0, 2.0, 3.0]), rotation("xyz", [10, 20, 30]))
+    b = Placement(np.array([-4.0, 0.5, 1.0]), rotation("zyx", [50, -20, 5]))
+    points = np.random.default_rng(3).normal(size=(5, 3))
+    np.testing.assert_allclose(b.after(a).places(points), b.places(a.places(points)))
+    with pytest.raises(ValueError, match="right-handed"):
+        Placement(np.zeros(3), np.diag([1.0, 1.0, -1.0]))
+
+
+def test_a_clamp_that_is_not_seen_all_around_tells_nothing():
+    frame = BEYOND[-1]
+    one_side = (frame.points[:, 0] > 103) & (frame.points[:, 1] > 0)
+    assert clamp_motion(frame, one_side) is UNKNOWN
+    np.testing.assert_allclose(without(frame, UNKNOWN).displacement, frame.displacement, atol=1e-12)
+
+
+def test_the_axes_do_not_move_with_what_is_constant_in_pressure():
+    """A first shape that is not symmetric, in every frame alike."""
+    x, y = FRAMES[0].points[:, :2].T / RADIUS
+    first = np.zeros_like(FRAMES[0].points)
+    first[:, 2] = 2.0 * (1 - x**2 - y**2) * (x * y + 0.3 * x)
+    with_it = [Frame(f.points, f.displacement + first) for f in FRAMES]
+    assert symmetry_axes(with_it, RADIUS).angle % 90.0 == pytest.approx(0.0, abs=0.1)
+
+
+def test_two_marks_need_to_differ():
+    assert warp_of_points(np.array([1.0, 1.0]), np.array([0.0, 2.0])) == pytest.approx(-45.0)
+    with pytest.raises(InputError, match="two different points"):
+        warp_of_points(np.zeros(2), np.zeros(2))
