@@ -26,6 +26,8 @@ ANGLES = np.radians(np.arange(0.0, 90.0, 0.05))
 LOW = 0.7
 #: Parts of the points that tell how sure the axes are, and the most frames that are looked at.
 PARTS, FRAMES = 4, 6
+#: Points that a part needs: four for each of its terms.
+ENOUGH = 120
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,11 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     together = costs.sum(axis=0)
     best = float(ANGLES[np.argmin(together)])
     # Frames share the noise of the one that is subtracted; parts of the points do not.
-    parts = [[_part(frame, k) for frame in frames] for k in range(PARTS)]
-    by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
-    error = float(np.hypot(_scatter(costs, best), _scatter(by_part, best)))
+    error = _scatter(costs, best)
+    if min(len(frame.points) for frame in frames) >= PARTS * ENOUGH:
+        parts = [[_part(frame, k) for frame in frames] for k in range(PARTS)]
+        by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
+        error = float(np.hypot(error, _scatter(by_part, best)))
     total = float(together.max())
     clear = 1.0 - float(together.min()) / total if total > 0 else 0.0
     return Axes(float(np.degrees(best)), error, clear)

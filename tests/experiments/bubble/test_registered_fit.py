@@ -1,0 +1,98 @@
+"""A fit of what a camera saw from anywhere, beside one of the same data in the test's own frame."""
+
+from __future__ import annotations
+
+import re
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.fits.law import law_of
+from bubblefit.identification.assessment import moduli_error
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.spatial.transform import Rotation
+
+from ...commands import in_process, result_in
+from ...complaints import complaint
+from ...projects import small
+
+#: Warp turned by 12 degrees, the sheet tilted by 3, 600 mm away and 5 mm off the middle.
+TURN = Rotation.from_euler("zx", [12.0, 3.0], degrees=True).as_matrix()
+SHIFT = np.array([3.0, -4.0, 600.0])
+COLUMNS = 'columns = { x = "x", y = "y", z = "z", dx = "dx", dy = "dy", dz = "dz" }'
+REGISTRATION = "[bubble.data.points.registration]\n"
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """The text of a project of computed data as a camera saw them: frame_0.csv ..."""
+    folder = tmp_path_factory.mktemp("registered")
+    path = small(folder, ("elements = 48", "elements = 108"))
+    text = path.read_text()
+    path.write_text(text.replace('symmetry = "quarter"', 'symmetry = "full"'))
+    project = bf.read_project(path)
+    test = project.tests["bubble"]
+    computed = test.prepare(law_of(project, [test.reach]), MembraneSolver)
+    for k, field in enumerate(computed.fields):
+        flat = np.column_stack([field.points, np.zeros(len(field.points))])
+        table = np.hstack([flat @ TURN.T + SHIFT, field.displacement @ TURN.T])
+        name = folder / f"frame_{k}.csv"
+        np.savetxt(name, table, delimiter=",", header="x,y,z,dx,dy,dz", comments="", fmt="%.9g")
+    data = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
+    files = [f"frame_{k}.csv" for k in range(len(computed.fields))]
+    points = f"[bubble.data.points]\nfiles = {files}\n{COLUMNS}\n"
+    return folder, data.sub(points + REGISTRATION + "\n", text), computed.known
+
+
+def project_of(seen, name: str, more: str = ""):
+    folder, text, _ = seen
+    path = folder / f"{name}.toml"
+    path.write_text(text.replace(REGISTRATION, REGISTRATION + more))
+    return path
+
+
+def test_moduli_are_those_of_the_right_frame(seen):
+    """Within 1 % over the strain reached."""
+    folder, _, known = seen
+    path = project_of(seen, "found")
+    in_process("bubble", path, "--starts", 1, "--jobs", 1, "--out", folder / "out", cwd=folder)
+    result = result_in(folder / "out")
+    law = bf.read_card(folder / "out" / "material.toml").law
+    errors = moduli_error(law, known, np.array(list(result["strain_reached"].values())))
+    assert max(errors.values()) < 0.01, errors
+    said = result["registration"]
+    assert said["warp_degrees"] == pytest.approx(12.0, abs=0.06)
+    assert said["tilt_degrees"] == pytest.approx(3.0, abs=1e-3)
+    np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
+    page = (folder / "out" / "report.html").read_text()
+    assert "registration.png" in page and "found by symmetry" in page
+    assert (folder / "out" / "registration.png").stat().st_size > 20_000
+
+
+def test_a_change_of_registration_is_another_fit(seen):
+    """--resume must not take a fit of other coordinates for this one."""
+    marks = [bf.read_project(project_of(seen, "a", more)).tests["bubble"].settings()
+             for more in ("", "warp = 12.0\n", 'warp_is = "soft"\n')]  # fmt: skip
+    assert len({str(mark) for mark in marks}) == 3
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("warp = 1.0\nwarp_points = [[0, 0, 0], [1, 0, 0]]\n", ["warp", "not both"]),
+        ('plane = "floor"\n', ["plane"]),
+        ("warp = 400.0\n", ["warp", "180"]),
+        ("centre = [1.0, 2.0]\n", ["centre"]),
+    ],
+)
+def test_bad_settings_are_named(seen, more, words):
+    said = complaint(bf.read_project, project_of(seen, "bad", more))
+    assert all(word in said for word in ["bubble[0].data.points.registration", *words]), said
+
+
+def test_what_cannot_be_found_names_the_key(seen):
+    path = project_of(seen, "far", "centre = [500.0, 0.0, 600.0]\nplane = 'clamp'\n")
+    project = bf.read_project(path)
+    test = project.tests["bubble"]
+    said = complaint(test.prepare, law_of(project, [test.reach]), MembraneSolver)
+    assert "bubble[0].data.points.registration" in said
