@@ -26,9 +26,10 @@ def plot_registration(
     every = slice(None, None, -(-len(points) // MOST))
     figure = new_figure(5.2 * len(maps), 4.6)
     panels = figure.subplots(1, len(maps), squeeze=False)[0]
+    size = float(np.clip(15_000 / len(points), 3.0, 30.0))
     turn = np.linspace(0, 2 * np.pi, 181)
     for axes, (title, values) in zip(panels, maps, strict=True):
-        drawn = axes.scatter(*points[every].T, c=values[every], s=4, linewidths=0)
+        drawn = axes.scatter(*points[every].T, c=values[every], s=size, linewidths=0)
         figure.colorbar(drawn, ax=axes, shrink=0.8)
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=BLACK, linewidth=1)
         for name, (x, y) in (("warp", (1.0, 0.0)), ("fill", (0.0, 1.0))):
