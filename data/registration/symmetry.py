@@ -56,8 +56,9 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     best = float(ANGLES[np.argmin(together)])
     # Frames share the noise of the one that is subtracted; parts of the points do not.
     error = _scatter(costs, best)
-    if min(len(frame.points) for frame in frames) >= PARTS * ENOUGH:
-        parts = [[_part(frame, k) for frame in frames] for k in range(PARTS)]
+    count = min(PARTS, min(len(frame.points) for frame in frames) // ENOUGH)
+    if count > 1:
+        parts = [[_part(frame, k, count) for frame in frames] for k in range(count)]
         by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
         error = float(np.hypot(error, _scatter(by_part, best)))
     total = float(together.max())
@@ -74,8 +75,8 @@ def _costs(frames: Sequence[Frame], radius: float) -> Array:
     return np.array([_asymmetry(harmonics(frame, radius) - first) for frame in high[-FRAMES:]])
 
 
-def _part(frame: Frame, number: int) -> Frame:
-    every = slice(number, None, PARTS)
+def _part(frame: Frame, number: int, count: int) -> Frame:
+    every = slice(number, None, count)
     return replace(frame, points=frame.points[every], displacement=frame.displacement[every])
 
 

@@ -139,10 +139,11 @@ def test_the_warp_is_the_stiff_or_the_soft_direction_as_said():
 def test_noise_shows_in_the_errors_that_are_said():
     """Over eight draws of noise, the errors said are those made, within a factor of two."""
     rng, angles, centres, said = np.random.default_rng(4), [], [], []
+    frames = [bubble(grid(7.0), rise) for rise in (8.0, 20.0, 30.0)]
     for _ in range(8):
         noisy = [
             Frame(f.points, f.displacement + 0.05 * rng.standard_normal(f.points.shape))
-            for f in FRAMES
+            for f in frames
         ]
         found = register(noisy, (RADIUS, RADIUS))[1]
         assert found.warp is not None and found.rim is not None
