@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverFailure
+from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver
 from .nuisance import Nuisance
@@ -107,14 +107,11 @@ class Comparison:
         ------
         SolverFailure : it did not end well.
         """
-        values = self._solver_values(nuisance)
+        values = self._model_values(nuisance)
+        model = self._model(values)
         if isinstance(self.solver, DifferentiatingSolver):
             guess = self._guess(_point(law, free, values)) if warm else None
-            return self.solver.run(self.model, law, guess=guess, **values)
-        model = self.model
-        for name, value in values.items():
-            if value != 0.0:
-                model = getattr(model, f"with_{name}")(value)
+            return self.solver.run(model, law, guess=guess)
         return self.solver.run(model, law)
 
     def differentiate(
@@ -133,34 +130,47 @@ class Comparison:
         """
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
-        values = self._solver_values(nuisance)
+        values = self._model_values(nuisance)
         point = _point(law, free, values)
         history, slope = self.solver.run_with_sensitivity(
-            self.model,
+            self._model(values),
             law,
             [*(f"beta_{i}" for i in free), *values],
             guess=self._guess(point) if warm else None,
-            **values,
         )
         if history.path is not None and history.path_slope is not None:
             self._last = (point, history.path, history.path_slope)
         return history, self._chain(self.objective.jacobian(history, slope), len(free))
 
-    def _solver_values(self, nuisance: Mapping[str, float]) -> dict[str, Any]:
-        """What the solver knows of, by its names and in its units."""
+    def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
+        """What the model knows of, by its names and in its units."""
         return {
-            n.solver_parameter: n.scale * nuisance[n.name]
+            n.model_parameter: n.scale * nuisance[n.name]
             for n in self.nuisance
-            if n.solver_parameter is not None
+            if n.model_parameter is not None
         }
 
+    def _model(self, values: Mapping[str, float]) -> Any:
+        """The model with its parameters at `values`; one that has none is as it is.
+
+        Raises
+        ------
+        SolverFailure : there is no such model (a pressure below zero): nothing to go to.
+        """
+        if not values:
+            return self.model
+        try:
+            return self.model.with_parameters(values)
+        except InputError as error:
+            raise SolverFailure(f"there is no such model: {error}", self.solver.name) from None
+
     def _chain(self, by_solver: Array, free: int) -> Array:
-        """Columns in the order of the unknowns, from those in the order of the solver's names."""
-        own = [n.name for n in self.nuisance if n.solver_parameter is None]
+        """Columns in the order of the unknowns, from those in the order of the model's names."""
+        own = [n.name for n in self.nuisance if n.model_parameter is None]
         by_objective = iter(self.objective.nuisance_columns(own).T if own else ())
         rest = iter(by_solver.T[free:])
         columns = [
-            next(by_objective) if n.solver_parameter is None else n.scale * next(rest)
+            next(by_objective) if n.model_parameter is None else n.scale * next(rest)
             for n in self.nuisance
         ]
         return np.column_stack([by_solver[:, :free], *columns])

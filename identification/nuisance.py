@@ -17,20 +17,20 @@ class Nuisance:
 
     Parameters
     ----------
-    name : as its objective knows it ("offset_z"), or as the solver does ("pressure_offset").
+    name : as its objective knows it ("offset_z"), or of a parameter of the model.
     lower, upper : its bounds, in `unit`. A fit starts from zero.
     unit : of its values ("mm", "kPa").
-    solver_parameter : what a solver calls it: a keyword of a differentiating solver's run and one
-        of the names it differentiates by, and "with_" before it a method of the model, for the
-        other solvers. None where only the objective knows of it.
-    scale : the solver's units in one `unit` (1e-3 from kPa to MPa).
+    model_parameter : which of the model's `parameters` it is: `with_parameters` of the model takes
+        it, and a solver that differentiates does so by it. None where only the objective knows of
+        it.
+    scale : the model's units in one `unit` (1e-3 from kPa to MPa).
     """
 
     name: str
     lower: float
     upper: float
     unit: str
-    solver_parameter: str | None = None
+    model_parameter: str | None = None
     scale: float = 1.0
 
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..meshes.mesh import Mesh
 
+Array = NDArray[np.float64]
+
 #: Pinned rim; symmetry lines where the mesh has them.
 RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
     "rim": (0, 1, 2),
@@ -19,24 +21,36 @@ RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
 }
 
 
+#: Parameters of the stress-free sheet beside its modes.
+SLACK = ("slack_warp", "slack_fill")
+PRESSURE_OFFSET = "pressure_offset"
+
+
 @dataclass(frozen=True, eq=False)
 class BubbleModel:
-    """A membrane that starts flat and is inflated by follower pressure.
+    """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
     Parameters
     ----------
-    mesh : mm; warp is x, fill is y.
+    mesh : mm; warp is x, fill is y. z is the surface of the sheet in the reference picture, from
+        which displacements are counted.
     thickness : mm, in the reference state.
     pressures : MPa, strictly increasing: the frames to report.
     increments : MPa, strictly increasing, containing every pressure: the steps over which the
         hypoelastic law is integrated; the pressures unless given. They hardly matter to the
         result (benchmarks/bench_increments.py).
-    supports : degrees of freedom held at zero, by node set.
+    supports : degrees of freedom held at zero, by node set; those of the rim where it moves.
+    modes : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm.
+    slack : how much longer the stress-free sheet is than the reference picture along x (warp) and
+        y (fill), as a share: 0.001 is 0.1 %.
+    rim_motion : (increments, rim nodes, 3) mm, where the rim is at the end of every increment,
+        counted from the reference picture; None for a rim that stays.
 
     Raises
     ------
     InputError : pressures that do not increase, increments without one of the pressures, a
-        support on a set that the mesh does not have (symmetry sets excepted).
+        support on a set that the mesh does not have (symmetry sets excepted), a motion or a mode
+        of another number of nodes, a sheet shorter than nothing.
     """
 
     mesh: Mesh
@@ -44,6 +58,9 @@ class BubbleModel:
     pressures: Sequence[float]
     increments: Sequence[float] = ()
     supports: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: RIM_AND_SYMMETRY)
+    modes: Mapping[str, Array] = field(default_factory=dict)
+    slack: tuple[float, float] = (0.0, 0.0)
+    rim_motion: Array | None = None
 
     def __post_init__(self) -> None:
         steps = np.array(self.increments if len(self.increments) else self.pressures, float)
@@ -60,19 +77,83 @@ class BubbleModel:
             raise InputError(None, "mesh", "has no node set 'rim' to pin")
         object.__setattr__(self, "pressures", tuple(wanted.tolist()))
         object.__setattr__(self, "increments", tuple(steps.tolist()))
+        self._check_sheet()
 
-    def with_pressure_offset(self, offset: float) -> BubbleModel:
-        """The same model with `offset` (MPa) added to every pressure and increment.
+    def _check_sheet(self) -> None:
+        if not min(self.slack) > -1:
+            raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
+        for name, mode in self.modes.items():
+            if mode.shape != (len(self.mesh.points),):
+                raise InputError(None, f"modes.{name}", "expected one height a node")
+        if self.rim_motion is not None:
+            wanted = (len(self.increments), len(self.mesh.node_sets["rim"]), 3)
+            if self.rim_motion.shape != wanted or not np.isfinite(self.rim_motion).all():
+                problem = f"expected finite numbers {wanted}, got {self.rim_motion.shape}"
+                raise InputError(None, "rim_motion", problem)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What `with_parameters` changes: pressure_offset (MPa), slack_warp and slack_fill
+        (shares), and the modes (mm)."""
+        return (PRESSURE_OFFSET, *SLACK, *self.modes)
+
+    def with_parameters(self, values: Mapping[str, float]) -> BubbleModel:
+        """The same model with `values` added to its `parameters`; itself where all are zero.
 
         Raises
         ------
-        InputError : the first increment would not be positive.
+        InputError : no such parameter, or the first increment would not be positive.
         """
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
+        if not any(values.values()):
+            return self
+        points = np.array(self.mesh.points, dtype=float)
+        for name, mode in self.modes.items():
+            points[:, 2] += values.get(name, 0.0) * mode
+        offset = values.get(PRESSURE_OFFSET, 0.0)
+        warp, fill = (
+            own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
+        )
         return replace(
             self,
+            mesh=replace(self.mesh, points=points),
             pressures=[p + offset for p in self.pressures],
             increments=[p + offset for p in self.increments],
+            slack=(warp, fill),
         )
+
+    @property
+    def stress_free(self) -> Array:
+        """(nodes, 3) mm, where the nodes of the sheet are without any stress."""
+        warp, fill = self.slack
+        return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
+
+    def sheet_slope(self, name: str) -> tuple[Array, Array]:
+        """Derivatives (nodes, 3) of the reference surface and of `stress_free` by a parameter."""
+        surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
+        if name in self.modes:
+            surface[:, 2] = sheet[:, 2] = self.modes[name]
+        elif name in SLACK:
+            axis = SLACK.index(name)
+            sheet[:, axis] = self.mesh.points[:, axis]
+        return surface, sheet
+
+    def held(self, pressure: float) -> Array:
+        """(fixed,) mm, displacement of the held degrees of freedom at a pressure (MPa)."""
+        values = np.zeros((len(self.mesh.points), 3))
+        if self.rim_motion is not None:
+            ends = np.array([0.0, *self.increments])
+            motion = np.concatenate([np.zeros((1, *self.rim_motion.shape[1:])), self.rim_motion])
+            k = int(np.clip(np.searchsorted(ends, pressure), 1, len(ends) - 1))
+            share = (pressure - ends[k - 1]) / (ends[k] - ends[k - 1])
+            values[self.mesh.node_sets["rim"]] = motion[k - 1] + share * (motion[k] - motion[k - 1])
+            for name, directions in self.supports.items():
+                if name != "rim" and name in self.mesh.node_sets:
+                    for direction in directions:
+                        values[self.mesh.node_sets[name], direction] = 0.0
+        return np.asarray(values.reshape(-1)[self.fixed])
 
     @property
     def reported(self) -> NDArray[np.intp]:

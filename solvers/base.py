@@ -15,9 +15,14 @@ from ..materials.law import HypoelasticLaw
 Array = NDArray[np.float64]
 
 
-def parameters_of(law: HypoelasticLaw) -> tuple[str, ...]:
-    """What a differentiating solver may be asked for: the entries of beta, and two more."""
-    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", "pressure_offset")
+def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
+    """What a differentiating solver may be asked for: entries of beta, nu12, and the model's own.
+
+    A model's own are its `parameters`, which its `with_parameters` changes; not every model has
+    any.
+    """
+    own = getattr(model, "parameters", ())
+    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +149,9 @@ class DifferentiatingSolver(Solver, Protocol):
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
-        pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> History:
-        """Run with `pressure_offset` (MPa) added to every load, from `guess` where given."""
+        """Run from `guess` where given."""
         ...
 
     def run_with_sensitivity(
@@ -155,11 +159,10 @@ class DifferentiatingSolver(Solver, Protocol):
         model: Any,
         law: HypoelasticLaw,
         parameters: Sequence[str] | None = None,
-        pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
         """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
 
-        The parameters are every entry of the law's beta unless given.
+        The parameters are every entry of the law's beta unless given; those of `parameters_of`.
         """
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from .analysis import Run, Setup
 from .deck import deck_files
 from .library import constants
 from .results import bubble_history
+from .sheet import FIRST_OF_STEP, rim_paths, tilt_remarks, without_stress
 from .shells import ShellMesh
 
 DECK = "bubble.inp.j2"
@@ -37,7 +39,13 @@ def analyse(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> 
     """
     shells = setup.shells(model.mesh)
     files = decks(model, law, shells, setup.element, setup.templates)
-    return run(files, lambda frd, iterations: bubble_history(frd, model, shells, iterations))
+    sheet = without_stress(shells, model)
+
+    def history(frd: Path, iterations: int) -> History:
+        found = bubble_history(frd, model, sheet, iterations)
+        return replace(found, remarks=(*found.remarks, *tilt_remarks(sheet)))
+
+    return run(files, history)
 
 
 def decks(
@@ -47,7 +55,11 @@ def decks(
     element: str,
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Text of each input file by name, `job.inp` and the mesh; `folder`: the user's templates.
+    """Text of each input file by name, `job.inp` and the mesh.
+
+    Parameters
+    ----------
+    shells : on the model's reference surface. folder : the user's templates.
 
     Raises
     ------
@@ -58,22 +70,25 @@ def decks(
         for name, directions in model.supports.items()
         if name in model.mesh.node_sets
     ]
+    rim = rim_paths(shells, model)
+    sheet = without_stress(shells, model)
     context: dict[str, Any] = {
         # The law's increments are the model's, whatever CalculiX makes of them.
         "constants": constants(law, whole_times=True),
         "thickness": model.thickness,
         "supports": supports,
+        "rim": rim,
         "most_increments": MOST_INCREMENTS,
         "steps": [
             {
                 "pressure": p,
-                "first": FIRST if i == 0 else 1.0,
+                "first": FIRST if i == 0 else FIRST_OF_STEP if rim else 1.0,
                 "least": LEAST[0 if i == 0 else 1],
             }
             for i, p in enumerate(model.increments)
         ],
     }
-    return deck_files(DECK, "Bubble", shells, element, TOLERANCES, context, folder)
+    return deck_files(DECK, "Bubble", sheet, element, TOLERANCES, context, folder)
 
 
 def held_directions(directions: tuple[int, ...]) -> tuple[int, ...]:

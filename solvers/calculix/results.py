@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ NEAR = 1e-6
 def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
     """Displacements, support forces and strains of a bubble's .frd file.
 
+    shells : where the sheet is without stress.
+
     Raises
     ------
     SolverFailure : the file is not there, damaged, or does not hold every increment.
@@ -37,10 +40,12 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
         for name, sums in reactions.items():
             sums[frame] = support[shells.node_sets[name]].sum(axis=0)
     corners = np.ascontiguousarray(u[:, : shells.corners])
+    strain = log_strain(replace(model.mesh, points=model.stress_free), corners)
+    corners += model.stress_free - model.mesh.points
     return History(
         levels[keep],
         corners[keep],
-        *extremes(log_strain(model.mesh, corners)),
+        *extremes(strain),
         reactions,
         iterations=iterations,
         path=corners,

@@ -57,8 +57,8 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
         inside = border & np.isin(edges, nodes).all(axis=1)
         sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(inside)])
         if name == "rim":
-            radius = np.linalg.norm(points[edges[inside]], axis=2).mean(axis=1)
-            length = np.linalg.norm(midsides[inside], axis=1)
-            midsides[inside] *= (radius / length)[:, None]
+            radius = np.hypot(*np.moveaxis(points[edges[inside]][..., :2], -1, 0)).mean(axis=1)
+            length = np.hypot(*midsides[inside, :2].T)
+            midsides[np.flatnonzero(inside), :2] *= (radius / length)[:, None]
     elements = np.concatenate([quads, len(points) + which.reshape(quads.shape)], axis=1)
     return ShellMesh(np.concatenate([points, midsides]), elements, sets, len(points))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
 from ..base import History
@@ -22,8 +23,13 @@ def analyse(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run
 
     Raises
     ------
-    SolverFailure : a run that did not end well. InputError : as `bubble_deck`.
+    SolverFailure : a run that did not end well; a sheet with slack, or a rim that moves, which
+        these decks do not have. InputError : as `bubble_deck`.
     """
+    if any(model.slack) or model.rim_motion is not None:
+        raise SolverFailure(
+            "takes no slack sheet and no rim that moves, use another solver", "marc"
+        )
     deck, count = bubble_deck(model, law, settings), len(model.increments)
     return run(deck, count, lambda t19, iterations: bubble_history(t19, model, iterations))
 

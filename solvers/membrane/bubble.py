@@ -1,4 +1,4 @@
-"""Inflation of a flat membrane, increment by increment."""
+"""Inflation of a membrane, increment by increment."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
-from ...models.bubble import BubbleModel
+from ...models.bubble import PRESSURE_OFFSET, BubbleModel
 from ..base import History
 from .derivatives import Derivatives
 from .element import reference_elements
@@ -29,15 +29,13 @@ FIRST_HEIGHTS = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
 
 def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
     """What does not change from one law to the next; the wall of a sheet is not bent."""
-    points = np.column_stack([model.mesh.points[:, :2], np.zeros(len(model.mesh.points))])
-    if model.mesh.points.shape[1] == 3:
-        points = np.array(model.mesh.points, dtype=float)
+    points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
         points,
         quads,
-        reference_elements(points, quads),
+        reference_elements(model.stress_free, quads),
         model.thickness,
         law,
         free,
@@ -52,19 +50,17 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
 
     The membrane is fresh: no strain, no stress.
     """
-    levels = np.array(model.increments) + asked.pressure_offset
-    if levels[0] <= 0:
-        raise SolverFailure(f"pressure {levels[0] * 1e3:.3g} kPa is not positive")
+    levels = np.array(model.increments)
     shape, last = membrane.reference.shape, len(levels) - 1
-    derivatives = Derivatives(membrane, asked.parameters) if asked.parameters else None
+    derivatives = _derivatives(membrane, model, asked.parameters)
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
     record, stable = Record(membrane, len(levels)), True
     membrane.keep_tangent = derivatives is not None or last == 0
-    for i, u in enumerate(march(Inflation(membrane), levels, asked)):
+    for i, u in enumerate(march(Inflation(membrane, model), levels, asked)):
         if membrane.keep_tangent:
             stable = membrane.factor(judge=i == last)
         if derivatives is not None:
-            rates[i] = derivatives.increment(u).reshape(*shape, -1)
+            rates[i] = derivatives.increment(u, levels[i]).reshape(*shape, -1)
         record.accept(i, u)
         membrane.keep_tangent = derivatives is not None or i + 1 == last
     keep = model.reported
@@ -87,13 +83,26 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     return history, rates[keep]
 
 
-class Inflation(Loading):
-    """A flat membrane under a pressure (MPa)."""
+def _derivatives(
+    membrane: Membrane, model: BubbleModel, parameters: Sequence[str]
+) -> Derivatives | None:
+    if not parameters:
+        return None
+    of_sheet = [name for name in parameters if name in model.parameters and name != PRESSURE_OFFSET]
+    slopes = {name: model.sheet_slope(name) for name in of_sheet}
+    return Derivatives(membrane, parameters, model.stress_free, slopes)
 
-    def __init__(self, membrane: Membrane) -> None:
-        self.membrane = membrane
+
+class Inflation(Loading):
+    """A membrane, flat or nearly so, under a pressure (MPa); its rim goes where the model says."""
+
+    def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
+        self.membrane, self.model = membrane, model
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
+        if self.model.rim_motion is not None:
+            start = start.copy()
+            start.reshape(-1)[self.model.fixed] = self.model.held(level)
         return self.membrane.equilibrium(start, level)
 
     def first(self, level: float) -> Array:

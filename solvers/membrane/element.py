@@ -15,6 +15,15 @@ _G = 1.0 / np.sqrt(3.0)
 #: 2 x 2 Gauss points of the square; all weights are one.
 GAUSS_POINTS = np.array([[-_G, -_G], [_G, -_G], [_G, _G], [-_G, _G]])
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+#: Bilinear shape functions (point, node) and their derivatives (point, 2, node) on the square.
+VALUES = 0.25 * np.prod(1.0 + GAUSS_POINTS[:, None, :] * _CORNERS[None], axis=2)
+NATURAL = 0.25 * np.stack(
+    [
+        _CORNERS[:, 0] * (1.0 + GAUSS_POINTS[:, None, 1] * _CORNERS[:, 1]),
+        _CORNERS[:, 1] * (1.0 + GAUSS_POINTS[:, None, 0] * _CORNERS[:, 0]),
+    ],
+    axis=1,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +55,7 @@ def reference_elements(
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    corner = points[quads]
-    values = 0.25 * np.prod(1.0 + GAUSS_POINTS[:, None, :] * _CORNERS[None], axis=2)
-    natural = 0.25 * np.stack(
-        [
-            _CORNERS[:, 0] * (1.0 + GAUSS_POINTS[:, None, 1] * _CORNERS[:, 1]),
-            _CORNERS[:, 1] * (1.0 + GAUSS_POINTS[:, None, 0] * _CORNERS[:, 0]),
-        ],
-        axis=1,
-    )  # (point, 2, node)
-    base = np.einsum("pan,mnk->mpak", natural, corner)
+    base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
     normal = np.cross(base[:, :, 0], base[:, :, 1])
     area = np.linalg.norm(normal, axis=2)
     centre = normal.sum(axis=1)
@@ -71,5 +71,5 @@ def reference_elements(
     along /= length
     frame = np.stack([along, np.cross(unit, along)], axis=2)  # (m, p, 2, 3)
     jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
-    slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), natural)
-    return ReferenceElements(values, np.ascontiguousarray(slopes), area)
+    slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), NATURAL)
+    return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)

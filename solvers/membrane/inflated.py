@@ -31,13 +31,11 @@ def analyse(membrane: ClosedMembrane, model: InflatedModel, asked: Asked) -> tup
 
     Raises
     ------
-    InputError : derivatives, an offset of the pressure or a guess was asked for.
+    InputError : derivatives or a guess was asked for.
     SolverFailure : an increment of the pressure has no equilibrium.
     """
-    if asked.parameters or asked.pressure_offset or asked.guess is not None:
-        raise InputError(
-            None, "parameters", "a closed membrane takes no parameters, pressure offset or guess"
-        )
+    if asked.parameters or asked.guess is not None:
+        raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
     levels = np.array(model.pressures)
     volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
     sides, filling = outside_caps(model), Filling(membrane)

@@ -28,13 +28,11 @@ class NoEquilibrium(SolverFailure):
 class Asked:
     """What is asked of an analysis beside its model.
 
-    parameters : of the derivatives. pressure_offset : MPa added to every level. guess :
-    (increments, nodes, 3) displacements to start each increment from. tell : called with every
-    increment that is done.
+    parameters : of the derivatives. guess : (increments, nodes, 3) displacements to start each
+    increment from. tell : called with every increment that is done.
     """
 
     parameters: Sequence[str] = ()
-    pressure_offset: float = 0.0
     guess: Array | None = None
     tell: Callable[[Progress], None] | None = None
 

@@ -94,43 +94,44 @@ class MembraneSolver:
         law: HypoelasticLaw,
         scratch: Path | None = None,
         timeout: float | None = None,
-        pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> History:
         """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
         Parameters
         ----------
-        pressure_offset : MPa added to every load level; a strip has none.
         guess : (increments, nodes, 3) displacements to start each increment from, mm.
 
         Raises
         ------
         SolverFailure : an increment has no equilibrium that Newton and cut-back can find.
         """
-        return self._analyse(model, law, (), pressure_offset, guess)[0]
+        return self._analyse(model, law, (), guess)[0]
 
     def run_with_sensitivity(
         self,
         model: Any,
         law: HypoelasticLaw,
         parameters: Sequence[str] | None = None,
-        pressure_offset: float = 0.0,
         guess: Array | None = None,
     ) -> tuple[History, Array]:
         """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
 
         The parameters are every entry of the law's beta unless given. Derivatives by them are per
-        MPa, by the pressure offset per MPa. Those of a strip's load are in the history
-        (`load_slope`).
+        MPa, by the model's own parameters per unit of theirs. Those of a strip's load are in the
+        history (`load_slope`).
+
+        Raises
+        ------
+        InputError : a parameter that law and model do not have. SolverFailure : as `run`.
         """
-        known = parameters_of(law)
+        known = parameters_of(law, model)
         if parameters is None:
             parameters = known[: law.form.size]
         unknown = [name for name in parameters if name not in known]
         if unknown:
             raise InputError(None, "parameters", f"{unknown} not among {known}")
-        return self._analyse(model, law, parameters, pressure_offset, guess)
+        return self._analyse(model, law, parameters, guess)
 
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
@@ -138,10 +139,9 @@ class MembraneSolver:
         model: Any,
         law: HypoelasticLaw,
         parameters: Sequence[str],
-        pressure_offset: float,
         guess: Array | None,
     ) -> tuple[History, Array]:
-        asked = Asked(parameters, pressure_offset, guess, self.progress)
+        asked = Asked(parameters, guess, self.progress)
         history, slope = analysis_of(ANALYSES, model, self.name).analyse(
             self._membrane(model, law), model, asked
         )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
 from ..base import History
@@ -56,8 +55,6 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     nearly symmetric and its load for given, and a strip is neither.
     """
     parameters = asked.parameters
-    if asked.pressure_offset or "pressure_offset" in parameters:
-        raise InputError(None, "pressure_offset", "a strip has no pressure; leave it out")
     initial_moduli(membrane.law)
     tangent = membrane.tangent
     assert isinstance(tangent, DrivenTangent)

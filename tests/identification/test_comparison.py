@@ -94,7 +94,8 @@ def test_both_offsets_and_the_law_are_found() -> None:
     truth = {"bubble 1": (0.8, 2.0, 0.2), "bubble 2": (-3.0,)}
     for one in fit.comparisons:
         values = dict(zip((n.name for n in one.nuisance), truth[one.name], strict=True))
-        moved = one.solver.run(one.model, LAW, pressure_offset=1e-3 * values["pressure_offset"])
+        offset = {"pressure_offset": 1e-3 * values["pressure_offset"]}
+        moved = one.solver.run(one.model.with_parameters(offset), LAW)
         shift = [values.get(f"offset_{axis}", 0.0) for axis in "xyz"]
         one.objective = FieldObjective(targets_of(one.model, moved.displacement + shift))
     optimum = levenberg_marquardt(fit, fit.unknowns.at(LAW.beta * 1.05), 1e-8, 60)

@@ -86,7 +86,7 @@ def test_linear_orthotropic_constants_are_recovered() -> None:
 
 def test_offsets_are_recovered_with_the_moduli() -> None:
     shift, offset = np.array([0.0, 0.0, 0.8]), 0.002
-    moved = MembraneSolver(1e-10).run(MODEL, LAW, pressure_offset=offset)
+    moved = MembraneSolver(1e-10).run(MODEL.with_parameters({"pressure_offset": offset}), LAW)
     objective = FieldObjective(targets(moved.displacement + shift))
     fit = single(MODEL, MembraneSolver(), LAW, objective, EVERYTHING)
     optimum = levenberg_marquardt(fit, feasible_start(fit, 1, 0), 1e-7, 100)

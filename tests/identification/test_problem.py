@@ -38,7 +38,7 @@ def test_jacobian_against_finite_differences(unknowns: Unknowns) -> None:
 def test_nuisance_parameters_do_what_they_say() -> None:
     """A shift of the data in z and of the pressure is taken back by the offsets."""
     offset, shift = 0.003, np.array([0.2, -0.1, 1.0])
-    moved = MembraneSolver(1e-10).run(MODEL, LAW, pressure_offset=offset)
+    moved = MembraneSolver(1e-10).run(MODEL.with_parameters({"pressure_offset": offset}), LAW)
     objective = FieldObjective(targets(moved.displacement + shift))
     fit = single(MODEL, MembraneSolver(1e-10), LAW, objective, EVERYTHING)
     y = EVERYTHING.at(LAW.beta)

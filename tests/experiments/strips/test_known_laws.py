@@ -51,7 +51,8 @@ def test_bubble_and_strips_find_the_law_that_made_them(number: int) -> None:
 def test_offsets_of_the_bubble_are_found_beside_the_strips() -> None:
     fit = joint(SHIFTED)
     shift, offset = np.array([0.2, -0.1, 0.8]), 0.003
-    moved = MembraneSolver(TIGHT).run(BUBBLE, LAW, pressure_offset=offset).displacement + shift
+    model = BUBBLE.with_parameters({"pressure_offset": offset})
+    moved = MembraneSolver(TIGHT).run(model, LAW).displacement + shift
     targets = [FieldTarget(p, u) for p, u in zip(BUBBLE.pressures, moved, strict=True)]
     fit.comparisons[0].objective = FieldObjective(targets, weight=1 / 9)
     found = levenberg_marquardt(fit, near(SHIFTED, LAW, 1.1), 1e-9, 100)

@@ -421,8 +421,8 @@ def test_a_modulus_that_turns_negative_on_the_way_fails_there() -> None:
 
 
 def test_a_pressure_offset_below_the_first_pressure_fails() -> None:
-    with pytest.raises(SolverFailure, match="not positive"):
-        MembraneSolver().run(quarter_bubble(), LAW, pressure_offset=-1.0)
+    with pytest.raises(InputError, match="expected positive"):
+        quarter_bubble().with_parameters({"pressure_offset": -1.0})
 
 
 def test_a_pressure_offset_is_a_shift_of_every_load() -> None:
@@ -430,7 +430,7 @@ def test_a_pressure_offset_is_a_shift_of_every_load() -> None:
     shifted = BubbleModel(
         model.mesh, THICKNESS, PRESSURES + 0.002, np.array(model.increments) + 0.002
     )
-    a = MembraneSolver(1e-11).run(model, LAW, pressure_offset=0.002)
+    a = MembraneSolver(1e-11).run(model.with_parameters({"pressure_offset": 0.002}), LAW)
     b = MembraneSolver(1e-11).run(shifted, LAW)
     assert a.displacement == pytest.approx(b.displacement, abs=1e-8)
     assert a.load == pytest.approx(b.load)

@@ -10,7 +10,8 @@ from bubblefit.errors import InputError
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.meshes.disk_modes import disk_modes
+from bubblefit.models.bubble import SLACK, BubbleModel, default_increments
 from bubblefit.solvers.base import DifferentiatingSolver, parameters_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -26,30 +27,37 @@ MODEL = BubbleModel(
     disk_mesh(100.0, 192, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
 )
 LAW = HypoelasticLaw(BETA, 0.24, [0.13, 0.13, 0.13])
-PARAMETERS = parameters_of(LAW)
+PARAMETERS = parameters_of(LAW, MODEL)
+OFFSET = "pressure_offset"
 TIGHT = 1e-10
 
 
-def changed(law: HypoelasticLaw, name: str, step: float) -> tuple[HypoelasticLaw, float]:
-    """Law and pressure offset with one parameter moved."""
+def changed(
+    law: HypoelasticLaw, model: BubbleModel, name: str, step: float
+) -> tuple[BubbleModel, HypoelasticLaw]:
+    """Model and law with one parameter moved."""
     if name == "nu12":
-        return replace(law, nu12=law.nu12 + step), 0.0
-    if name == "pressure_offset":
-        return law, step
+        return model, replace(law, nu12=law.nu12 + step)
+    if name in model.parameters:
+        return model.with_parameters({name: step}), law
     beta = law.beta.copy()
     beta[int(name.removeprefix("beta_"))] += step
-    return law.with_beta(beta), 0.0
+    return model, law.with_beta(beta)
 
 
 def differences(
-    law: HypoelasticLaw, name: str, slope: np.ndarray, move: float = 0.01
+    law: HypoelasticLaw,
+    name: str,
+    slope: np.ndarray,
+    move: float = 0.01,
+    model: BubbleModel = MODEL,
 ) -> np.ndarray:
     """Central differences, extrapolated, with the step that moves the bubble by `move` mm."""
 
     def central(step: float) -> np.ndarray:
         ahead, behind = (
-            MembraneSolver(TIGHT).run(MODEL, moved, pressure_offset=offset).displacement
-            for moved, offset in (changed(law, name, step), changed(law, name, -step))
+            MembraneSolver(TIGHT).run(*changed(law, model, name, by)).displacement
+            for by in (step, -step)
         )
         return (ahead - behind) / (2 * step)
 
@@ -68,6 +76,39 @@ def test_each_parameter(name: str, thickness_change: str) -> None:
     # Not only the largest: the first frame, too, is right to 1e-5 of its own largest.
     first = np.abs(slope[0, ..., 0] - expected[0]).max()
     assert first < 2e-5 * np.abs(expected[0]).max()
+
+
+def sheet(thickness_change: str) -> tuple[BubbleModel, HypoelasticLaw]:
+    """A whole disk that is neither flat nor taut, with a rim that moves."""
+    mesh = disk_mesh(100.0, 64)
+    modes = disk_modes(mesh.points, 100.0, 10)
+    x, y = mesh.points[:, 0], mesh.points[:, 1]
+    points = mesh.points + np.outer(3.0 * modes["z0_1"] - 4.0 * modes["z0_xy"], [0, 0, 1])
+    points[:, 2] += 0.01 * x - 1e-4 * y**2
+    pressures = 1e-3 * np.array([22.0, 97.0, 186.0])
+    steps = default_increments(pressures)
+    rim = mesh.points[mesh.node_sets["rim"]]
+    motion = np.array([p / 0.186 * (0.01 * rim + (0.3, 0.0, 1.0)) for p in steps])
+    model = BubbleModel(
+        replace(mesh, points=points), 0.81, pressures, steps,
+        modes=modes, slack=(0.002, -0.001), rim_motion=motion,
+    )  # fmt: skip
+    return model, replace(LAW, thickness_change=thickness_change)
+
+
+@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
+def test_the_parameters_of_the_sheet_together(thickness_change: str) -> None:
+    """Heights and slack, along the path: the law's own history depends on them, too."""
+    model, law = sheet(thickness_change)
+    names = [*SLACK, *model.modes, OFFSET, "beta_11"]
+    slopes = MembraneSolver(TIGHT).run_with_sensitivity(model, law, names)[1]
+    for j, name in enumerate(names):
+        if name in ("z0_x", "z0_xx", "z0_xxy", "z0_yyy"):
+            continue
+        expected = differences(law, name, slopes[..., j], model=model)
+        for frame in range(3):
+            off = np.abs(slopes[frame, ..., j] - expected[frame]).max()
+            assert off < 2e-5 * np.abs(expected[frame]).max(), (name, frame)
 
 
 def test_where_the_moduli_are_held() -> None:

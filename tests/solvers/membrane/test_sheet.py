@@ -1,0 +1,114 @@
+"""Sheets that are neither flat nor taut, and rims that move, in the embedded membrane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.disk_modes import disk_modes, doubly_symmetric, monomials
+from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+PRESSURES = (0.022, 0.097, 0.186)
+STEPS = default_increments(PRESSURES)
+LAW = HypoelasticLaw.linear(500.0, 250.0, 12.0)
+MESH = disk_mesh(100.0, 64)
+RIM = MESH.node_sets["rim"]
+FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points, 100.0, 6))
+
+
+def run(model: BubbleModel) -> np.ndarray:
+    return MembraneSolver(1e-10).run(model, LAW).displacement
+
+
+def with_rim(model: BubbleModel, motion: np.ndarray) -> BubbleModel:
+    """The rim moves so from the first increment on."""
+    return replace(model, rim_motion=np.repeat(motion[None], len(STEPS), axis=0))
+
+
+def test_a_rim_that_moves_rigidly_takes_the_bubble_along() -> None:
+    shift = np.array([0.5, -0.3, 2.0])
+    moved = run(with_rim(FLAT, np.tile(shift, (len(RIM), 1))))
+    np.testing.assert_allclose(moved, run(FLAT) + shift, atol=1e-6)
+
+
+def test_a_tilted_rim_turns_it() -> None:
+    """The pressure follows the surface, so that the whole state turns about the y axis."""
+    angle = np.radians(3.0)
+    turn = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    moved = run(with_rim(FLAT, MESH.points[RIM] @ turn.T - MESH.points[RIM]))
+    places = (MESH.points + run(FLAT)) @ turn.T
+    np.testing.assert_allclose(MESH.points + moved, places, atol=1e-6)
+
+
+def test_between_two_increments_the_rim_goes_straight() -> None:
+    """Where it is at an increment does not depend on whether the analysis stopped on the way."""
+    motion = np.linspace(0.2, 1.0, len(STEPS))[:, None, None] * MESH.points[RIM] * 0.01
+    model = replace(FLAT, rim_motion=motion)
+    held = model.held(0.5 * (STEPS[1] + STEPS[2])).reshape(-1, 3)
+    np.testing.assert_allclose(held, 0.5 * (motion[1] + motion[2]))
+    np.testing.assert_allclose(model.held(0.5 * STEPS[0]).reshape(-1, 3), 0.5 * motion[0])
+    np.testing.assert_allclose(run(model)[-1][RIM], motion[-1], atol=1e-12)
+
+
+def test_symmetry_lines_keep_a_moving_rim() -> None:
+    mesh = disk_mesh(100.0, 64, "quarter")
+    model = BubbleModel(mesh, 0.81, PRESSURES, STEPS)
+    rim = mesh.node_sets["rim"]
+    model = replace(model, rim_motion=np.ones((len(STEPS), len(rim), 3)))
+    u = run(model)
+    on_line = np.intersect1d(rim, mesh.node_sets["symmetry_x"])
+    assert (u[:, on_line, 0] == 0).all() and (u[:, on_line, 1] == 1).all()
+
+
+def test_a_slack_sheet_is_a_larger_disk_pushed_together() -> None:
+    """0.4 % longer along the warp: the same places as of an ellipse whose rim is moved inwards."""
+    slack = np.array([0.004, 0.001, 0.0])
+    larger = replace(MESH, points=MESH.points * (1 + slack))
+    inwards = with_rim(replace(FLAT, mesh=larger), -slack * MESH.points[RIM])
+    there = larger.points + run(inwards)
+    slackened = replace(FLAT, slack=(0.004, 0.001))
+    np.testing.assert_allclose(MESH.points + run(slackened), there, atol=1e-6)
+    apex = MESH.node_sets["apex"][0]
+    assert run(slackened)[0, apex, 2] > run(FLAT)[0, apex, 2] + 0.5
+
+
+def test_parameters_are_added_to_what_the_model_has() -> None:
+    model = FLAT.with_parameters({"z0_1": 2.0, "z0_xy": -1.0, "slack_fill": 0.001})
+    heights = 2.0 * FLAT.modes["z0_1"] - FLAT.modes["z0_xy"]
+    np.testing.assert_allclose(model.mesh.points[:, 2], heights)
+    again = model.with_parameters({"z0_1": 1.0, "slack_fill": 0.001, "pressure_offset": 0.002})
+    np.testing.assert_allclose(again.mesh.points[:, 2], heights + FLAT.modes["z0_1"])
+    assert again.slack == (0.0, 0.002)
+    np.testing.assert_allclose(again.pressures, np.add(PRESSURES, 0.002))
+    assert FLAT.with_parameters({"z0_1": 0.0}) is FLAT
+    with pytest.raises(InputError, match="z0_9"):
+        FLAT.with_parameters({"z0_9": 1.0})
+
+
+def test_modes_vanish_at_the_rim_and_are_named_after_their_monomials() -> None:
+    assert monomials(6) == [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    assert list(FLAT.modes) == ["z0_1", "z0_x", "z0_y", "z0_xx", "z0_xy", "z0_yy"]
+    modes = disk_modes(np.array([[50.0, -20.0], [60.0, 80.0]]), 100.0, 6)
+    np.testing.assert_allclose(modes["z0_xy"], [(1 - 0.29) * 0.5 * -0.2, 0.0], atol=1e-15)
+    assert modes["z0_1"][0] == pytest.approx(0.71)
+    assert doubly_symmetric(1) and not doubly_symmetric(2)
+
+
+@pytest.mark.parametrize(
+    ("bad", "problem"),
+    [
+        ({"slack": (-1.0, 0.0)}, "slack: expected shares above -1"),
+        ({"modes": {"z0_1": np.zeros(3)}}, r"modes\.z0_1: expected one height a node"),
+        ({"rim_motion": np.zeros((1, len(RIM), 3))}, "rim_motion: expected finite numbers"),
+    ],
+)
+def test_bad_sheets(bad: dict, problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        replace(FLAT, **bad)
