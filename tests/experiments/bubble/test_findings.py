@@ -30,7 +30,8 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path: Path) -> None:
     point = problem.evaluate(y, False, warm=False)
     # As many kPa are added to every pressure of the model, which is in MPa.
     (history,) = point.histories
-    moved = MembraneSolver().run(prepared.test.model(), law, pressure_offset=1e-3 * PRESSURE)
+    model = prepared.test.model().with_parameters({"pressure_offset": 1e-3 * PRESSURE})
+    moved = MembraneSolver().run(model, law)
     np.testing.assert_allclose(history.displacement, moved.displacement, atol=1e-7)
     nuisance = problem.unknowns.nuisance_values("bubble", y)
     reached = np.full(3, 0.1)
