@@ -4,7 +4,8 @@ Usage: bench_symmetry.py [DATA_FOLDER]. A model with warp and fill as planes of 
 value for a point and its mirror images (dx odd in x, dy odd in y, dz even in both); the nearest in
 mean |dx| + |dy| + |dz| is their median. What is left then, over all points and pressures, is the
 floor that docs/validation/results.md names: no such model can be nearer. Beside it the mean
-difference of dz between mirror images, left and right (x -> -x) and top and bottom (y -> -y).
+difference of dz between mirror images, left and right (x -> -x) and top and bottom (y -> -y), and
+dz in the middle of the first picture.
 """
 
 from __future__ import annotations
@@ -28,14 +29,15 @@ def main() -> None:
     if not (folder / "grid").is_dir():
         print(f"skipped: no measured data in {folder}")
         return
-    print("test  floor, mm  left and right, mm  top and bottom, mm")
+    print("test  floor, mm  left and right, mm  top and bottom, mm  first picture, mm")
     for test in (1, 2, 3):
         frames = [read(folder / "grid" / f"test{test}_{k:02d}.csv") for k in range(PRESSURES)]
         left = np.mean(np.concatenate([unsymmetric(frame) for frame in frames]))
         gaps = [
             np.mean(np.concatenate([mirrored(frame, axis) for frame in frames])) for axis in AXES
         ]
-        print(f"{test:4d}{left:11.2f}{gaps[0]:20.2f}{gaps[1]:20.2f}")
+        middle = float(frames[0].dz[np.hypot(frames[0].x, frames[0].y) < 1.0].mean())
+        print(f"{test:4d}{left:11.2f}{gaps[0]:20.2f}{gaps[1]:20.2f}{middle:19.1f}")
 
 
 def read(path: Path) -> pd.DataFrame:
