@@ -129,14 +129,15 @@ def messages() -> Iterator[tuple[str, str]]:
         if room.parts[0] in OUTSIDE:
             continue
         tree = parsed(path)
-        prose = {
-            id(node.value)
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        }
+        apart = set()  # docstrings, and formats of what is computed, such as ".0%"
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Expr):
+                apart.add(id(node.value))
+            elif isinstance(node, ast.FormattedValue) and node.format_spec is not None:
+                apart.update(id(part) for part in ast.walk(node.format_spec))
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                if id(node) not in prose:
+                if id(node) not in apart:
                     yield f"{room}:{node.lineno}", node.value
     for path in sorted((ROOT / "templates").rglob("*.*")):
         for number, line in enumerate(path.read_text().splitlines(), 1):
