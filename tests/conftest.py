@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bubblefit.experiments import registry as experiments
 from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.calculix.executable import Executable
 from hypothesis import settings
+from matplotlib.figure import Figure
 
 from . import needs
 from .bars import BarKind, BarSolver
@@ -29,6 +31,20 @@ def shared_data() -> Path:
 def ccx() -> Executable:
     """A ccx that can load material libraries; see `needs`."""
     return needs.calculix()
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """Every figure saved by the test, in turn; each is still written."""
+    figures: list[Figure] = []
+    write = Figure.savefig
+
+    def keep(self: Figure, *args: Any, **kwargs: Any) -> None:
+        write(self, *args, **kwargs)
+        figures.append(self)
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+    return figures
 
 
 @pytest.fixture

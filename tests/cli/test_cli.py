@@ -375,7 +375,11 @@ def test_init_on_a_full_disk_leaves_nothing(mounted):
 
 @pytest.mark.slow
 def test_the_example_recovers_the_known_solution_from_other_data(tmp_path):
-    """Finer mesh and other increments: the fit cannot be exact, and says how far off it is."""
+    """Finer mesh and other increments: the fit cannot be exact, and says how far off it is.
+
+    As the example's README and docs/validation/results.md say: e = 0.0065, moduli off by 0.5, 1.0
+    and 17 %.
+    """
     project = small(
         tmp_path,
         ("# elements = 1800", "elements = 1800"),
@@ -383,10 +387,13 @@ def test_the_example_recovers_the_known_solution_from_other_data(tmp_path):
     )
     text = project.read_text().replace("elements = 48", "elements = 800", 1)
     project.write_text(text)
-    bubblefit("bubble", project, "--out", "out", "--starts", 2, cwd=tmp_path)
+    bubblefit("bubble", project, "--out", "out", "--starts", 1, cwd=tmp_path)
     result = json.loads((tmp_path / "out/result.json").read_text())
-    assert 1e-6 < result["objective"] < 0.05
-    assert result["moduli_error"]["E1"] < 0.05 and result["moduli_error"]["E2"] < 0.05
+    assert result["objective"] == pytest.approx(0.0065, abs=5e-5)
+    error = result["moduli_error"]
+    assert error["E1"] == pytest.approx(0.0050, abs=5e-4)
+    assert error["E2"] == pytest.approx(0.0105, abs=5e-4)
+    assert error["G12"] == pytest.approx(0.174, abs=5e-3)
 
 
 def test_help_is_quick_and_complete(tmp_path):

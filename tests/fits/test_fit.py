@@ -12,8 +12,11 @@ import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.fits import best
 from bubblefit.fits.start import StartRecord
+from bubblefit.reports.style import BLACK
+from matplotlib.figure import Figure
 
 from ..commands import in_process, result_in
+from ..drawings import data, lines, titles
 from ..projects import small, with_form
 
 SECOND = """
@@ -76,6 +79,24 @@ def test_tables(fitted: bf.Fit, tmp_path: Path):
     assert card.law.beta == pytest.approx(fitted.law.beta)
     assert card.law.strain_range == pytest.approx(fitted.best.valid)
     assert result_in(tmp_path)["valid_strain"]["warp"] == pytest.approx(card.law.strain_range[0])
+
+
+def test_figures_show_what_the_tables_hold(fitted: bf.Fit, tmp_path: Path, drawn: list[Figure]):
+    fitted.report(tmp_path)
+    by_panel = {axes.get_ylabel(): axes for figure in drawn for axes in figure.axes}
+    residuals = fitted.residuals()
+    heights = residuals[residuals["quantity"] == "dz"]
+    shown = np.concatenate(data(by_panel["modelled z, mm"])[1:], axis=1)
+    assert shown == pytest.approx(heights[["measured_mm", "modelled_mm"]].to_numpy().T)
+    off = np.concatenate(data(by_panel["modelled $-$ known solution, mm"])[1:], axis=1)
+    assert off[1] == pytest.approx(heights["difference_mm"].to_numpy(), abs=1e-12)
+    moduli = fitted.moduli()
+    e1 = moduli[moduli["modulus"] == "E1"]
+    (best,) = lines(by_panel["tangent modulus, MPa"], BLACK)
+    assert best[1] == pytest.approx(fitted.law.E1(best[0]))
+    assert (best[0].min(), best[0].max()) == pytest.approx((0.0, e1["strain"].max()))
+    (optima, *_) = data(next(f for f in drawn if "Optima" in titles(f)[0]).axes[0])
+    assert optima[1] == pytest.approx(sorted(fitted.starts()["objective"], reverse=True))
 
 
 def test_the_listed_uncertainty_is_one_standard_deviation(fitted: bf.Fit):

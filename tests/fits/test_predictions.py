@@ -18,10 +18,13 @@ from bubblefit.fits.predictions import RunEvent, predict
 from bubblefit.fits.project import Project, read_project
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.reports.style import NAMED
 from bubblefit.solvers import registry
+from matplotlib.figure import Figure
 
 from ..complaints import complaint
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
+from ..drawings import lines
 
 CARDS = ("soft", "stiff")
 TESTS = ("150 mm, 90 kPa", "high")
@@ -64,6 +67,23 @@ def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
     # Nothing was written, nothing was measured.
     assert [p.name for p in tmp_path.iterdir()] == ["project.toml"]
     assert done.worst is None and done.silent() == []
+
+
+def test_figures_show_the_curves_of_the_table(
+    project: Project, tmp_path: Path, drawn: list[Figure]
+) -> None:
+    done = predict(project, ["high"], jobs=1)
+    done.report(tmp_path / "out")
+    curves = done.curves()
+    panels = {axes.get_ylabel(): axes for figure in drawn for axes in figure.axes}
+    for rank, card in enumerate(CARDS):
+        own = curves[curves["card"] == card]
+        load = lines(panels["load, N"], NAMED[rank])[0]
+        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T)
+        gas = lines(panels["gauge pressure, kPa"], NAMED[rank])[0]
+        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy())
+        volume = own["volume_mm3"].to_numpy()
+        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6)
 
 
 def test_tests_and_cards_by_name(project: Project) -> None:
@@ -126,6 +146,18 @@ def test_measured_tests_that_say_nothing(tmp_path: Path) -> None:
     assert np.isnan(done.runs()["rms_relative"].tolist()[2])
     with pytest.raises(SolverFailure, match="no run ended well: made to fail"):
         predict(read_project(path), cards=["soft"], jobs=1)
+
+
+def test_a_card_runs_with_its_own_thickness(project: Project) -> None:
+    """Not with the fabric's of 0.81 mm: the card's moduli are those of the card's thickness."""
+    law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
+    cards = {f"{t} mm": MaterialCard(law, t) for t in (0.81, 0.9)}
+    done = predict(project, ["high"], cards, jobs=1)
+    for run, thickness in zip(done.each, (0.81, 0.9), strict=True):
+        # The seam is three layers.
+        assert set(np.unique(run.model.thickness)) == {thickness, 3 * thickness}
+    thin, thick = done.curves()["load_N"].to_numpy().reshape(2, -1)[:, 1]
+    assert thick > 1.05 * thin
 
 
 def test_notes_stand_wherever_a_run_does(project: Project, tmp_path: Path) -> None:

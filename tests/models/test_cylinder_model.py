@@ -135,7 +135,8 @@ def test_the_thesis_case(symmetry):
     seam = np.isin(np.arange(len(model.mesh.quads)), model.mesh.element_sets["seam"])
     np.testing.assert_array_equal(model.thickness, np.where(seam, 3 * 0.81, 0.81))
     volume = model.copies * enclosed_volume(model.mesh.points, model.mesh.quads)
-    assert volume == pytest.approx(np.pi * 75.0**2 * 3000, rel=0.03)
+    # Sixteen corners around, those at the seam closer together: 97.33 % of the circle.
+    assert volume == pytest.approx(0.9733 * np.pi * 75.0**2 * 3000, rel=1e-4)
     extra = np.setdiff1d(model.held_on_inflation, model.fixed)
     np.testing.assert_array_equal(extra, 3 * model.mesh.node_sets["support_bottom"] + 1)
 

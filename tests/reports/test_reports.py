@@ -25,7 +25,11 @@ from bubblefit.reports import (
 )
 from bubblefit.reports.cuts import node_cut, point_cut
 from bubblefit.reports.html import number, percent
+from bubblefit.reports.style import BLACK, SKY, VERMILION
 from bubblefit.writing import replacing
+from matplotlib.figure import Figure
+
+from ..drawings import data, legend, lines
 
 #: Best, median and worst of 50 starts (docs/references.md, its Fig. 4.8).
 PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
@@ -47,36 +51,101 @@ def polar(angles: np.ndarray) -> np.ndarray:
 QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
 
 
-def is_png(path: Path) -> bool:
-    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 5000
-
-
 @pytest.mark.parametrize("values", [[0.0, 1e-9, 3.2], [np.nan, 1.3, np.inf, 1.4], [np.nan], [0.1]])
-def test_optima(tmp_path: Path, values: list[float]):
-    assert is_png(plot_optima(tmp_path / "optima.png", values, references=PUBLISHED))
-    assert is_png(plot_optima(tmp_path / "plain.png", values))
+def test_optima(tmp_path: Path, drawn: list[Figure], values: list[float]):
+    """Every start that ended, worst first; a line at every published value."""
+    plot_optima(tmp_path / "optima.png", values, references=PUBLISHED)
+    plot_optima(tmp_path / "plain.png", values)
+    ended = sorted((v for v in values if np.isfinite(v)), reverse=True)
+    for figure, references in zip(drawn, (PUBLISHED, {}), strict=True):
+        (axes,) = figure.axes
+        optima, *published = data(axes)
+        np.testing.assert_array_equal(optima[0], np.arange(1, len(ended) + 1))
+        np.testing.assert_array_equal(optima[1], np.maximum(ended, 1e-16))
+        assert [line[1].tolist() for line in published] == [[v] * 2 for v in references.values()]
+        assert [text.get_text() for text in axes.texts] == [
+            f"published {name} {value:g}" for name, value in references.items()
+        ]
+        low, high = axes.get_ylim()
+        assert all(low <= y <= high for y in (*optima[1], *references.values()))
+        said = axes.get_title("left")
+        assert said.startswith(f"Optima of {len(values)} start")
+        failed = len(values) - len(ended)
+        assert (f", {failed} without a result" in said) == bool(failed)
+        if ended:
+            best, median, worst = ended[-1], np.median(ended), ended[0]
+            assert f"best {best:.3g}, median {median:.3g}, worst {worst:.3g}" in said
 
 
 @pytest.mark.parametrize("fits, known", [(5, True), (5, False), (1, True), (1, False)])
-def test_moduli(tmp_path: Path, fits: int, known: bool):
+def test_moduli(tmp_path: Path, drawn: list[Figure], fits: int, known: bool):
     strains = np.linspace(0, [0.08, 0.1, 0.06], 20).T
     truth = 1000 * (1 - 3 * strains)
     curves = np.array([truth * (1 + 1e-6 * i) for i in range(fits)])
-    assert is_png(plot_moduli(tmp_path / "m.png", strains, curves, truth if known else None))
+    plot_moduli(tmp_path / "m.png", strains, curves, truth if known else None)
+    (figure,) = drawn
+    assert len(figure.axes) == (6 if known else 3)
+    for m, top in enumerate(figure.axes[:3]):
+        (best,), others = lines(top, BLACK), lines(top, SKY)
+        np.testing.assert_array_equal(best, [strains[m], curves[0, m]])
+        assert sorted(other[1, 0] for other in others) == sorted(curves[1:, m, 0])
+        assert [line[1].tolist() for line in lines(top, VERMILION)] == [truth[m].tolist()] * known
+    for m, below in enumerate(figure.axes[3:]):
+        off = [line[1] for line in data(below)]
+        # Percent; the best, drawn last, is the known one itself.
+        np.testing.assert_array_equal(off[-1], np.full(20, 1e-10))
+        assert [y[0] for y in off[:-1]] == pytest.approx([1e-4 * i for i in range(fits - 1, 0, -1)])
+        assert below.texts[0].get_text() == "best: at most 1e-10 %", m
+    assert ("known" in legend(figure)) == known
 
 
 @pytest.mark.parametrize("points", [QUARTER, FULL], ids=["quarter", "full"])
-def test_profiles_and_heights(tmp_path: Path, points: np.ndarray):
+def test_profiles_and_heights(tmp_path: Path, drawn: list[Figure], points: np.ndarray):
     heights = (13.0, 30.0, 39.0)
     model = np.array([cap(points, h) for h in heights])
     grid = FULL[np.hypot(*FULL.T) < 90]
     measured = [(grid, cap(grid, h + 1)) for h in heights]
-    assert is_png(plot_profiles(tmp_path / "one.png", PRESSURES, points, model))
+    plot_profiles(tmp_path / "one.png", PRESSURES, points, model)
     several = np.array([model, 1.01 * model])
-    assert is_png(plot_profiles(tmp_path / "p.png", PRESSURES, points, several, measured))
-    seen = [d[:, 2] for _, d in measured]
-    assert is_png(plot_heights(tmp_path / "h.png", PRESSURES, seen, [z - 1 for z in seen]))
-    assert is_png(plot_heights(tmp_path / "same.png", PRESSURES, seen, seen))
+    plot_profiles(tmp_path / "p.png", PRESSURES, points, several, measured)
+    one, both = drawn
+    for axis, panel in enumerate(one.axes):
+        for line, height in zip(data(panel), heights, strict=True):
+            assert line[1] == pytest.approx(height_at(line[0], height), rel=0.02, abs=0.3)
+            assert line[1].max() == pytest.approx(height)
+        shown = data(both.axes[axis])
+        for best, next_best, dots, height in zip(
+            shown[::3], shown[1::3], shown[2::3], heights, strict=True
+        ):
+            assert best[1].max() == pytest.approx(height)
+            assert next_best[1].max() == pytest.approx(1.01 * height)
+            assert dots[1].max() == pytest.approx(height + 1)
+    assert legend(one) == ["300 kPa", "186 kPa", "22 kPa", "model"]
+    assert legend(both)[3:] == ["model (2 best)", "measured"]
+
+
+def height_at(position: np.ndarray, height: float) -> np.ndarray:
+    """Of a cap over where its points have moved to, nearly."""
+    at = position / (1 + 0.05 * (1 - position**2 / 1e4))
+    return height * (1 - at**2 / 1e4)
+
+
+def test_heights_are_drawn_against_each_other(tmp_path: Path, drawn: list[Figure]):
+    seen = [np.linspace(1.0, h, 12) for h in (13.0, 30.0, 39.0)]
+    modelled = [z + 0.1 * k for k, z in enumerate(seen)]
+    plot_heights(tmp_path / "h.png", PRESSURES, seen, modelled)
+    plot_heights(tmp_path / "same.png", PRESSURES, seen, seen)
+    left, right = drawn[0].axes
+    for shown, off, z, model in zip(data(left)[1:], data(right)[1:], seen, modelled, strict=True):
+        np.testing.assert_array_equal(shown, [z, model])
+        np.testing.assert_array_equal(off, [z, model - z])
+    rms = np.sqrt(np.mean([0.0, 0.01, 0.04]))
+    assert right.get_title("left") == f"RMS {rms:.2g} mm"
+    every, spread = np.concatenate(seen), np.concatenate(modelled) - np.concatenate(seen)
+    said = 1 - (spread**2).sum() / ((every - every.mean()) ** 2).sum()
+    assert left.get_title("left") == f"$R^2$ = 1 $-$ {1 - said:.1e}"
+    assert legend(drawn[0]) == ["300 kPa", "186 kPa", "22 kPa"]
+    assert drawn[1].axes[1].get_title("left") == "RMS 0 mm"
 
 
 @pytest.mark.parametrize("axis", [0, 1])

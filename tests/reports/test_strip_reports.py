@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,38 +22,15 @@ from bubblefit.reports import (
 )
 from bubblefit.reports.pinned import NOT_DETERMINED
 from bubblefit.reports.style import BLACK, GREY, NAMED, SKY, named_look
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from ..drawings import legend, lines
 from ..places import PUBLISHED
 
 U = np.linspace(0.0, 4.0, 41)
 STRAINS = np.linspace(0, [0.15, 0.2, 0.6], 20).T
 MODULI = np.array([[800.0], [150.0], [20.0]]) * (1 + STRAINS)
-
-
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
-    """Every figure saved, in turn; each is still written."""
-    figures: list[Figure] = []
-    write = Figure.savefig
-
-    def keep(self: Figure, *args, **kwargs) -> None:
-        write(self, *args, **kwargs)
-        figures.append(self)
-
-    monkeypatch.setattr(Figure, "savefig", keep)
-    yield figures
-
-
-def lines(axes: Axes, colour: str) -> list[np.ndarray]:
-    """(2, k) data of every line of the colour."""
-    return [np.array(line.get_data()) for line in axes.lines if line.get_color() == colour]
-
-
-def legend(figure: Figure) -> list[str]:
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def is_inside(figure: Figure) -> bool:

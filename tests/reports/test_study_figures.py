@@ -9,18 +9,7 @@ import pytest
 from bubblefit.reports import ConvergencePanel, plot_convergence, plot_nu12
 from matplotlib.figure import Figure
 
-
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    figures: list[Figure] = []
-    write = Figure.savefig
-
-    def keep(self: Figure, *args, **kwargs) -> None:
-        write(self, *args, **kwargs)
-        figures.append(self)
-
-    monkeypatch.setattr(Figure, "savefig", keep)
-    return figures
+from ..drawings import legend
 
 
 def test_convergence_figure(tmp_path: Path, drawn: list[Figure]) -> None:
@@ -53,8 +42,10 @@ def test_nu12_figure(tmp_path: Path, drawn: list[Figure]) -> None:
         plot_nu12(tmp_path / "none.png", {}, 0.24, "load")
 
 
-def test_more_quantities_than_colours_are_drawn(tmp_path: Path) -> None:
+def test_more_quantities_than_colours_are_drawn(tmp_path: Path, drawn: list[Figure]) -> None:
     names = [*(f"load at {d} mm, N" for d in (40, 100, 240)), *(f"quantity {i}" for i in range(9))]
     panel = ConvergencePanel("case", [2.0, 1.0], {n: [0.1] for n in names}, [10, 40], [0.1, 0.3])
     plot_convergence(tmp_path / "c.png", [panel], "elements")
-    assert (tmp_path / "c.png").stat().st_size > 10_000
+    shown = drawn[0].axes[0].lines[: len(names)]
+    assert [line.get_ydata().tolist() for line in shown] == [[0.1]] * len(names)
+    assert legend(drawn[0]) == [*names, "order 1", "order 2"]

@@ -15,8 +15,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.studies.poisson import by_response, ratios, vary_nu12
+from matplotlib.figure import Figure
 
 from ..bars import STRETCH, BarSolver, BarTest, project_of
+from ..drawings import data
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 END = "load at the end, N"
@@ -34,7 +36,7 @@ def test_ratios_leave_out_what_failed() -> None:
     assert early["b"].to_base == pytest.approx([np.nan, 0.25], nan_ok=True)
 
 
-def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path) -> None:
+def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path, drawn: list[Figure]) -> None:
     study = vary_nu12(project_of(BarTest("a bar")), CARD, [0.4, 0.0, 0.4])
     found = study.parts["a bar"].responses[END]
     assert found.nu12.tolist() == [0.0, 0.4] and study.base == 0.24
@@ -44,7 +46,10 @@ def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path) -> None:
     table = pd.read_csv(tmp_path / "nu12.csv")
     pd.testing.assert_frame_equal(table, study.table())
     assert json.loads((tmp_path / "result.json").read_text()) == study.result
-    assert (tmp_path / "nu12.png").stat().st_size > 10_000
+    assert (tmp_path / "nu12.png").exists()
+    _, shown, base = data(drawn[0].axes[0])
+    np.testing.assert_array_equal(shown, [found.nu12, found.to_base])
+    assert base.ravel().tolist() == [0.24, 1.0]
     assert any(line.startswith(f"a bar, {END}") for line in study.lines())
 
 

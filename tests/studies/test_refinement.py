@@ -16,8 +16,10 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip import strip_mesh
 from bubblefit.models.uniaxial import bias_strip, refined_quads, straight_strip
 from bubblefit.studies.refinement import edge_length, refine, rms_between
+from matplotlib.figure import Figure
 
 from ..bars import STRETCH, WIDTH, BarSolver, BarTest, project_of
+from ..drawings import data
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WIDTH
@@ -86,7 +88,9 @@ def test_parts_and_tests_are_told_apart(bars: BarSolver) -> None:
         refine(both, CARD, tests=["three"])
 
 
-def test_a_level_that_fails_is_named_and_left_out(bars: BarSolver, tmp_path: Path) -> None:
+def test_a_level_that_fails_is_named_and_left_out(
+    bars: BarSolver, tmp_path: Path, drawn: list[Figure]
+) -> None:
     bars.fails = 16
     study = refine(project_of(BarTest("a bar")), CARD)
     *_, last = study.runs["a bar"]
@@ -99,7 +103,13 @@ def test_a_level_that_fails_is_named_and_left_out(bars: BarSolver, tmp_path: Pat
     assert table.quantity.str.startswith("failed: ").sum() == 1
     assert (table[table.quantity == END].off_finest.iloc[-1]) == 0
     assert json.loads((tmp_path / "result.json").read_text()) == study.result
-    assert (tmp_path / "convergence.png").stat().st_size > 10_000
+    assert (tmp_path / "convergence.png").exists()
+    # The figure shows the levels of the table that ended, each beside the next finer one.
+    rows = table[table.quantity == END]
+    change = 100 * np.abs(np.diff(rows.value)) / rows.value.iloc[-1]
+    shown = data(drawn[0].axes[0])[0]
+    assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1])
+    assert shown[1] == pytest.approx(change)
 
 
 def test_nothing_to_compare_is_a_failure(bars: BarSolver) -> None:

@@ -111,10 +111,11 @@ def test_bodies_are_where_they_touch(model, grown):
     support, collar = contact_bodies(model, grown)
     crown = 105.0
     points = np.reshape(support["patches"], (-1, 3))
-    assert points[:, 1].max() == pytest.approx(-crown + 0.02, abs=0.3)
+    assert points[:, 1].max() == pytest.approx(-crown + 0.02, abs=1e-9)
     points = np.reshape(collar["patches"], (-1, 3))
-    # Its mouth is rounded.
-    assert points[points[:, 2] < 60, 1].max() == pytest.approx(crown + ABOVE, abs=0.3)
+    # Its mouth is rounded; corners of flat faces lie outside the ring, here by 0.034 mm.
+    top = points[points[:, 2] < 60, 1].max()
+    assert crown + ABOVE < top < crown + ABOVE + 0.05
 
 
 def test_a_whole_cylinder_is_refused(grown):

@@ -1,0 +1,75 @@
+"""Figures of bent cylinders: curves, what was measured, and the gas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.reports import (
+    BendLine,
+    BendPanel,
+    BendReadings,
+    plot_bending,
+    plot_bending_cases,
+    plot_gas,
+)
+from bubblefit.reports.style import GREY, NAMED
+from matplotlib.figure import Figure
+
+from ..drawings import data, legend, lines, titles
+
+WAY = np.linspace(0.0, 40.0, 9)
+GRID = np.linspace(0.0, 30.0, 7)
+SOFT = BendLine(
+    "soft", 0, WAY, 3 * WAY, 0.14 + 1e-5 * WAY, 5e7 - 1e4 * WAY, knee=(20.0, 60.0), rms=3.106
+)
+STIFF = BendLine("stiff", 1, WAY, 5 * WAY, 0.14 + 2e-5 * WAY, 5e7 - 2e4 * WAY, limit=(40.0, 200.0))
+MEASURED = BendReadings(
+    [(WAY[:5], 3.9 * WAY[:5]), (WAY[:6], 4.1 * WAY[:6])], GRID, 4 * GRID, 0.1 * GRID
+)
+CASE = BendPanel("one", [SOFT, STIFF], MEASURED)
+
+
+def test_loads_and_what_the_cards_miss(tmp_path: Path, drawn: list[Figure]) -> None:
+    plot_bending(tmp_path / "b.png", CASE)
+    top, low = drawn[0].axes
+    (soft, knee), (stiff, limit) = lines(top, NAMED[0]), lines(top, NAMED[1])
+    np.testing.assert_array_equal(soft, [WAY, 3 * WAY])
+    np.testing.assert_array_equal(stiff, [WAY, 5 * WAY])
+    assert (knee.ravel().tolist(), limit.ravel().tolist()) == ([20.0, 60.0], [40.0, 200.0])
+    for shown, reading in zip(lines(top, GREY), MEASURED.readings, strict=True):
+        np.testing.assert_array_equal(shown, reading)
+    np.testing.assert_array_equal(data(top)[0], [GRID, 4 * GRID])
+    (band,) = top.collections
+    upper = band.get_paths()[0].vertices[:, 1].max()
+    assert upper == pytest.approx((4.1 * GRID).max())
+    (off,), (other,) = lines(low, NAMED[0]), lines(low, NAMED[1])
+    assert off == pytest.approx(np.array([GRID, -GRID]))
+    assert other == pytest.approx(np.array([GRID, GRID]))
+    box = top.get_legend()
+    assert [text.get_text() for text in box.get_texts()] == ["3.11 N"]
+    assert legend(drawn[0]) == [
+        "soft", "stiff", "measured", "mean", "scatter of repetitions (±)", "knee", "limit point",
+    ]  # fmt: skip
+
+
+def test_all_cases_with_the_same_loads_in_a_row(tmp_path: Path, drawn: list[Figure]) -> None:
+    other = BendPanel("two", [STIFF])
+    plot_bending_cases(tmp_path / "a.png", [BendPanel("one", [SOFT]), other, BendPanel("")], 2)
+    assert titles(drawn[0]) == ["one", "two", "", ""]
+    one, two, *free = drawn[0].axes
+    assert one.get_ylim() == two.get_ylim() == pytest.approx((0.0, 1.06 * 200.0))
+    np.testing.assert_array_equal(lines(one, NAMED[0])[0], [WAY, 3 * WAY])
+    np.testing.assert_array_equal(lines(two, NAMED[1])[0], [WAY, 5 * WAY])
+    assert not any(axes.axison for axes in free)
+
+
+def test_gas_in_kilopascal_and_litres(tmp_path: Path, drawn: list[Figure]) -> None:
+    plot_gas(tmp_path / "g.png", CASE)
+    left, right = drawn[0].axes
+    (by_volume,), (by_way,) = lines(left, NAMED[0]), lines(right, NAMED[0])
+    assert by_volume == pytest.approx(np.array([-0.01 * WAY, 140.0 + 0.01 * WAY]))
+    assert by_way == pytest.approx(np.array([WAY, 140.0 + 0.01 * WAY]))
+    assert legend(drawn[0]) == ["soft, from 50 litres", "stiff, from 50 litres"]
+    assert "litres" in left.get_xlabel() and "kPa" in left.get_ylabel()
