@@ -1,4 +1,5 @@
-# make demo, make test, make lint, make bench, make docs, make mutants: each does all the set-up it needs.
+# make demo, make test, make lint, make bench, make docs, make mutants, make faults: each does all
+# the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -9,7 +10,7 @@ READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test lint bench docs mutants calculix clean
+.PHONY: demo test lint bench docs mutants faults calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -28,6 +29,10 @@ lint: $(READY)
 
 bench: $(READY)
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+# Faults that once escaped all tests, put into a copy one by one: does a test fail? Some minutes.
+faults: $(READY)
+	$(BIN)/python tests/faults
 
 # Pages of the Python interface, from the docstrings.
 docs: $(READY)
