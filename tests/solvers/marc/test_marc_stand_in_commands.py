@@ -83,9 +83,9 @@ def test_the_known_solution_is_found_in_four_runs_of_marc(marc, tmp_path):
     bubblefit("bubble", "project.toml", "--solver", "marc", "--marc", marc.program, "--jobs", 1,
               "--quiet", "--out", "out", cwd=tmp_path)  # fmt: skip
     e = marc_rows(tmp_path / "out").objective.to_numpy()
-    # 1.3e-2, 1.7e-4, 1.4e-5, 8.5e-6, 6.5e-6: measured.
-    assert e[:4].min() < 1e-3 and e[1] < 1e-3
-    assert e[:4].min() < 3e-5, "six digits spoil it"
+    # 1.6e-4, 7.5e-6, 5.6e-6, 5.2e-6: measured.
+    assert e[0] < 1e-3 and len(e) <= 5
+    assert e[1] < 3e-5, "six digits spoil it"
     result = result_in(tmp_path / "out")
     assert result["solver"] == "marc" and result["external_runs"] == len(e)
 
