@@ -65,6 +65,13 @@ def test_zero_of_the_deflection_and_what_hangs_on_the_beam(
     assert found.load == pytest.approx([10.0, 30.0, 50.0, 70.0])
 
 
+def test_a_soft_beam_has_a_zero_too(tmp_path: Path) -> None:
+    """0.02 N/mm."""
+    path = written(tmp_path, "deflection (mm),load (N)\n7,0.1\n17,0.3\n27,0.5\n37,0.7\n")
+    (found,) = read_bending_curves(path, zero="line")
+    assert found.deflection == pytest.approx([5.0, 15.0, 25.0, 35.0])
+
+
 @pytest.mark.parametrize(
     ("text", "how", "words"),
     [

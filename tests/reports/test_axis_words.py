@@ -1,0 +1,96 @@
+"""Every axis says what it shows and in which unit: once for a row of panels, beneath the lowest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.reports import (
+    BendLine,
+    BendPanel,
+    BendReadings,
+    ConvergencePanel,
+    OrderErrors,
+    StripCurves,
+    plot_bending,
+    plot_bending_cases,
+    plot_convergence,
+    plot_gas,
+    plot_loads,
+    plot_nu12,
+    plot_orders,
+    plot_pinned,
+)
+from bubblefit.reports.pinned import NOT_DETERMINED, STEP, WORDS
+from bubblefit.reports.style import GREY
+from matplotlib.figure import Figure
+
+X = np.linspace(0.0, 4.0, 5)
+LINE = BendLine("card", 0, X, 3 * X, 0.14 + 0 * X, 5e7 + X)
+SEEN = BendReadings([(X, 3 * X)], X, 3 * X, 0 * X + 1)
+STRIP = StripCurves("fill", [("model", X, X)], (X, X), None, None)
+PANEL = ConvergencePanel("bubble", [2.0, 1.0], {"apex, mm": [0.1]}, [10, 40], [0.1, 0.3])
+ORDER = OrderErrors("warp", [1, 2], [3.0, 2.0], [3.0, 2.0], 2)
+STRAINS, SIGMA = np.tile(X, (3, 1)), np.full((3, 5), 40.0)
+DEFLECTION, CHANGE = "deflection of the collar, mm", "change to the next finer level, %"
+EDGE = "mean edge, mm"
+
+#: Drawing, and (x, y) of each axis.
+FIGURES = {
+    "bending alone": (
+        lambda: plot_bending("b", BendPanel("one", [LINE])), [(DEFLECTION, "load, N")]
+    ),
+    "bending": (
+        lambda: plot_bending("b", BendPanel("one", [LINE], SEEN)),
+        [("", "load, N"), (DEFLECTION, "model $-$ mean, N")],
+    ),
+    "cases": (
+        lambda: plot_bending_cases("b", [BendPanel(n, [LINE]) for n in "abc"], 2),
+        [("", "load, N"), ("deflection, mm", ""), ("deflection, mm", "load, N"), ("", "")],
+    ),
+    "gas": (
+        lambda: plot_gas("b", BendPanel("one", [LINE])),
+        [("volume less that when inflated, litres", "gauge pressure, kPa"), (DEFLECTION, "")],
+    ),
+    "convergence": (
+        lambda: plot_convergence("b", [PANEL, PANEL], "elements"),
+        [(EDGE, CHANGE), (EDGE, ""), ("elements x increments", "seconds")],
+    ),
+    "loads": (
+        lambda: plot_loads("b", [STRIP, STRIP]),
+        [("", "load, N"), ("", ""), ("gauge elongation, mm", "difference, N"),
+         ("gauge elongation, mm", "")],
+    ),
+    "nu12": (
+        lambda: plot_nu12("b", {"a": {"r": (X, X)}, "b": {"r": (X, X)}}, 0.24, "load"),
+        [("nu12", "load / that at nu12 = 0.24"), ("nu12", "")],
+    ),
+    "orders": (
+        lambda: plot_orders("b", [ORDER, ORDER]),
+        [("order of the polynomial", "error of the load, N"), ("order of the polynomial", "")],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_quantity_and_unit(name: str, figures: list[Figure]) -> None:
+    draw, wanted = FIGURES[name]
+    draw()
+    assert [(a.get_xlabel(), a.get_ylabel()) for a in figures[0].axes] == wanted
+
+
+def test_what_is_not_determined_lies_above_a_line(figures: list[Figure]) -> None:
+    lost = SIGMA.copy()
+    lost[2] = np.inf
+    plot_pinned("p", STRAINS, {"bubble": lost, "strips": SIGMA})
+    for panel in figures[0].axes:
+        (line,) = (line for line in panel.lines if line.get_color() == GREY)
+        assert line.get_ydata() == pytest.approx([NOT_DETERMINED] * 2)
+        end = NOT_DETERMINED * 10 ** (2.6 * STEP + WORDS)
+        assert panel.get_ylim() == pytest.approx((10.0, end))
+    assert figures[0].axes[0].get_ylabel() == r"1 $\sigma$, % of the modulus"
+    assert [panel.get_ylabel() for panel in figures[0].axes[1:]] == ["", ""]
+
+
+def test_without_any_sigma_the_axes_are_there(figures: list[Figure]) -> None:
+    plot_pinned("p", STRAINS, {})
+    assert figures[0].axes[0].get_ylim()[0] == pytest.approx(1.0)

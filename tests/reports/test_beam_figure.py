@@ -1,0 +1,78 @@
+"""The bent cylinder's figure: what is drawn where, in mm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.reports.beam import CLOSE, WALL, BeamBodies, plot_beam
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+BODIES = BeamBodies(((-500.0, -150.0), (500.0, -150.0)), 50.0, 10.0, 100.0, 80.0)
+#: Four quads in a row on the seen side, two behind: (n, 3) mm.
+Z = np.linspace(-600.0, 600.0, 5)
+POINTS = np.array([[x, y, z] for x in (80.0, -80.0) for y in (-75.0, 75.0) for z in Z])
+QUADS = np.array([[i, i + 1, i + 6, i + 5] for i in (0, 1, 2, 3, 10, 11)])
+STRAIN = np.array([0.01, 0.02, 0.03, -0.4, 0.9, 0.9])
+OUTLINE = np.array([[-600.0, -75.0], [600.0, -75.0], [600.0, 75.0], [-600.0, -75.0]])
+RING = (np.array([[-75.0, 0.0], [0.0, 75.0]]), np.array([[-70.0, -5.0], [0.0, 60.0]]))
+
+
+@pytest.fixture
+def figure(figures: list[Figure]) -> Figure:
+    plot_beam("b.png", POINTS, QUADS, STRAIN, OUTLINE, RING, BODIES, "150 mm, 140 kPa")
+    return figures[0]
+
+
+def test_the_side_is_the_half_that_is_seen(figure: Figure) -> None:
+    whole, close, _, bar = figure.axes
+    for axes in (whole, close):
+        (faces,) = (c for c in axes.collections if isinstance(c, PolyCollection))
+        z_of_first = faces.get_paths()[0].vertices[:4, 0]
+        assert len(faces.get_paths()) == 4 and np.abs(z_of_first).max() <= 600.0
+        # What lies behind (0.9) is left out of the drawing.
+        assert faces.get_array().max() == pytest.approx(0.03)
+        assert axes.get_aspect() == 1.0
+        (before,) = axes.lines
+        np.testing.assert_array_equal(np.transpose(before.get_data()), OUTLINE)
+    assert bar.get_ylabel() == "log strain along the axis"
+    assert (whole.get_ylabel(), whole.get_title("left")) == ("y, mm", "150 mm, 140 kPa")
+    assert (close.get_xlabel(), close.get_ylabel()) == ("z, mm", "y, mm")
+    assert close.get_title("left") == "at the collar"
+
+
+def test_everything_is_in_sight(figure: Figure) -> None:
+    whole, close, *_ = figure.axes
+    assert whole.get_xlim() == pytest.approx((-618.0, 618.0))
+    # The supports' feet below, the collar's wall above, and room.
+    assert whole.get_ylim() == pytest.approx((-220.0, 10.0 + 100.0 + WALL + 20.0))
+    assert close.get_xlim() == pytest.approx((-CLOSE * 80.0, CLOSE * 80.0))
+    tall = 100.0 + 4 * WALL
+    assert close.get_ylim() == pytest.approx((10.0 - tall, 10.0 + tall))
+
+
+def test_supports_and_collar_are_true_to_scale(figure: Figure) -> None:
+    whole, _, cut, _ = figure.axes
+    circles = [p for p in whole.patches if isinstance(p, Circle)]
+    assert [(*c.center, c.radius) for c in circles] == [
+        (-500.0, -150.0, 50.0), (500.0, -150.0, 50.0)
+    ]  # fmt: skip
+    inside, low, high = (p for p in whole.patches if isinstance(p, Rectangle))
+    ends = [(r.get_x(), r.get_y(), r.get_width(), r.get_height()) for r in (inside, low, high)]
+    assert ends == [
+        (-40.0, -90.0 - WALL, 80.0, 2 * (100.0 + WALL)),
+        (-40.0, -90.0 - WALL, 80.0, WALL),
+        (-40.0, 110.0, 80.0, WALL),
+    ]
+    (ring,) = (p for p in cut.patches if isinstance(p, Circle))
+    assert (*ring.center, ring.radius) == (0.0, 10.0, 100.0 + 0.5 * WALL)
+
+
+def test_the_cut_is_the_ring_before_and_now(figure: Figure) -> None:
+    cut = figure.axes[2]
+    for line, ring, name in zip(cut.lines, RING, ("inflated", "bent"), strict=True):
+        np.testing.assert_array_equal(np.transpose(line.get_data()), ring)
+        assert line.get_label() == name
+    assert cut.get_aspect() == 1.0
+    assert (cut.get_xlabel(), cut.get_ylabel()) == ("x, mm", "y, mm")
