@@ -41,7 +41,7 @@ ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", 
 )
 @click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
 @click.option("--format", metavar="NAME", help="Of the frames; found by their content.")
-@click.option("--columns", metavar="x=..,..", help="Names in the files of x, y, z, dx, dy, dz.")
+@click.option("--columns", metavar="x=..,..", help="Names in the files, where not found.")
 @click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost.")
 @click.option(
     "--length-unit", type=click.Choice(list(LENGTH_UNITS)), default="mm", help="Of the files [mm]."
@@ -90,6 +90,7 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
             _columns(options["columns"]),
             options["flag_column"],
             length_scale=LENGTH_UNITS[options["length_unit"]],
+            planar=True,
         )
         read = read_frames(files, asked, options["format"])
         lower, upper = options["lower"], options["upper"]
@@ -97,6 +98,8 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         names = [frame.path.name if frame.path else "" for frame in read]
         table = GaugeTable(names, lower, upper, record, note=note)
         # At once: should the loads be refused, this may be why.
+        for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
+            click.echo(f"note: {words}", err=True)
         for words in table.warnings:
             click.echo(f"warning: {words}", err=True)
         if loads is not None:
@@ -128,17 +131,17 @@ def _check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> Non
 
 
 def _columns(given: str | None) -> dict[str, str] | None:
-    """Names in the files of x, y, z, dx, dy, dz, where "x=X,dz=W" changes some of them."""
+    """Names in the files of some of x, y, z, dx, dy, dz, as in "x=X,dz=W"."""
     if given is None:
         return None
-    names = {quantity: quantity for quantity in QUANTITIES}
+    names: dict[str, str] = {}
     for part in given.split(","):
         quantity, equals, name = (piece.strip() for piece in part.partition("="))
         if not (equals and name):
             problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
             raise InputError(None, "columns", problem)
-        if quantity not in names:
-            problem = f"unknown quantity {quantity!r}; expected {', '.join(names)}"
+        if quantity not in QUANTITIES:
+            problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
             raise InputError(None, "columns", problem)
         names[quantity] = name
     for quantity, name in names.items():

@@ -15,6 +15,14 @@ WORDS = {
     "time": frozenset("time zeit prüfzeit".split()),
     "deflection": frozenset("deflection displacement durchbiegung weg".split()),
 }
+#: Words of columns of elongation: those measured on the strip, then those of the machine's travel,
+#: which holds the slip in the grips and the machine's own give too.
+ON_THE_STRIP = frozenset(
+    "extensometer gauge gage video längenänderung feindehnung wegaufnehmer".split()
+)
+OF_THE_MACHINE = frozenset(
+    "crosshead stroke position travel traversenweg traverse verfahrweg kolbenweg".split()
+)
 #: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
 OTHERS = frozenset(
     "strain stress rate speed velocity time cell cycle"
@@ -31,10 +39,12 @@ LABELS = {
 #: mm in one of each unit of length, N in one of each unit of load.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
 LOAD_UNITS = {"N": 1.0, "kN": 1e3}
+#: N/mm in one of each unit of load per width of the strip.
+WIDTH_LOAD_UNITS = {"kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02}
 #: Seconds in one of each unit of time.
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
-_KNOWN = r"mm|cm|kN|kn|N|n|m"
+_KNOWN = r"kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%][A-Za-z0-9µμ°%/^*·²-]{0,5}"
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
@@ -68,6 +78,17 @@ def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> lis
     exact = [i for i, name in enumerate(names) if name == asked]
     plain = [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
     return exact or plain
+
+
+def nearest_to_strip(names: list[str], which: list[int]) -> list[int]:
+    """Of columns of elongation, those measured nearest to the strip."""
+
+    def rank(index: int) -> int:
+        words = set(re.split(r"[\W\d_]+", split_unit(names[index])[0].casefold()))
+        return 0 if words & ON_THE_STRIP else 2 if words & OF_THE_MACHINE else 1
+
+    best = min((rank(i) for i in which), default=0)
+    return [i for i in which if rank(i) == best]
 
 
 def scale_of(unit: str, units: dict[str, float]) -> float | None:

@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .column_names import LENGTH_UNITS, LOAD_UNITS
-from .machine_tables import MachineTable, TableOptions, column_of, measured, read_machine_table
+from .column_names import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
+from .machine_tables import (
+    MachineTable,
+    TableOptions,
+    choice_of,
+    column_of,
+    measured,
+    read_machine_table,
+)
 
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 
@@ -49,6 +56,7 @@ class LoadCurve:
     path : the file, None when the curve did not come from one.
     time : (n,) in the file's unit, None unless asked for by name.
     frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
+    notes : one sentence each: what was chosen where the file leaves a choice.
     """
 
     direction: str
@@ -58,6 +66,7 @@ class LoadCurve:
     path: Path | None
     time: NDArray[np.float64] | None = None
     frame: NDArray[np.intp] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
@@ -78,8 +87,9 @@ def read_load_curves(
     path: Path | str,
     *,
     columns: Mapping[str, str] | None = None,
-    load_unit: Literal["N", "kN"] | None = None,
+    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None,
     length_unit: Literal["mm", "cm", "m"] | None = None,
+    width: float | None = None,
     comment: str = "#",
     direction: str | None = None,
     decimal: Literal[".", ","] | None = None,
@@ -95,6 +105,7 @@ def read_load_curves(
     columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with
         or without the unit; needed where finding is ambiguous. `time` is read only when named.
     load_unit, length_unit : needed where the file names none.
+    width : of the strip, mm, by which a load per width (kN/m, N/mm) is multiplied.
     comment : lines that start so are skipped.
     direction : of a file without a column of directions; in a file with one, the rows to keep.
     decimal : needed where 1,234 may be a thousand or little more than one.
@@ -118,7 +129,8 @@ def read_load_curves(
     found = read_machine_table(path, options, format)
     column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
     elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
-    load = measured(found, column["load"], "load", LOAD_UNITS, load_unit)
+    load = _load(found, column["load"], load_unit, width)
+    notes = found.notes + choice_of(found, "elongation", named)
     time = found.table.numbers(column["time"]) if column["time"] else None
     labels = _labels(found, column, wanted)
     places: dict[tuple[str, str], list[int]] = {}
@@ -128,7 +140,7 @@ def read_load_curves(
     for key, rows in places.items():
         if wanted in (None, key[0]):
             taken = None if time is None else time[rows]
-            curves.append(LoadCurve(*key, elongation[rows], load[rows], path, taken))
+            curves.append(LoadCurve(*key, elongation[rows], load[rows], path, taken, notes=notes))
     if not curves:
         there = ", ".join(dict.fromkeys(key[0] for key in places))
         raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
@@ -157,9 +169,23 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
             curve.load[part],
             curve.path,
             None if curve.time is None else curve.time[part],
+            notes=curve.notes,
         )
         for number, part in enumerate(parts, start=1)
     )
+
+
+def _load(
+    found: MachineTable, column: str, unit: str | None, width: float | None
+) -> NDArray[np.float64]:
+    """Loads (rows,) in N of the whole strip."""
+    units = dict(LOAD_UNITS)
+    if found.units[column] in WIDTH_LOAD_UNITS or unit in WIDTH_LOAD_UNITS:
+        if width is None:
+            problem = f"{found.units[column] or unit} is a load per width; say the strip's width"
+            raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
+        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
+    return measured(found, column, "load", units, unit)
 
 
 def _labels(

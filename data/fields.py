@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .frames import LOST, FrameOptions, FrameSource, read_frames
+from .frames import LOST, Frame, FrameOptions, FrameSource, read_frames
 
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
 QUANTITIES = ("x", "y", "dx", "dy", "dz")
 #: How a table of exactly these columns is read.
-PLAIN = FrameOptions(QUANTITIES, holes=False)
+PLAIN = FrameOptions(QUANTITIES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,30 +54,47 @@ def read_fields(
     comment: str = "#",
     length_scale: float = 1.0,
     format: str | None = None,
+    options: FrameOptions | None = None,
 ) -> tuple[DisplacementField, ...]:
     """Read one frame a pressure.
 
     Parameters
     ----------
-    files : each with one frame; columns that are not asked for are ignored.
-    pressures : MPa, one a file.
+    files : the frames in order, one a file or several; columns that are not asked for are ignored.
+        A first frame in which nothing moves is left out where there is one frame too many: it is
+        the reference of a file that holds them all.
+    pressures : MPa, one a frame.
     columns, flag_column, comment, length_scale : see `frames.FrameOptions`; quantities are `x`,
         `y`, `dx`, `dy`, `dz`, and `z` where it is there.
     format : its name; found by the files' content unless given.
+    options : in place of the four before, where there is more to say of the files.
 
     Raises
     ------
     InputError : naming file, line and column: no such file, missing columns, an empty table,
-        cells that are not finite numbers, nothing left without the doubtful rows.
+        cells that are not finite numbers, nothing left without the doubtful rows, more or fewer
+        frames than pressures.
     """
-    if len(files) != len(pressures):
+    if len(files) > len(pressures):
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
-    options = FrameOptions(QUANTITIES, columns, flag_column, comment, length_scale, holes=False)
+    if options is None:
+        options = FrameOptions(QUANTITIES, columns, flag_column, comment, length_scale)
+    frames = read_frames(files, options, format)
+    if len(frames) == len(pressures) + 1 and len(files) == 1 and _at_rest(frames[0]):
+        frames = frames[1:]
+    if len(frames) != len(pressures):
+        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(frames)}"
+        raise InputError(None, "files", problem)
     return tuple(
-        read_field(file, float(pressure), options, format)
-        for file, pressure in zip(files, pressures, strict=True)
+        field_of(frame, float(pressure), options)
+        for frame, pressure in zip(frames, pressures, strict=True)
     )
+
+
+def _at_rest(frame: Frame) -> bool:
+    moved = frame.displacement[np.isfinite(frame.displacement)]
+    return bool(moved.size) and not moved.any()
 
 
 def read_field(
@@ -88,9 +105,6 @@ def read_field(
 ) -> DisplacementField:
     """Read the field of one file, at a pressure in MPa.
 
-    Points where a quantity is not a number, which only formats that mark lost correlation so have,
-    are dropped as the doubtful ones are.
-
     Raises
     ------
     InputError : as `read_fields`; several frames in the file.
@@ -98,7 +112,19 @@ def read_field(
     frames = read_frames([path], options, format)
     if len(frames) != 1:
         raise InputError(path, "", f"expected one frame, one a pressure; found {len(frames)}")
-    (frame,) = frames
+    return field_of(frames[0], pressure, options)
+
+
+def field_of(frame: Frame, pressure: float, options: FrameOptions = PLAIN) -> DisplacementField:
+    """The field of a frame, at a pressure in MPa.
+
+    Points where a quantity is not a number, where correlation was lost, are dropped as the doubtful
+    ones are.
+
+    Raises
+    ------
+    InputError : no point is left.
+    """
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.
     measured = bool(np.isfinite(z).any())
@@ -107,9 +133,10 @@ def read_field(
     lost = int((~whole).sum())
     dropped = {**frame.dropped, **({LOST: frame.dropped.get(LOST, 0) + lost} if lost else {})}
     if not whole.any():
-        why = f" ({options.flag_column!r} is not 0)" if options.flag_column is not None else ""
-        problem = f"all {sum(dropped.values())} rows are doubtful{why}; none is left to use"
-        raise InputError(path, "", problem)
+        why = (
+            ", ".join(f"{count} {reason}" for reason, count in dropped.items()) or "there are none"
+        )
+        raise InputError(frame.path, "", f"no row is left to use: {why}")
     return DisplacementField(
         pressure,
         frame.points[whole, :2],
@@ -117,6 +144,6 @@ def read_field(
         dropped,
         z[whole] if measured else None,
         None if frame.sigma is None else frame.sigma[whole],
-        Path(path),
+        frame.path,
         frame.source,
     )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,17 +80,23 @@ class FrameOptions:
 
     Parameters
     ----------
-    quantities : of `QUANTITIES`, those that the file must hold.
-    columns : the file's own name of each of them, and of others that are read where they are there;
-        None where the format knows what they are called.
+    quantities : of `QUANTITIES`, those that the file must hold; others are read where they are
+        there.
+    columns : the file's own name of some quantities; the others are found by their headings.
     flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
+    valid_column : the same for a column that is zero in doubtful rows.
     comment : lines that start so are skipped, where the format has no comments of its own.
-    length_scale : mm in one unit of length of a file that does not name its unit.
-    holes : whether empty cells and "nan" are lost correlation; otherwise they are mistakes.
+    length_scale : mm in one unit of length of columns that do not name theirs.
+    decimal : the decimal mark, "." or ","; None finds it.
+    coordinates : whether the places in the file are those before or after the motion; None where
+        the format tells.
+    camera_axes : whether y points down in the file and z away from the camera, so that both are
+        turned over; None where the format tells.
+    planar : whether z and dz may be missing, and are then zero.
 
     Raises
     ------
-    InputError : a quantity without a name, a scale that is not above zero.
+    InputError : a name for what is no quantity, a scale that is not above zero.
     """
 
     quantities: tuple[str, ...] = QUANTITIES
@@ -97,16 +104,20 @@ class FrameOptions:
     flag_column: str | None = None
     comment: str = "#"
     length_scale: float = 1.0
-    holes: bool = True
+    valid_column: str | None = None
+    decimal: Literal[".", ","] | None = None
+    coordinates: Literal["reference", "deformed"] | None = None
+    camera_axes: bool | None = None
+    planar: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < self.length_scale < math.inf:
             problem = f"expected mm per unit, above 0, got {self.length_scale}"
             raise InputError(None, "length_scale", problem)
-        named = self.quantities if self.columns is None else self.columns
-        unnamed = [name for name in self.quantities if name not in named]
-        if unnamed:
-            raise InputError(None, "columns", f"expected a name for each of {', '.join(unnamed)}")
+        unknown = [name for name in self.columns or {} if name not in QUANTITIES]
+        if unknown:
+            problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
+            raise InputError(None, "columns", problem)
 
 
 def read_frames(
@@ -116,8 +127,8 @@ def read_frames(
 ) -> tuple[Frame, ...]:
     """Read frames in the order of the files; most formats have one a file.
 
-    Exports that write zeros where correlation was lost need a flag column: zeros alone cannot be
-    told from a point that did not move.
+    Exports that write zeros for the displacement only where correlation was lost need a flag
+    column: such a point cannot be told from one that did not move.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .column_names import columns_of, scale_of
+from .column_names import columns_of, nearest_to_strip, scale_of
 from .registry import read_file
 from .tables import TextTable
 
@@ -40,12 +40,14 @@ class MachineTable:
     """A table as the file has it.
 
     table : the rows of numbers. units : for each column name the unit that the file names, "" for
-    none. header : line number of the row of names.
+    none. header : line number of the row of names. notes : one sentence each: what was chosen where
+    the file leaves a choice.
     """
 
     table: TextTable
     units: Mapping[str, str]
     header: int
+    notes: tuple[str, ...] = ()
 
 
 def read_machine_table(
@@ -73,7 +75,8 @@ def column_of(
 ) -> str:
     """The name of the one column that holds a quantity; "" where it may be absent and is.
 
-    Times are looked for only where they are named or needed.
+    Times are looked for only where they are named or needed. Of several elongations, the one that
+    was measured nearest to the strip (`choice_of`).
 
     Raises
     ------
@@ -83,6 +86,8 @@ def column_of(
     if quantity == "time" and quantity not in (*named, *needed):
         return ""
     which = columns_of(names, quantity, named)
+    if quantity == "elongation" and quantity not in named:
+        which = nearest_to_strip(names, which)
     if len(which) == 1 or (not which and quantity not in (*named, *needed)):
         return names[which[0]] if which else ""
     there = ", ".join(name for name in names if name)[:300]
@@ -92,6 +97,20 @@ def column_of(
         what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
     problem = f"the column of {quantity} {what}; the file has: {there}"
     raise InputError(found.table.path, f"line {found.header}", problem)
+
+
+def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> tuple[str, ...]:
+    """A sentence where `column_of` chose one column among several; else nothing."""
+    names = [str(name) for name in found.table.cells.columns]
+    which = [] if quantity in named else columns_of(names, quantity, named)
+    if len(which) < 2:
+        return ()
+    chosen = column_of(found, quantity, named)
+    others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
+    return (
+        f"{found.table.path.name}: the {quantity} is column {chosen!r}, not {others};"
+        f" columns = {{ {quantity} = ... }} names another",
+    )
 
 
 def measured(

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+#: Cells, in small letters, that stand for no value: empty, and what C, .NET and spreadsheets write.
+HOLES = ("", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind", "n. def.", "n/a", "---")
+
+
 @dataclass(frozen=True, eq=False)
 class TextTable:
     """Cells as text, and where each row stood.
@@ -33,7 +37,7 @@ class TextTable:
     decimal: str = "."
 
     def numbers(self, column: str, holes: bool = False) -> NDArray[np.float64]:
-        """One column as finite numbers, (rows,); with `holes`, empty cells and "nan" give NaN.
+        """One column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN.
 
         Raises
         ------
@@ -51,7 +55,7 @@ class TextTable:
         bad = ~np.isfinite(value)
         if holes and bad.any():
             # Only of the rows in question: text costs more than numbers.
-            lost = text[bad].str.strip().str.lower().isin(["", "nan"]).to_numpy(dtype=bool)
+            lost = text[bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
             bad[bad] = ~lost
         if bad.any():
             first = int(np.argmax(bad))
@@ -151,7 +155,7 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
         raise InputError(path, "", problem) from None
     if "\0" in text:
         raise InputError(path, "", "is not a text file; save it as a comma-separated table")
-    kept = enumerate(re.split("\r\n|\r|\n", text), start=1)
+    kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
 
 

@@ -2,7 +2,9 @@
 
 The layouts that MTS TestSuite and TestWorks, Instron Bluehill and ZwickRoell testXpert write:
 some lines about the test and the specimen, one row of names, mostly one row of units, numbers;
-separated by commas, semicolons or tabs; the decimal mark a point or a comma.
+separated by commas, semicolons or tabs; the decimal mark a point or a comma. A table of results may
+stand above the readings, and the readings of several specimens one block after the other, each with
+its names: of several tables the one with most rows is read, and all blocks with the same names.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -27,6 +30,7 @@ SEPARATORS = ("\t", ";", ",")
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_LETTER = re.compile(r"[^\W\d_eE]")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
@@ -51,14 +55,11 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     if not found:
         raise InputError(path, "", _nothing_found(lines, named, quantities))
     _, rows, index, separator = max(found, key=lambda one: one[0])
-    header_line, names = rows[index]
-    needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
-    body = index + 1
-    units = {name: split_unit(name)[1] for name in names}
-    if body < len(rows) and _is_unit_row(rows[body][1], needed):
-        units |= _unit_row(path, rows[body], names, units)
-        body += 1
-    rest = [(n, row) for n, row in rows[body:] if any(row)]
+    blocks = _blocks(path, rows, index, named, quantities)
+    chosen = max(blocks, key=lambda names: sum(len(one.rows) for one in blocks[names]))
+    names, several = list(chosen), blocks[chosen]
+    header_line, units = several[0].line, several[0].units
+    rest = [row for one in several for row in one.rows]
     if not rest:
         raise InputError(path, f"line {header_line}", "no rows of numbers below these names")
     for number, row in rest:
@@ -71,8 +72,58 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     width = len(names)
     cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
     line_numbers = np.array([number for number, _ in rest])
+    needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
     decimal = options.decimal or _decimal(path, rest, names, needed)
-    return MachineTable(TextTable(path, cells, line_numbers, decimal), units, header_line)
+    table = TextTable(path, cells, line_numbers, decimal)
+    return MachineTable(table, units, header_line, _notes(path, blocks, chosen))
+
+
+@dataclass(frozen=True)
+class Block:
+    """A row of names with the numbers below it. line : of the names."""
+
+    line: int
+    units: dict[str, str]
+    rows: Rows
+
+
+def _blocks(
+    path: Path, rows: Rows, first: int, named: Mapping[str, str], quantities: Sequence[str]
+) -> dict[tuple[str, ...], list[Block]]:
+    """The tables from the row `first` on, by their names."""
+    heads = [
+        first,
+        *(i for i in range(first + 1, len(rows)) if _is_header(rows, i, named, quantities)),
+    ]
+    blocks: dict[tuple[str, ...], list[Block]] = {}
+    for head, end in zip(heads, [*heads[1:], len(rows)], strict=True):
+        line, names = rows[head]
+        needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
+        units, body = {name: split_unit(name)[1] for name in names}, head + 1
+        if body < end and _is_unit_row(rows[body][1], needed):
+            units |= _unit_row(path, rows[body], names, units)
+            body += 1
+        inside = [(n, row) for n, row in rows[body:end] if any(row)]
+        # What stands between two tables begins with a word: the title of the second.
+        while end < len(rows) and inside and not _begins_with_a_number(inside[-1][1]):
+            inside.pop()
+        blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
+    return blocks
+
+
+def _notes(
+    path: Path, blocks: Mapping[tuple[str, ...], list[Block]], chosen: tuple[str, ...]
+) -> tuple[str, ...]:
+    others = [
+        str(one.line) for names, several in blocks.items() if names != chosen for one in several
+    ]
+    if not others:
+        return ()
+    line = blocks[chosen][0].line
+    return (
+        f"{path.name}: the table with its names in line {line}, which has most rows, is read; not"
+        f" that of line {' and '.join(others)}",
+    )
 
 
 def _cells(text: str, separator: str) -> list[str]:
@@ -88,16 +139,38 @@ def _cells(text: str, separator: str) -> list[str]:
 def _header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str]) -> int | None:
     """The first row of names with numbers one or two rows below; else the first row of names."""
     first = None
-    for index, (_, names) in enumerate(rows):
-        columns = [columns_of(names, quantity, named) for quantity in quantities]
-        # A sentence that speaks of load and extension is one cell, and no header.
-        if not all(columns) or len(set().union(*columns)) < len(quantities):
-            continue
-        below = [row for _, row in rows[index + 1 : index + 3]]
-        if any(all(any(_is_number(row, i) for i in each) for each in columns) for row in below):
+    for index in range(len(rows)):
+        if _is_header(rows, index, named, quantities):
             return index
-        first = index if first is None else first
+        if first is None and _names_all(rows[index][1], named, quantities):
+            first = index
     return first
+
+
+def _names_all(
+    names: list[str], named: Mapping[str, str], quantities: Sequence[str]
+) -> list[list[int]]:
+    """The columns of each quantity; none where a quantity has no column of its own."""
+    columns = [columns_of(names, quantity, named) for quantity in quantities]
+    # A sentence that speaks of load and extension is one cell, and no header.
+    several = all(columns) and len(set().union(*columns)) >= len(quantities)
+    return columns if several else []
+
+
+def _is_header(rows: Rows, index: int, named: Mapping[str, str], quantities: Sequence[str]) -> bool:
+    """Whether a row has the names, and numbers one or two rows below."""
+    # Most rows are numbers, and quickly passed over.
+    if not _LETTER.search("".join(rows[index][1])):
+        return False
+    columns = _names_all(rows[index][1], named, quantities)
+    below = [row for _, row in rows[index + 1 : index + 3]]
+    return bool(columns) and any(
+        all(any(_is_number(row, i) for i in each) for each in columns) for row in below
+    )
+
+
+def _begins_with_a_number(row: list[str]) -> bool:
+    return bool(_NUMBER.fullmatch(next((cell for cell in row if cell), "")))
 
 
 def _is_number(row: list[str], column: int) -> bool:

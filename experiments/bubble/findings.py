@@ -4,6 +4,7 @@ out.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from ...identification.assessment import moduli_error
@@ -40,12 +41,15 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "matched_by": test.match_by,
             "places": [len(t.displacement) for t in objective.targets],
             "doubtful_dropped": prepared.dropped,
+            **_as_read(prepared),
             "outside_dropped": prepared.outside,
         },
     }
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
+    lines += [f"data: {note}" for note in notes]
     if prepared.known is not None:
         errors = moduli_error(fitted.law, prepared.known, fitted.reached)
         numbers["moduli_error"] = errors
@@ -62,6 +66,15 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
         f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
     )
+
+
+def _as_read(prepared: PreparedBubble) -> dict[str, Any]:
+    """Which columns of the files were read, and how many rows were dropped, by why."""
+    source, dropped = prepared.fields[0].source, Counter[str]()
+    for field in prepared.fields:
+        dropped.update(field.dropped)
+    read = {"format": source.format, "columns": dict(source.columns), "units": dict(source.units)}
+    return {"dropped": dict(dropped), **({"read": read} if source.format else {})}
 
 
 def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:

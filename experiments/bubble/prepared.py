@@ -204,15 +204,12 @@ def _computed(
 def _measured(
     test: BubbleTest, data: PointFiles
 ) -> tuple[tuple[DisplacementField, ...], Registration | None]:
-    fields = read_fields(
-        data.files,
-        test.pressures,
-        columns=data.columns,
-        flag_column=data.flag_column,
-        comment=data.comment,
-        length_scale=data.length_scale,
-        format=data.format,
-    )
+    try:
+        fields = read_fields(data.files, test.pressures, options=data.options, format=data.format)
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise test.place.error(f"data.points.{error.field}", error.problem) from None
     if data.registration is None:
         return fields, None
     try:

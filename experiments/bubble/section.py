@@ -25,18 +25,18 @@ class KnownSolutionSection(Section):
 
 
 class ColumnsSection(Section):
-    """Names in the files; the height of the reference state may be missing."""
+    """Names in the files, where they are not found."""
 
-    x: str = "x"
-    y: str = "y"
+    x: str | None = None
+    y: str | None = None
     z: str | None = None
-    dx: str = "dx"
-    dy: str = "dy"
-    dz: str = "dz"
+    dx: str | None = None
+    dy: str | None = None
+    dz: str | None = None
 
 
 class PointsSection(Section):
-    """[bubble.data.points]: files of measured points, one a pressure."""
+    """[bubble.data.points]: files of measured points, one a pressure or all in one."""
 
     files: list[str] | None = None
     pattern: str | None = None
@@ -45,6 +45,10 @@ class PointsSection(Section):
     format: str | None = None
     columns: ColumnsSection = ColumnsSection()
     flag_column: str | None = None
+    valid_column: str | None = None
+    decimal: Literal[".", ","] | None = None
+    coordinates: Literal["reference", "deformed"] | None = None
+    camera_axes: bool | None = None
     comment: str = "#"
     length_unit: LengthUnit | None = None
     registration: RegistrationSection | None = None

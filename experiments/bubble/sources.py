@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data.fields import QUANTITIES as FIELD
+from ...data.frames import FrameOptions
 from ...data.registration.register import RegistrationOptions
 from ...errors import InputError
 from ...sections import LENGTH_UNITS
@@ -36,19 +38,10 @@ class KnownSolution:
 
 @dataclass(frozen=True)
 class PointFiles:
-    """Measured displacements, one file a pressure, in the order of the pressures.
-
-    columns : names in the files of x, y, dx, dy, dz, perhaps z, None where their format tells.
-    flag_column : rows where it is not zero are doubtful. comment : lines that start so are skipped.
-    length_scale : mm per unit of files that do not name theirs. format : its name, None where it
-    is found.
-    """
+    """Measured displacements: files in the order of the pressures, and how they are read."""
 
     files: tuple[Path, ...]
-    columns: dict[str, str] | None
-    flag_column: str | None
-    comment: str
-    length_scale: float
+    options: FrameOptions
     format: str | None = None
     registration: RegistrationOptions | None = None
 
@@ -121,7 +114,7 @@ def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
         if first != name:
             problem = f"column {column!r} is named for {first} and for {name}"
             raise place.error(f"data.points.columns.{name}", problem)
-    if len(names) != count:
+    if len(names) != count and len(names) != 1:
         field = "data.points.files" if points.files is not None else "data.points.indices"
         problem = f"expected one file for each of the {count} pressures, got {len(names)}"
         raise place.error(field, problem)
@@ -132,12 +125,20 @@ def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
     if place.need_data:
         _check_there(place, folder, files)
     unit = points.length_unit or place.scales.length_unit
-    return PointFiles(
-        files,
-        columns if "columns" in points.model_fields_set else None,
+    options = FrameOptions(
+        FIELD,
+        columns or None,
         points.flag_column,
         points.comment,
         LENGTH_UNITS[unit],
+        points.valid_column,
+        points.decimal,
+        points.coordinates,
+        points.camera_axes,
+    )
+    return PointFiles(
+        files,
+        options,
         named_format(place, "data.points.format", "frame", points.format),
         registration_options(points.registration, place, LENGTH_UNITS[unit]),
     )

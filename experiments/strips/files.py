@@ -57,12 +57,12 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
 
 
 def measured_curves(
-    place: Place, data: CurvesSection, listed: Sequence[ListedFile]
+    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
 ) -> dict[str, tuple[LoadCurve, ...]]:
     """The specimens' curves by direction, in the order of `DIRECTIONS`; only those there are.
 
     A file with one curve in a direction perhaps lists several specimens, one after the other and
-    not named: it is split where the elongation starts again.
+    not named: it is split where the elongation starts again. width : of the strips, mm.
 
     Raises
     ------
@@ -79,6 +79,7 @@ def measured_curves(
             columns=columns or None,
             load_unit=data.load_unit,
             length_unit=data.length_unit,
+            width=width,
             comment=data.comment,
             direction=file.direction,
             decimal=data.decimal,

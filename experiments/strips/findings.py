@@ -51,6 +51,7 @@ def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[str]:
         for direction, modulus in PINS.items()
         if direction not in directions
     ]
+    words += dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
     if test.match_by == "points":
         words += [
             f"{s.direction}: {s.strip.beyond} points beyond the final length (or before zero) "

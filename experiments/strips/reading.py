@@ -11,6 +11,7 @@ from ...data.curves import DIRECTIONS
 from ...data.load_polynomials import LoadPolynomial, fit_load_polynomial, specimen_scatter
 from ...data.published_polynomials import read_published_polynomials
 from ...errors import InputError
+from ...models.uniaxial import WIDTH
 from ...sections import beside
 from ..base import Place
 from ..formats import named_format
@@ -55,7 +56,8 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     if data.polynomials is not None:
         strips = _published(place, data, tables, listed[0])
     else:
-        strips = _measured(place, data, tables, listed)
+        width = WIDTH if section.width is None else section.width * place.scales.length
+        strips = _measured(place, data, tables, listed, width)
     if not strips:
         problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
         raise place.error("data", problem)
@@ -94,10 +96,11 @@ def _measured(
     data: CurvesSection,
     tables: Mapping[str, GaugeSection],
     listed: Sequence[ListedFile],
+    width: float,
 ) -> dict[str, Strip]:
     said = {file.direction for file in listed}
     strips = {}
-    for direction, curves in measured_curves(place, data, listed).items():
+    for direction, curves in measured_curves(place, data, listed, width).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
         if tables and direction not in tables and direction not in said:
             continue

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...sections import LoadUnit, Positive, Section
+from ...sections import Positive, Section
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -53,7 +53,7 @@ class CurvesSection(Section):
     folder: str = ""
     format: str | None = None
     columns: ColumnsSection = ColumnsSection()
-    load_unit: LoadUnit | None = None
+    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None
     length_unit: Literal["mm", "cm", "m"] | None = None
     decimal: Literal[".", ","] | None = None
     comment: str = "#"

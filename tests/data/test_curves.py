@@ -165,11 +165,12 @@ def test_specimens_and_directions_have_columns(scratch):
 
 
 def test_names_given_settle_what_is_ambiguous(scratch):
-    text = TESTXPERT.replace("Dehnung", "Traversenweg absolut").replace('"%"', '"mm"')
+    text = TESTXPERT.replace("Dehnung", "Weg absolut").replace('"%"', '"mm"')
     message = complaint(read, scratch, text)
-    assert "line 5: the column of elongation may be 'Standardweg' or 'Traversenweg" in message
+    assert "line 5: the column of elongation may be 'Standardweg' or 'Weg absolut'" in message
     assert "the file has: Prüfzeit, Standardkraft, Standardweg" in message
-    (curve,) = read(scratch, text, columns={"elongation": "Traversenweg absolut"})
+    (curve,) = read(scratch, text, columns={"elongation": "Weg absolut"})
+    assert curve.notes == ()
     np.testing.assert_allclose(curve.elongation, [0, 0.3])
     # Names the reader does not know, with and without their unit; a column of time.
     text = "t,Kanal 1 [mm],Kanal 2 [kN]\n0,1,2\n5,3,4\n"
@@ -177,6 +178,59 @@ def test_names_given_settle_what_is_ambiguous(scratch):
     (curve,) = read(scratch, text, columns=columns)
     np.testing.assert_allclose(curve.load, [2000, 4000])
     np.testing.assert_allclose(curve.time, [0, 5])
+
+
+def test_of_two_elongations_the_one_on_the_strip_is_taken_and_said(scratch):
+    text = TESTXPERT.replace("Dehnung", "Traversenweg absolut").replace('"%"', '"mm"')
+    (curve,) = read(scratch, text)
+    np.testing.assert_allclose(curve.elongation, [-0.01, 0.25])
+    (note,) = curve.notes
+    assert "the elongation is column 'Standardweg', not 'Traversenweg absolut'" in note
+    assert "columns = { elongation = ... }" in note
+    text = "Crosshead [mm],Extensometer displacement [mm],Load [N]\n5,1,0\n6,2,10\n"
+    (curve,) = read(scratch, text)
+    np.testing.assert_allclose(curve.elongation, [1, 2])
+    (curve,) = read(scratch, text, columns={"elongation": "Crosshead"})
+    np.testing.assert_allclose(curve.elongation, [5, 6])
+    assert curve.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("unit", "newton"),
+    [("kN/m", 25.0), ("N/mm", 25.0), ("N/m", 0.025), ("N/cm", 2.5), ("N/50mm", 0.5)],
+)
+def test_loads_per_width_are_those_of_the_whole_strip(scratch, unit, newton):
+    for name in (f"Force [{unit}]", f"Force in {unit}"):
+        text = f"Weg [mm];{name}\n0,5;2\n1,5;4,0\n"
+        (curve,) = read(scratch, text, width=25.0)
+        np.testing.assert_allclose(curve.load, [2 * newton, 4 * newton], rtol=1e-14)
+    assert f"{unit} is a load per width; say the strip's width" in complaint(read, scratch, text)
+
+
+def test_a_load_per_width_may_be_said(scratch):
+    (curve,) = read(scratch, "Load,disp_mm\n2,1\n", load_unit="kN/m", width=50.0)
+    assert curve.load == [100.0]
+
+
+def test_results_above_the_readings_are_not_the_readings(scratch):
+    results = (
+        "Results\nSpecimen,Maximum load [N],Extension at break [mm]\n1,2000,14.5\n2,2010,14.1\n\n"
+    )
+    (curve,) = read(scratch, results + "Extension [mm],Load [N]\n0,0\n1,100\n2,180\n")
+    np.testing.assert_allclose(curve.load, [0, 100, 180])
+    (note,) = curve.notes
+    assert "names in line 6, which has most rows, is read; not that of line 2" in note
+
+
+def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
+    block = "Time,Extension,Load\n(s),(mm),(N)\n0,0,0\n1,1,100\n2,2,{}\n"
+    text = "Specimen 1\n" + block.format(180) + "\nSpecimen 2\nWidth,25,mm\n" + block.format(190)
+    (curve,) = read(scratch, text)
+    np.testing.assert_allclose(curve.load, [0, 100, 180, 0, 100, 190])
+    assert [len(part.load) for part in split_at_restarts(curve)] == [3, 3]
+    assert curve.notes == ()
+    message = complaint(read, scratch, text.replace("1,1,100", "1,x,100"))
+    assert "line 5, column 'Extension': expected a number, found 'x'" in message
 
 
 @pytest.mark.parametrize(

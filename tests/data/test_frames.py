@@ -33,9 +33,11 @@ def test_frames_are_read_with_holes(tmp_path):
     assert frame.path == path
     message = complaint(read_frames, [path], options(names))
     assert "B00001.csv: line 5, column 'Y': expected a number, found 'x'" in message
-    assert "column 'x': this column is missing" in complaint(read_frames, [path])
+    # The names are found without being told.
+    (found,) = read_frames([path], options(flag_column="mask", length_scale=10.0))
+    np.testing.assert_array_equal(found.points, frame.points)
     assert complaint(read_frames, []).startswith("files")
-    assert complaint(options, {"x": "X"}).startswith("columns")
+    assert complaint(options, {"w": "W"}).startswith("columns: unknown quantity 'w'")
     assert complaint(options, length_scale=0.0).startswith("length_scale")
     assert "length unit" in complaint(
         read_frames, [path], options(names, flag_column="mask", length_scale=1e308)

@@ -56,7 +56,7 @@ def test_every_content_has_one_format_that_takes_what_no_other_recognises():
 def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
     path = tmp_path / "frame.csv"
     path.write_text(STARRED)
-    assert "this column is missing" in complaint(read_frames, [path])
+    assert "no row of names with places" in complaint(read_frames, [path])
     register_format(starred())
     assert format_of("frame", path).name == "starred"
     (frame,) = read_frames([path])
@@ -77,12 +77,12 @@ def test_lost_everywhere_and_several_frames_are_no_field(tmp_path, own):
     path = tmp_path / "frame.txt"
     path.write_text("*** a camera\n7 8 0 nan nan nan\n")
     register_format(starred())
-    assert "all 1 rows are doubtful; none is left" in complaint(read_fields, [path], [0.1])
+    assert "no row is left to use: 1 without a value" in complaint(read_fields, [path], [0.1])
     twice = Format("twice", "frame", "two", lambda *a: read_starred(*a) * 2)
     register_format(twice)
     assert len(read_frames([path], format="twice")) == 2
     message = complaint(read_fields, [path], [0.1], format="twice")
-    assert "expected one frame, one a pressure; found 2" in message
+    assert "expected one frame for each of 1 pressures, found 2" in message
 
 
 def test_names_that_are_not_there_and_files_that_are_not_there(tmp_path):
@@ -138,7 +138,7 @@ def test_ours_are_asked_before_plug_ins_and_keep_their_names(packages, tmp_path,
     install_reader(packages, "csv", "raise RuntimeError")
     path = tmp_path / "frame.json"
     path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')
-    assert format_named("frame", "csv").title.startswith("comma-separated")
+    assert format_named("frame", "csv").title.startswith("columns of text")
     register_format(starred("mine", lambda path, head: head.startswith(b"{")))
     assert format_of("frame", path).name == "mine"
 
