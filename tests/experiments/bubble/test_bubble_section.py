@@ -86,7 +86,8 @@ def test_real_examples(name: str, shared_data: Path):
     recorded = np.loadtxt(GRID / "grid_pressures.csv", delimiter=",", skiprows=1)
     indices = [int(f.stem[-2:]) for f in p.data.files]
     assert p.pressures == pytest.approx(recorded[indices, 2])
-    assert p.data.columns["dz"] == "dz" and p.data.flag_column == "flag"
+    assert p.data.options.columns == {name: name for name in ("x", "y", "dx", "dy", "dz")}
+    assert p.data.options.flag_column == "flag"
     for file, bar in zip(p.data.files, recorded[indices, 1], strict=True):
         assert f"p_bar={bar:.6f}" in file.open().readline()
 
