@@ -18,7 +18,7 @@ from .solids import SolidMesh
 
 Array = NDArray[np.float64]
 
-#: MPa/mm, as the membrane solver's: with 1 the load is 2 % less at 20 mm and 1 % at 60 mm.
+#: MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md, *Contact*.
 STIFFNESS = 5.0
 #: CalculiX' own, and more than enough: the load is a sum over many nodes.
 TOLERANCES = (5e-3, 1e-2)
