@@ -41,7 +41,17 @@ def test_the_table_of_a_gauge_reads_back_as_a_load_curve(record, tmp_path):
     np.testing.assert_array_equal(back.load, curve.load)
     numbers = table.numbers()
     assert numbers["lost"] == ["b"] and numbers["points"] == 2 and "a note" in table.warnings
-    assert numbers["longest"]["strain"] == pytest.approx(0.2)
+    assert numbers["longest"] == {
+        "file": "c",
+        "length_mm": pytest.approx(1.2 * table.record.reference_length),
+        "elongation_mm": pytest.approx(0.2 * table.record.reference_length),
+        "strain": pytest.approx(0.2),
+        "log_strain": pytest.approx(np.log(1.2)),
+    }
+    assert numbers["gauge_length_mm"] == table.record.reference_length
+    assert (numbers["direction"], numbers["specimen"]) == ("fill", "3")
+    assert (numbers["largest_load_N"], numbers["frames"]) == (30, 3)
+    assert numbers["without_load"] == []
 
 
 def test_without_loads_every_frame_has_its_row(record):

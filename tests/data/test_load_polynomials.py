@@ -63,6 +63,7 @@ def test_r_squared_and_rmse_are_those_of_numpy():
         ([1, np.nan], [1, 2], 1, "expected finite numbers"),
         ([], [], 1, "expected points with elongation above 0"),
         ([-1, -2], [1, 2], 1, "expected points with elongation above 0"),
+        ([0, 0], [1, 2], 1, "expected points with elongation above 0"),
         ([1, 2], [3, 3], 1, "all 2 loads are 3 N"),
         ([1, 2, 3], [1, 2, 3], 4, "order 4: 4 coefficients need as many points, there are 3"),
         ([1, 1, 1, 1, 2], [1, 2, 3, 4, 5], 3, "order 3: the elongations settle only 2 of 3"),

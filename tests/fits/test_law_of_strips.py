@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.experiments.base import Reach
 from bubblefit.fits.law import bounds_of, law_of
 from bubblefit.fits.project import Project, read_project
 from bubblefit.identification.feasibility import allowed, draw
@@ -105,6 +106,13 @@ def test_strain_range(example):
     assert list(example(two, ("# strain_range", "strain_range")).tests["strips"].strips) == [
         "warp", "fill",
     ]  # fmt: skip
+
+
+def test_breaks_that_no_test_tells_are_thirds(example):
+    project = example((CUBIC, 'form = "trilinear"'))
+    own = law_of(project, [Reach((0.12, 0.24, 0.6))])
+    for component, end in enumerate((0.12, 0.24, 0.6)):
+        assert own.form.breaks[component] == pytest.approx([end / 3, 2 * end / 3])
 
 
 @pytest.mark.parametrize("form, size", [("constant", 1), ("linear", 2), ("cubic", 4)])

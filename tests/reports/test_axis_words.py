@@ -15,6 +15,7 @@ from bubblefit.reports import (
     plot_bending_cases,
     plot_convergence,
     plot_gas,
+    plot_heights,
     plot_loads,
     plot_nu12,
     plot_orders,
@@ -94,3 +95,31 @@ def test_what_is_not_determined_lies_above_a_line(figures: list[Figure]) -> None
 def test_without_any_sigma_the_axes_are_there(figures: list[Figure]) -> None:
     plot_pinned("p", STRAINS, {})
     assert figures[0].axes[0].get_ylim()[0] == pytest.approx(1.0)
+
+
+def test_rows_of_cases_have_their_own_loads(figures: list[Figure]) -> None:
+    panels = [
+        BendPanel(str(i), [BendLine("card", 0, X, f * X, X, X)]) for i, f in enumerate((1, 2, 9))
+    ]
+    plot_bending_cases("b", panels, 2)
+    for axes, highest in zip(figures[0].axes[:3], (8.0, 8.0, 36.0), strict=True):
+        assert axes.get_ylim() == pytest.approx((0.0, 1.06 * highest))
+    assert figures[0].axes[0].get_xlim() == pytest.approx((0.0, 1.03 * 4.0))
+
+
+def test_heights_have_all_points_in_sight(figures: list[Figure]) -> None:
+    seen, model = np.array([1.0, 20.0, 30.0]), np.array([-0.5, 21.0, 31.0])
+    plot_heights("h", [0.022], [seen], [model])
+    left, right = figures[0].axes
+    assert left.get_xlim() == left.get_ylim() == pytest.approx((-0.5, 1.03 * 31.0))
+    np.testing.assert_array_equal(left.lines[1].get_data(), [seen, model])
+    np.testing.assert_array_equal(right.lines[1].get_data(), [seen, model - seen])
+    rms, r2 = np.sqrt((1.5**2 + 2) / 3), 1 - (1.5**2 + 2) / ((seen - 17) ** 2).sum()
+    assert right.get_title("left") == f"RMS {rms:.2g} mm"
+    assert left.get_title("left") == f"$R^2$ = {r2:.3f}"
+    assert [t.get_text() for t in figures[0].legends[0].get_texts()] == ["22 kPa"]
+    assert (left.get_xlabel(), left.get_ylabel()) == ("measured z, mm", "modelled z, mm")
+    assert (right.get_xlabel(), right.get_ylabel()) == (
+        "measured z, mm",
+        "modelled $-$ measured, mm",
+    )
