@@ -295,7 +295,7 @@ class RunRecord:
     seconds : wall clock. failure : why there is no result, "" where there is one; early : the
     solver's own word for why it could go no further than it did, "" where it came to the end.
     strain : (3,) largest (eps1, eps2, gamma12). arrays : what the kind of test keeps of the
-    history. iterations, stable, remarks : as the solver says them.
+    history. iterations, unstable, remarks : as the solver says them.
     """
 
     seconds: float
@@ -304,7 +304,7 @@ class RunRecord:
     strain: Array | None = None
     arrays: Mapping[str, Array] = field(default_factory=dict)
     iterations: int = 0
-    stable: bool | None = None
+    unstable: tuple[str, ...] | None = None
     remarks: tuple[str, ...] = ()
 
 

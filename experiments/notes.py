@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.card import MaterialCard, thickness_difference
-from ..solvers.base import History
+from ..solvers.base import History, instability
 from .base import RunRecord
 
 Array = NDArray[np.float64]
@@ -17,7 +17,12 @@ Array = NDArray[np.float64]
 STRAINS = ("warp", "fill", "shear")
 #: A strain this far beyond an end, relative, is no rounding.
 BEYOND = 1 + 1e-6
-UNSTABLE = "the equilibrium at the last load is unstable: no test could be held there"
+
+
+def unstable_words(unstable: Sequence[str] | None) -> list[str]:
+    """That equilibria at these loads (in words) are unstable, where there are any."""
+    words = instability(unstable)
+    return [f"{words}: the model would not stay there"] if words else []
 
 
 def strains_of(history: History) -> Array:
@@ -61,17 +66,16 @@ def beyond_range(reached: Array, ends: Array, where: str = "") -> list[str]:
 
 def notes_of(history: History, card: MaterialCard) -> list[str]:
     """Everything to know of an analysis with a card."""
-    return _notes(history.remarks, strains_of(history), history.stable, card)
+    return _notes(history.remarks, strains_of(history), history.unstable, card)
 
 
 def notes_of_record(record: RunRecord, card: MaterialCard) -> list[str]:
     """The same of a run that is stored; nothing of one that failed, but its failure."""
     reached = np.zeros(3) if record.strain is None else record.strain
-    return _notes(record.remarks, reached, record.stable, card)
+    return _notes(record.remarks, reached, record.unstable, card)
 
 
 def _notes(
-    remarks: Sequence[str], reached: Array, stable: bool | None, card: MaterialCard
+    remarks: Sequence[str], reached: Array, unstable: Sequence[str] | None, card: MaterialCard
 ) -> list[str]:
-    unstable = [UNSTABLE] if stable is False else []
-    return [*remarks, *beyond_card(reached, card), *unstable]
+    return [*remarks, *beyond_card(reached, card), *unstable_words(unstable)]

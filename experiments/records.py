@@ -27,7 +27,7 @@ def record_of(
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
                 arrays=kind.arrays(model, outcome),
                 iterations=outcome.iterations,
-                stable=outcome.stable,
+                unstable=outcome.unstable,
                 remarks=tuple(outcome.remarks),
             )
         except SolverFailure as failure:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..experiments.notes import UNSTABLE, beyond_range, by_strain, strains_of
+from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
 from ..identification.assessment import pinned_by
 
 if TYPE_CHECKING:
@@ -137,10 +137,13 @@ def warnings_of(fit: Fit, pins: dict[str, Any]) -> list[str]:
     """What a reader must know before using the numbers: one place for page, terminal and json."""
     best, several = fit.best, len(fit.problem.comparisons) > 1
     words = list(best.certainty.undetermined) if best.certainty is not None else []
-    if not best.point.stable:
-        words.append(UNSTABLE)
     ends = np.asarray(fit.law.strain_range)
-    for comparison, history in zip(fit.problem.comparisons, best.point.histories, strict=True):
+    # What the solver that counts does not look at, the one that leads may have.
+    leading = (best.differentiated or best.point).histories
+    every = zip(fit.problem.comparisons, best.point.histories, leading, strict=True)
+    for comparison, history, beside in every:
+        unstable = beside.unstable if history.unstable is None else history.unstable
+        words += [f"{comparison.name}: {w}" if several else w for w in unstable_words(unstable)]
         where = f" in {comparison.name}" if several else ""
         words += beyond_range(strains_of(history), ends, where)
         words += [f"{comparison.name}: {r}" if several else r for r in history.remarks]

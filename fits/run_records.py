@@ -51,7 +51,7 @@ class RunRecords:
             "seconds": record.seconds,
             "early": record.early,
             "iterations": record.iterations,
-            "stable": record.stable,
+            "unstable": record.unstable,
             "remarks": record.remarks,
             "arrays": list(record.arrays),
         }
@@ -75,7 +75,7 @@ class RunRecords:
                 strain=strain if len(strain) else None,
                 arrays=arrays,
                 iterations=int(words["iterations"]),
-                stable=words["stable"],
+                unstable=None if words["unstable"] is None else tuple(words["unstable"]),
                 remarks=tuple(map(str, words["remarks"])),
             )
         return None

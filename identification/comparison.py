@@ -73,6 +73,8 @@ class Comparison:
     stage : those of lower stages lead into a fit of several (see `approach`).
     contracts : the sheet is free to contract under tension, so that the law has to be positive
         definite there.
+    must_be_stable : an unstable equilibrium is no point for a fit to go to: no test under load
+        could show it.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Comparison:
     nuisance: tuple[Nuisance, ...] = ()
     stage: int = 0
     contracts: bool = False
+    must_be_stable: bool = True
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
 
     def by(self, solver: Solver) -> Comparison:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import DifferentiatingSolver, History, Solver
+from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .blocks import Blocks
 from .comparison import Comparison
 from .unknowns import Unknowns
@@ -23,7 +23,8 @@ class Evaluation:
     """An analysis that ended well, seen by the optimiser.
 
     coefficients (free,) MPa; residual (m,); jacobian (m, unknowns) or None; value: e of Eq. 3.7
-    or 4.8; histories: one a comparison.
+    or 4.8; histories: one a comparison; stable: every equilibrium that has to be
+    (`Comparison.must_be_stable`), as far as the solver looked.
     """
 
     unknowns: Array
@@ -32,16 +33,14 @@ class Evaluation:
     value: float
     jacobian: Array | None
     histories: tuple[History, ...]
-
-    @property
-    def stable(self) -> bool:
-        """Not known to be an unstable equilibrium, which no test under load can show."""
-        return all(history.stable is not False for history in self.histories)
+    stable: bool = True
 
     @property
     def status(self) -> str:
         """What a history says of it."""
-        return "ok" if self.stable else "unstable equilibrium"
+        if self.stable:
+            return "ok"
+        return next(filter(None, (instability(h.unstable) for h in self.histories)))
 
 
 #: Called after every analysis with unknowns, e (None when it failed), what happened, who ran it.
@@ -164,7 +163,16 @@ class FitProblem:
         whole = np.concatenate(residuals)
         value = self.blocks.value(whole)
         jacobian = np.concatenate(jacobians) if with_jacobian else None
-        point = Evaluation(y.copy(), law.beta[list(free)], whole, value, jacobian, tuple(histories))
+        pairs = zip(self.comparisons, histories, strict=True)
+        point = Evaluation(
+            y.copy(),
+            law.beta[list(free)],
+            whole,
+            value,
+            jacobian,
+            tuple(histories),
+            all(h.stable is not False for c, h in pairs if c.must_be_stable),
+        )
         self.unstable += not point.stable
         self._report(y, value, point.status)
         return point

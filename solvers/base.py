@@ -14,6 +14,9 @@ from ..materials.law import HypoelasticLaw
 
 Array = NDArray[np.float64]
 
+#: Loads that are named one by one; of more, the first and the last.
+FEW = 3
+
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
     """What a differentiating solver may be asked for: entries of beta, nu12, and the model's own.
@@ -25,6 +28,16 @@ def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
     return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *own)
 
 
+def instability(unstable: Sequence[str] | None) -> str:
+    """That equilibria at these loads (in words) are unstable; "" where there are none."""
+    if not unstable:
+        return ""
+    places = ", ".join(unstable)
+    if len(unstable) > FEW:
+        places = f"{len(unstable)} of the reported loads, from {unstable[0]} to {unstable[-1]}"
+    return f"unstable equilibrium at {places}"
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """What an analysis that ended well reports, frame by frame.
@@ -34,12 +47,13 @@ class History:
     reactions by named set (frames, 3) N; strain_min, strain_max (3,) extremes of (eps1, eps2,
     gamma12) log strain; cavity pressure (MPa) and volume (mm^3), (frames,), where there is a
     cavity; path: displacement at every increment (increments, nodes, 3) and its derivatives
-    path_slope (..., parameters), where the solver keeps them (a start for the next run); stable:
-    whether the equilibrium at the last load is, None where the solver did not look; wrinkled:
-    share of the reference surface that carries no stress in one direction (frames,), None likewise;
-    iterations: what the solver counts as its work; remarks: what a reader of the result should
-    know; early: the solver's own word for an end before the model's last frame (it found no
-    equilibrium further on), "" where there is none: fewer frames without it are no result.
+    path_slope (..., parameters), where the solver keeps them (a start for the next run); unstable:
+    at which of the reported loads the equilibrium is, in words ("132 kPa"), empty where all are
+    stable, None where the solver did not look; wrinkled: share of the reference surface that
+    carries no stress in one direction (frames,), None likewise; iterations: what the solver
+    counts as its work; remarks: what a reader of the result should know; early: the solver's own
+    word for an end before the model's last frame (it found no equilibrium further on), "" where
+    there is none: fewer frames without it are no result.
     """
 
     load: Array
@@ -53,10 +67,15 @@ class History:
     path: Array | None = None
     path_slope: Array | None = None
     load_slope: Array | None = None
-    stable: bool | None = None
+    unstable: tuple[str, ...] | None = None
     wrinkled: Array | None = None
     remarks: tuple[str, ...] = ()
     early: str = ""
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether every equilibrium that is reported is; None where the solver did not look."""
+        return None if self.unstable is None else not self.unstable
 
 
 @dataclass(frozen=True)

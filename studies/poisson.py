@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, SolverFailure
-from ..experiments.notes import UNSTABLE
+from ..experiments.notes import unstable_words
 from ..fits.analyses import Progress
 from ..fits.project import Project
 from ..materials.card import MaterialCard
@@ -236,8 +236,7 @@ def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
             continue
         responses.append(part.studied.responses(part.model, history))
         # Strains beyond the card's range are those of the base run, more or less.
-        if history.stable is False:
-            warnings.append(f"nu12 = {value:g}: {UNSTABLE}")
+        warnings += [f"nu12 = {value:g}: {words}" for words in unstable_words(history.unstable)]
     own = part.studied.responses(part.model, base)
     return PartRatios(part.studied.response, by_response(values, responses, own), failed, warnings)
 

@@ -20,11 +20,14 @@ class BorderedTangent:
         self.inner, self.data, self.slot = inner, inner.data, inner.slot
         self.stiffness, self.border = 0.0, np.empty(0)
 
-    def factor(self, judge: bool = False) -> bool:
-        """Factorise the sparse part; `judge` looks at that part only (the rest is positive)."""
-        good = self.inner.factor(judge)
+    def factor(self) -> None:
+        """Factorise the sparse part."""
+        self.inner.factor()
         self.answer = self.inner.solve(self.border) if self.stiffness else self.border
-        return good
+
+    def definite(self) -> bool:
+        """Whether the sparse part is (the rest is never negative)."""
+        return self.inner.definite()
 
     def solve(self, rhs: Array) -> Array:
         x = self.inner.solve(rhs)

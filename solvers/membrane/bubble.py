@@ -17,6 +17,7 @@ from .element import reference_elements
 from .factorisation import tangent_for
 from .march import Asked, Loading, Record, lagrange, march
 from .newton import Membrane, initial_moduli
+from .stability import named
 from .wall import Wall
 
 Array = NDArray[np.float64]
@@ -51,19 +52,20 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     The membrane is fresh: no strain, no stress.
     """
     levels = np.array(model.increments)
-    shape, last = membrane.reference.shape, len(levels) - 1
+    shape = membrane.reference.shape
     derivatives = _derivatives(membrane, model, asked.parameters)
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
-    record, stable = Record(membrane, len(levels)), True
-    membrane.keep_tangent = derivatives is not None or last == 0
+    record, keep = Record(membrane, len(levels)), model.reported
+    judged, unstable = set(keep.tolist()), []
+    membrane.keep_tangent = derivatives is not None or 0 in judged
     for i, u in enumerate(march(Inflation(membrane, model), levels, asked)):
-        if membrane.keep_tangent:
-            stable = membrane.factor(judge=i == last)
+        if i in judged and not membrane.tangent.definite():
+            unstable.append(i)
         if derivatives is not None:
+            membrane.factor()
             rates[i] = derivatives.increment(u, levels[i]).reshape(*shape, -1)
         record.accept(i, u)
-        membrane.keep_tangent = derivatives is not None or i + 1 == last
-    keep = model.reported
+        membrane.keep_tangent = derivatives is not None or i + 1 in judged
     reactions = {
         name: record.forces[keep][:, model.mesh.node_sets[name]].sum(axis=1)
         for name in model.supports
@@ -78,7 +80,7 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
         iterations=membrane.iterations,
         path=record.path,
         path_slope=rates if asked.parameters else None,
-        stable=stable,
+        unstable=named(1e3 * levels[unstable], "kPa"),
     )
     return history, rates[keep]
 

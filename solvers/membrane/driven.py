@@ -43,8 +43,11 @@ class DrivenTangent:
         self._tail, self._at = self.data[inside:], (rows[beside], columns[beside])
         self._shape = (size, size)
 
-    def factor(self, judge: bool = False) -> bool:
-        return self.inner.factor(judge)
+    def factor(self) -> None:
+        self.inner.factor()
+
+    def definite(self) -> bool:
+        return self.inner.definite()
 
     def solve(self, rhs: Array) -> Array:
         return self.inner.solve(rhs)
@@ -106,7 +109,7 @@ class Pull:
             gap = elongation - now
             if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
                 return found
-            m.factor(judge=False)
+            m.factor()
             w = self.response()
             opens = float(slope @ w)
             move = gap / opens if opens > 0 else np.inf

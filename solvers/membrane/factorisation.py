@@ -7,7 +7,7 @@ unsymmetric, because the hypoelastic tangent is, and exact sensitivities want it
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,10 +33,14 @@ class Tangent(Protocol):
     data: Array
     slot: NDArray[np.int64]
 
-    def factor(self, judge: bool = False) -> bool:
-        """Factorise what `data` holds. SingularTangent on failure.
+    def factor(self) -> None:
+        """Factorise what `data` holds. SingularTangent on failure."""
 
-        With `judge`: returns whether it is positive definite, else True.
+    def definite(self) -> bool:
+        """Whether the symmetric part of what `data` holds is positive definite.
+
+        That of the hypoelastic tangent stands for all of it: the two differ by 1 to 5 %, and their
+        least eigenvalues agree to a few tenths of a per cent (measured on strips and bubbles).
         """
 
     def solve(self, rhs: Array) -> Array:
@@ -90,15 +94,18 @@ class BandedTangent:
         self.slot[inside] = j * self.depth + 2 * width + i - j
         self.rank, self.order = rank, np.argsort(rank)
 
-    def factor(self, judge: bool = False) -> bool:
+    def factor(self) -> None:
         band = self.data.reshape((self.depth, self.size), order="F")
         self.lu, self.pivots, info = lapack.dgbtrf(band, self.width, self.width)
         if info != 0:
             raise SingularTangent
-        if not judge:
-            return True
-        # The lower half stands for the symmetric part: the two differ by a few per cent.
-        lower = np.asfortranarray(band[2 * self.width :])
+
+    def definite(self) -> bool:
+        band = self.data.reshape((self.depth, self.size), order="F")
+        lower = np.array(band[2 * self.width :], order="F")
+        for k in range(1, self.width + 1):
+            lower[k, : self.size - k] += band[2 * self.width - k, k:]
+            lower[k] *= 0.5
         return bool(lapack.dpbtrf(lower, lower=1, overwrite_ab=1)[1] == 0)
 
     def solve(self, rhs: Array) -> Array:
@@ -125,22 +132,31 @@ class SparseTangent:
         self.data = np.zeros(len(keys))
         self.matrix = sp.csc_matrix((self.data, index, pointer), shape=(size, size))
 
-    def factor(self, judge: bool = False) -> bool:
+    def factor(self) -> None:
+        self.matrix.data[:] = self.data
+        self.lu = self._factors(self.matrix)
+
+    def definite(self) -> bool:
         self.matrix.data[:] = self.data
         try:
-            self.lu = splu(
-                self.matrix,
+            lu = self._factors((0.5 * (self.matrix + self.matrix.T)).tocsc())
+        except SingularTangent:
+            return False
+        # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
+        straight = np.array_equal(lu.perm_r, lu.perm_c)
+        return bool(straight and (lu.U.diagonal() > 0).all())
+
+    @staticmethod
+    def _factors(matrix: sp.csc_matrix) -> Any:
+        try:
+            return splu(
+                matrix,
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.001,
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
             raise SingularTangent from error
-        if not judge:
-            return True
-        # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
-        straight = np.array_equal(self.lu.perm_r, self.lu.perm_c)
-        return bool(straight and (self.lu.U.diagonal() > 0).all())
 
     def solve(self, rhs: Array) -> Array:
         return np.asarray(self.lu.solve(rhs))

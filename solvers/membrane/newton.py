@@ -98,15 +98,15 @@ class Membrane:
         self.strain_old[:] = self.strain_new
         self.stress_old[:] = self.stress_new
 
-    def factor(self, judge: bool) -> bool:
-        """Factorise the tangent that `keep_tangent` left; with `judge`: is the state stable?
+    def factor(self) -> None:
+        """Factorise the tangent that `keep_tangent` left.
 
         Raises
         ------
         SolverFailure : the tangent is singular, so the state is a limit point.
         """
         try:
-            return self.tangent.factor(judge)
+            self.tangent.factor()
         except SingularTangent:
             raise SolverFailure("the tangent is singular: a limit point") from None
 

@@ -15,6 +15,7 @@ from .driven import DrivenTangent, Pull
 from .element import reference_elements
 from .march import Asked, Loading, Record, lagrange, march
 from .newton import Membrane, initial_moduli
+from .stability import named
 from .wall import Wall
 
 Array = NDArray[np.float64]
@@ -51,8 +52,8 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     gauge does not: du = a - w (g a)/(g w), g the derivative of its length. The load's derivative
     is that of the residual at the driven unknowns.
 
-    Stability is not judged (`stable` is None): the judgement for the bubble takes the tangent for
-    nearly symmetric and its load for given, and a strip is neither.
+    An increment is stable where the sheet between grips that stand still is, in its plane: a
+    machine prescribes their distance, not the load.
     """
     parameters = asked.parameters
     initial_moduli(membrane.law)
@@ -65,11 +66,13 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     rates = np.zeros((len(levels), *shape, len(parameters)))
     load_slope = np.zeros((len(levels), len(parameters)))
     derivatives = Derivatives(membrane, parameters) if parameters else None
-    record = Record(membrane, len(levels))
+    record, unstable = Record(membrane, len(levels)), []
     membrane.keep_tangent = True
     for i, u in enumerate(march(Pulling(pull), levels, asked)):
+        if not tangent.definite():
+            unstable.append(i)
         if derivatives is not None:
-            membrane.factor(judge=False)
+            membrane.factor()
             rate = derivatives.at_fixed_displacement(u)
             w, (_, slope) = pull.response(), pull.elongation(u)
             du = np.zeros_like(rate)
@@ -93,6 +96,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
         path=record.path,
         path_slope=rates if parameters else None,
         load_slope=model.load_factor * load_slope if parameters else None,
+        unstable=named(levels[unstable], "mm of elongation"),
     )
     return history, rates
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import bubblefit as bf
@@ -214,6 +215,26 @@ def test_another_form_of_the_moduli(tmp_path: Path, form: str):
         assert again.E1(x) == pytest.approx(fit.law.E1(x))
     else:
         assert fit.objective > 1e-3
+
+
+def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
+    from bubblefit.fits.numbers import warnings_of
+
+    def with_unstable(point, words):
+        (history,) = point.histories
+        return replace(point, histories=(replace(history, unstable=words),))
+
+    def said(counts, leads) -> list[str]:
+        best = fitted.best
+        best = replace(best, point=with_unstable(best.point, counts),
+                       differentiated=with_unstable(best.differentiated, leads))  # fmt: skip
+        return [w for w in warnings_of(replace(fitted, best=best), {}) if "unstable" in w]
+
+    told = ["unstable equilibrium at 59 kPa: the model would not stay there"]
+    assert said((), ()) == []
+    assert said(("59 kPa",), ()) == told
+    # Another program does not look: what leads it does.
+    assert said(None, ("59 kPa",)) == told
 
 
 def test_a_test_that_says_nothing_of_a_modulus_is_named(fitted: bf.Fit):

@@ -194,11 +194,13 @@ def test_every_kind_of_note() -> None:
         HypoelasticLaw([0] * 3 + [20] + [0] * 3 + [150] + [0] * 3 + [500], 0.24, [0.1, 0.2, 0.3]),
         0.81,
     )
-    record = RunRecord(1.0, strain=np.array([0.1, 0.21, 0.31]), stable=False, remarks=("a remark",))
+    record = RunRecord(
+        1.0, strain=np.array([0.1, 0.21, 0.31]), unstable=("132 kPa",), remarks=("a remark",)
+    )
     notes = notes_of_record(record, card)
     assert notes[0] == "a remark" and len(notes) == 4
     assert notes[1].startswith("fill strain 0.210") and notes[2].startswith("shear strain 0.310")
-    assert "unstable" in notes[3]
+    assert notes[3] == "unstable equilibrium at 132 kPa: the model would not stay there"
     assert notes_of_record(RunRecord(1.0, "failed"), card) == []
 
 

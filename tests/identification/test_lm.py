@@ -58,7 +58,7 @@ def test_levenberg_marquardt_steps_round_failures(how: str) -> None:
     assert optimum is not None and optimum.value < 1e-6
 
 
-@pytest.mark.parametrize("seed, number", [(3, 41), (4, 10), (5, 10), (6, 5), (3, 43)])
+@pytest.mark.parametrize("seed, number", [(3, 41), (4, 10), (5, 10), (6, 1), (3, 43)])
 def test_fits_that_meet_instability_get_past_it(seed: int, number: int) -> None:
     """The example's mesh and starts, of 400, that ended at a folded membrane or met it most."""
     model = BubbleModel(

@@ -80,6 +80,7 @@ def test_a_comparison_a_direction(published):
     assert [c.name for c in compared] == ["strips: warp", "strips: fill", "strips: bias"]
     # Strips along the yarns lead into a fit; all are free to contract.
     assert [c.stage for c in compared] == [0, 0, 1] and all(c.contracts for c in compared)
+    assert not any(c.must_be_stable for c in compared)
     assert all(c.nuisance == () for c in compared)
     assert len({id(c.solver) for c in compared}) == 3
     assert [len(c.objective.load) for c in compared] == [5, 5, 5]

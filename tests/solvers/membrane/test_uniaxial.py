@@ -426,7 +426,7 @@ def test_the_history_is_that_of_a_plain_run() -> None:
     history, _ = MembraneSolver().run_with_sensitivity(model, LAW)
     assert history.load == pytest.approx(plain.load, rel=1e-7)
     assert plain.load_slope is None
-    assert plain.stable is None and history.stable is None
+    assert plain.unstable == history.unstable == ()
 
 
 # Robustness
