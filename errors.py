@@ -84,6 +84,11 @@ class SolverFailure(BubblefitError):
             text += f"\n{log_tail}"
         super().__init__(text)
 
+    @property
+    def line(self) -> str:
+        """The reason, and the folder where one is kept, without the log."""
+        return f"{self.reason}; scratch kept in {self.scratch}" if self.scratch else self.reason
+
     def __reduce__(self) -> tuple:
         """Exceptions cross process borders: rebuild from the fields, not from the text."""
         fields = (self.reason, self.solver, self.exit_number, self.log_tail, self.scratch)

@@ -38,8 +38,8 @@ def command(
 
     Without a card in the project, or named, with the one that `bubblefit fit` wrote. Writes
     result.json, load_deflection.csv, runs.csv, figures, the bent beams for ParaView and
-    report.html into the output folder. A run that fails is named and left out; when none ends
-    well the exit code is 4.
+    report.html into the output folder. A run that fails is named and left out, everything else is
+    written, the exit code is 4, and --resume tries it again.
     """
     from ..fits.project import read_project
     from ..fits.store import usual_folder

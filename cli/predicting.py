@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, SolverFailure
 from .options import solver_choice, with_checks, with_solver
 from .progress import RunsProgress
 
@@ -82,11 +82,23 @@ def run_predictions(
 
 
 def tell(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
-    """Print the outcome; exit 1 when a run is further from its measurement than asked for."""
+    """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
     lines = [*predictions.lines(), f"written to {folder} (open report.html)"]
     click.echo(json.dumps(predictions.result, indent=1) if as_json else "\n".join(lines))
-    if fail_above is None:
-        return
+    failed = predictions.failed()
+    if failed:
+        run = predictions.each[failed[0]]
+        words = f"{len(failed)} of {len(predictions.each)} runs failed ({run.test.name} with "
+        words += f"{run.card}: {run.record.failure}); --resume tries again"
+        click.echo(f"bubblefit: {words}", err=True)
+    if fail_above is not None:
+        _compare(predictions, fail_above)
+    if failed:
+        sys.exit(SolverFailure.exit_code)
+
+
+def _compare(predictions: Predictions, fail_above: float) -> None:
+    """Exit 1 when a run is further from its measurement than `fail_above`, or says nothing."""
     words, worst, silent = "", predictions.worst, predictions.silent()
     if worst is not None and worst > fail_above:
         words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"

@@ -32,5 +32,4 @@ def record_of(
             )
         except SolverFailure as failure:
             outcome = failure
-    where = f"; scratch kept in {outcome.scratch}" if outcome.scratch is not None else ""
-    return RunRecord(seconds, outcome.reason + where)
+    return RunRecord(seconds, outcome.line)

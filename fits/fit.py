@@ -7,9 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from ..errors import NoFeasibleStart
+from ..errors import NoFeasibleStart, SolverFailure
 from ..experiments.base import FittableTest
-from .best import best_fit
+from ..identification.problem import FitProblem
+from .best import BestFit, best_fit
+from .failure_page import failure_page
 from .processes import run_starts
 from .project import Project, cores
 from .result import Fit
@@ -57,7 +59,8 @@ def fit(
     ------
     InputError : in the project or its data, or nothing to go on with. OutputError : the folder is
         used or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is
-        not there, or the best fit does not run again.
+        not there, it failed in every start, or the best fit does not run again or gives another
+        objective: then the page in `out` says so, and there is no result.
     """
     begun = time.perf_counter()
     project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs)
@@ -74,11 +77,21 @@ def fit(
         scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
         files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
         done = files.begin(resume)
-    records = _records(setup, files, done, progress or _nobody)
-    if all(r.objective is None for r in records):
-        raise NoFeasibleStart(f"{project.path}: no feasible start: {records[0].status}")
-    best = best_fit(problem, records, project.fit.tolerance)
+    with failure_page(None if out is None else Path(out), project.title):
+        records = _records(setup, files, done, progress or _nobody)
+        best = _best(problem, records, project)
     return Fit(setup, problem, best, time.perf_counter() - begun)
+
+
+def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:
+    """The best of the starts, run again; raises NoFeasibleStart, SolverFailure."""
+    if any(r.objective is not None for r in records):
+        return best_fit(problem, records, project.fit.tolerance)
+    failed = next((r for r in records if r.failure), None)
+    if failed is None:
+        raise NoFeasibleStart(f"{project.path}: no feasible start: {records[0].status}")
+    problem_said = f"no start ended with a fit: {failed.failure}"
+    raise SolverFailure(f"{problem_said}; --resume tries again", problem.solver.name)
 
 
 def _records(

@@ -137,6 +137,12 @@ def warnings_of(fit: Fit, pins: dict[str, Any]) -> list[str]:
     """What a reader must know before using the numbers: one place for page, terminal and json."""
     best, several = fit.best, len(fit.problem.comparisons) > 1
     words = list(best.certainty.undetermined) if best.certainty is not None else []
+    cut = [record for record in best.records if record.failure]
+    if cut:
+        words.append(
+            f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
+            f"failed ({cut[0].failure}): --resume tries them again"
+        )
     ends = np.asarray(fit.law.strain_range)
     # What the solver that counts does not look at, the one that leads may have.
     leading = (best.differentiated or best.point).histories

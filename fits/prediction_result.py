@@ -91,6 +91,10 @@ class Predictions:
         outcome, own = self._own(number)
         return outcome.error(own)
 
+    def failed(self) -> list[int]:
+        """Numbers of the runs that failed."""
+        return [i for i, run in enumerate(self.each) if run.record.failure]
+
     def silent(self) -> list[int]:
         """Numbers of the runs of measured tests that gave nothing to compare."""
         measured = [

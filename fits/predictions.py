@@ -20,6 +20,7 @@ from ..solvers.base import Solver
 from ..solvers.registry import solver_named, usable_solver
 from .cards import Cards, chosen_cards
 from .content import digest_of
+from .failure_page import failure_page
 from .prediction_result import Predictions, predicted_kind
 from .processes import Task, run_tasks
 from .project import Project, cores
@@ -85,10 +86,12 @@ def predict(
     if out is not None:
         records = RunRecords(Path(out))
         records.begin(resume, overwrite)
-    runs = _run(project, pairs, solver, records, jobs, progress or _nobody)
-    if all(run.record.failure for run in runs):
-        failure = f"no run ended well: {runs[0].record.failure}"
-        raise SolverFailure(failure, project.fit.solver)
+    with failure_page(None if out is None else Path(out), project.title) as said:
+        runs = _run(project, pairs, solver, records, jobs, progress or _nobody)
+        if all(run.record.failure for run in runs):
+            said += [f"{r.test.name} with {r.card}: failed: {r.record.failure}" for r in runs]
+            failure = f"no run ended well: {runs[0].record.failure}"
+            raise SolverFailure(failure, project.fit.solver)
     return Predictions(project, tuple(runs), time.perf_counter() - begun)
 
 

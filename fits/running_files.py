@@ -36,6 +36,8 @@ class RunningFiles:
     def begin(self, resume: bool) -> dict[int, StartRecord]:
         """Open the files; the starts that are finished already (none unless going on).
 
+        One that the solver's failure ended is not.
+
         Raises
         ------
         InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
@@ -100,7 +102,7 @@ class RunningFiles:
                 problem = "is damaged; use --overwrite"
                 raise InputError(path, f"line {i + 1}", problem) from None
             done[record.number] = record
-        return done
+        return {number: record for number, record in done.items() if not record.failure}
 
     def _read(self) -> list[list[str]]:
         path = self.store.path / HISTORY

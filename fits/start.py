@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,9 +32,10 @@ class EvaluationRecord:
 
 @dataclass(frozen=True)
 class StartRecord:
-    """How one start ended. `unknowns` are the optimiser's; objective None: no feasible start.
+    """How one start ended. `unknowns` are the optimiser's; objective None: there is no fit.
 
-    analyses : in all; external_runs : of them, by an external solver.
+    analyses : in all; external_runs : of them, by an external solver. failure : why the solver
+    failed, where that ended it: it is no finished start, and is run again on going on.
     """
 
     number: int
@@ -46,6 +47,7 @@ class StartRecord:
     coefficients: tuple[float, ...]
     wall_s: float
     external_runs: int = 0
+    failure: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, exact in JSON."""
@@ -64,6 +66,7 @@ class StartRecord:
             coefficients=tuple(map(float, values["coefficients"])),
             wall_s=float(values["wall_s"]),
             external_runs=int(values.get("external_runs", 0)),
+            failure=str(values.get("failure", "")),
         )
 
 
@@ -104,15 +107,17 @@ def run_start(
     try:
         start = feasible_start(problem, seed, number)
         optimum = fit_from(problem, start, options)
-        status = "the first analysis failed"
+        failure = optimum.failure if optimum is not None else _why(watched)
+        status = f"{problem.solver.name} failed: {failure}"
     except NoFeasibleStart as error:
-        optimum, status = None, str(error)
+        optimum, status, failure = None, str(error), ""
     finally:
         for p in watched:
             p.watch = None
     wall = time.perf_counter() - begun
     if optimum is None:
-        return StartRecord(number, (seed, number), None, status, analyses, (), (), wall, runs)
+        none = StartRecord(number, (seed, number), None, status, analyses, (), (), wall, runs)
+        return replace(none, failure=failure)
     return StartRecord(
         number,
         (seed, number),
@@ -123,4 +128,10 @@ def run_start(
         tuple(optimum.coefficients.tolist()),
         wall,
         runs,
+        failure,
     )
+
+
+def _why(problems: Sequence[FitProblem]) -> str:
+    """Why nothing came of the first that failed: the solver that counts, else what leads it."""
+    return next((p.failure for p in problems if p.failure), "the first analysis failed")

@@ -11,6 +11,9 @@ from ..errors import InputError, OutputError
 from ..writing import telling, write_text
 
 RUN, RESULT = "run.json", "result.json"
+#: What only a complete result has, beside it: a page and a card of an earlier one must not stand
+#: beside a later one that failed.
+OUTDATED = (RESULT, "report.html", "material.toml")
 #: What run.json must hold of a folder that an older version wrote: it can be replaced only.
 PARTS = "parts"
 
@@ -71,10 +74,8 @@ class Store:
             self._check(parts)
         with telling(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            (self.path / RESULT).unlink(missing_ok=True)
-            if not resume:
-                for name in records:
-                    (self.path / name).unlink(missing_ok=True)
+            for name in (*OUTDATED, *(() if resume else records)):
+                (self.path / name).unlink(missing_ok=True)
         if not resume:
             self.write(RUN, json.dumps({PARTS: dict(parts)}, indent=1) + "\n")
         return resume

@@ -43,14 +43,14 @@ def corrected_fit(
     assert surrogate is not None
     with _corrections_of(surrogate) as objectives:
         best: Evaluation | None = None
-        status, shorter = RUNS_USED_UP, 0
+        status, shorter, failure = RUNS_USED_UP, 0, ""
         y = _lead(surrogate, start, method, options)
         while y is not None and problem.analyses < options.max_runs:
             point = problem.evaluate(y, False)
             worse = point is not None and best is not None and point.value >= best.value
             if point is None or not point.stable or worse:
                 if shorter == MOST_SHORTER or _is_level(point, best):
-                    status = LEVEL
+                    status, failure = LEVEL, problem.failure if point is None else ""
                     break
                 shorter += 1
                 origin = start if best is None else best.unknowns
@@ -70,7 +70,9 @@ def corrected_fit(
             y = _lead(surrogate, y, method, options)
     if best is None:
         return None
-    return Optimum(best, status, problem.analyses + surrogate.analyses, problem.analyses)
+    status = f"{problem.solver.name} failed: {failure}" if failure else status
+    runs = problem.analyses
+    return Optimum(best, status, runs + surrogate.analyses, runs, failure)
 
 
 def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:

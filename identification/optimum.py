@@ -21,13 +21,15 @@ class Optimum:
     """The best feasible point of one start.
 
     status : how the fit ended. analyses : all of them; runs : those of them that the solver that
-    counts ran while a surrogate led (0 where there is none).
+    counts ran while a surrogate led (0 where there is none). failure : why the solver that counts
+    failed, where that and nothing else ended the fit.
     """
 
     best: Evaluation
     status: str
     analyses: int
     runs: int = 0
+    failure: str = ""
 
     @property
     def value(self) -> float:

@@ -127,7 +127,7 @@ class FitProblem:
 
     def reset(self) -> None:
         """Forget the warm start and the count: every start of a study begins alike."""
-        self.analyses, self.unstable, self.warm_starts = 0, 0, True
+        self.analyses, self.unstable, self.failure, self.warm_starts = 0, 0, "", True
         for comparison in self.comparisons:
             comparison.forget()
         if self.surrogate is not None:
@@ -152,7 +152,7 @@ class FitProblem:
                 else:
                     history = comparison.run(law, free, nuisance, warm)
             except SolverFailure as failure:
-                self._failed(y, comparison, failure.reason)
+                self._failed(y, comparison, failure.line)
                 return None
             residual = comparison.objective.residual(history, nuisance)
             if not np.isfinite(residual).all():

@@ -21,6 +21,13 @@ T = TypeVar("T")
 POLL_S = 0.05
 #: Lines of the log that an error carries.
 TAIL = 25
+#: What a shell adds to the number of the signal that killed its program, and the signals that are
+#: looked for in its exit code: other numbers are the program's own.
+SHELL = 128
+KILLS = {
+    signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE,
+    signal.SIGILL, signal.SIGXFSZ, signal.SIGXCPU,
+}  # fmt: skip
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 
@@ -35,12 +42,16 @@ class Outcome:
 
     @property
     def signal_name(self) -> str:
-        """Name of the signal that killed it, or empty."""
-        if self.exit_code >= 0:
+        """Name of the signal that killed it, or empty.
+
+        A shell that was in between says 128 and the signal's number.
+        """
+        number = -self.exit_code if self.exit_code < 0 else self.exit_code - SHELL
+        if self.exit_code >= 0 and number not in KILLS:
             return ""
         with suppress(ValueError):
-            return signal.Signals(-self.exit_code).name
-        return f"signal {-self.exit_code}"
+            return signal.Signals(number).name
+        return f"signal {number}"
 
 
 def run_process(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..disk import disk_full
 from ..process import Outcome, log_tail
 
 FINISHED = "Job finished"
-#: Free space (bytes) at which a run that ended badly is said to have filled the disk.
-FULL = 1024**2
 _ERROR = re.compile(r"^\s*\*ERROR\b:?\s*(.*(?:\n {6,}\S.*)*)", re.MULTILINE)
 _JACOBIAN = re.compile(r"nonpositive jacobian.*?element\s*(\d*)", re.IGNORECASE | re.DOTALL)
 _TOO_SMALL = re.compile(
@@ -61,7 +59,7 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     reached = f"after step {done[-1].step}, increment {done[-1].increment}" if done else "at once"
     if outcome.timed_out:
         return f"did not end within {timeout:g} s: killed {reached}"
-    full = _disk_full(folder, text, outcome)
+    full = disk_full(folder, text.splitlines(), outcome)
     if full:
         return f"disk full {reached}: {full}"
     if outcome.signal_name:
@@ -87,22 +85,9 @@ def collapsed(folder: Path, job: str, outcome: Outcome) -> bool:
     """Whether CalculiX itself gave up, its increment as small as it may be.
 
     What converged until then is a result that ends early. After any other bad end (killed, out of
-    time, disk full, an error) there is none.
+    time, disk full, an element inside out, an error) there is none.
     """
     text = log_tail(folder / f"{job}.log", 400)
-    if outcome.timed_out or outcome.signal_name or _disk_full(folder, text, outcome):
+    if outcome.timed_out or outcome.signal_name or disk_full(folder, text.splitlines(), outcome):
         return False
-    return _GAVE_UP.search(text) is not None
-
-
-def _disk_full(folder: Path, text: str, outcome: Outcome) -> str:
-    if outcome.signal_name == "SIGXFSZ":
-        return "a file would be larger than allowed"
-    for words in ("No space left on device", "File too large", "Disk quota exceeded"):
-        if words.lower() in text.lower():
-            return words
-    try:
-        free = shutil.disk_usage(folder).free
-    except OSError:
-        return ""
-    return f"{free} bytes left for {folder}" if free < FULL else ""
+    return _GAVE_UP.search(text) is not None and _JACOBIAN.search(text) is None

@@ -6,13 +6,15 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..disk import WORDS, disk_full
 from ..process import Outcome, log_tail
 from .sts import exit_number, increments, repeated
 
-NORMAL, NO_SMALLER = 3004, 3015
+NORMAL, NO_SMALLER, TURNED = 3004, 3015, 1005
 #: Exit numbers that public sources explain; others are reported as they are.
 MEANINGS = {
     NO_SMALLER: "the time step could not get smaller: no convergence",
+    TURNED: "an element was turned inside out",
     3: "run_marc could not compile or link the user subroutine",
 }
 #: Total time that may be missing at the end: the .sts has few digits.
@@ -69,7 +71,8 @@ def ending(
         *(folder / f"{job}.{end}" for end in ("sts", "log", "out")), folder / screen
     )
     texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
-    errors, licence_lines, turned = _lines(texts)
+    errors, licence_lines, turned, complaints = _lines(texts)
+    full = disk_full(folder, complaints, outcome)
     reached = f"after increment {done[-1].increment}" if done else "before the first increment"
     licence = bool(licence_lines) and not done
     problem = None
@@ -77,16 +80,18 @@ def ending(
         problem, licence = f"did not end within {timeout:g} s: killed {reached}", False
     elif licence and number != NORMAL:
         problem = f"no licence: {licence_lines[0]}"
-    elif outcome.signal_name:
+    elif full and number != NORMAL:
+        problem = f"disk full {reached}: {full}"
+    elif outcome.exit_code < 0 or (outcome.signal_name and number is None):
         problem = f"killed by {outcome.signal_name} {reached}"
     elif number is None:
         what = "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
         problem = f"{what}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
+    elif turned is not None:
+        problem = f"an element was turned inside out{turned}, {reached}"
     elif number != NORMAL:
         meaning = MEANINGS.get(number, "did not end well")
         problem = f"{meaning}, {reached}"
-    elif turned is not None:
-        problem = f"an element was turned inside out{turned}, {reached}"
     elif not done or done[-1].time < time - NEAR * max(1.0, time):
         at = done[-1].time if done else 0.0
         problem = f"ended at time {at:g} of {time:g}, {reached}"
@@ -95,9 +100,12 @@ def ending(
                   sum(one.iterations for one in done), repeated(done))  # fmt: skip
 
 
-def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None]:
-    """`*** error` lines, refusals of a licence, and which element was inside out ("" unknown)."""
+def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
+    """`*** error` lines, refusals of a licence, which element was inside out ("" unknown), and
+    complaints of a full disk.
+    """
     errors: list[str] = []
+    full: list[str] = []
     refusals: list[str] = []
     turned: str | None = None
     for file in files:
@@ -108,13 +116,15 @@ def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None]:
                     found = _INSIDE_OUT.search(line)
                     if found is not None and turned is None:
                         turned = f" (element {found[1]})" if found[1] else ""
+                    if any(words.lower() in line.lower() for words in WORDS):
+                        _add(full, line)
                     if _ERROR.search(line):
                         _add(errors, line)
                     if _LICENCE.search(line) and _REFUSED.search(line):
                         _add(refusals, line)
         except OSError:
             continue
-    return errors, refusals, turned
+    return errors, refusals, turned, full
 
 
 def _add(lines: list[str], line: str) -> None:
