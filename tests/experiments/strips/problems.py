@@ -85,7 +85,7 @@ def strip_tests(
         load = measured(model, law, noise, 10 * seed + k)
         scale = float(load.max()) if relative else 1.0
         objective = LoadObjective(model.elongations, model.elongations, load, scale)
-        tests.append(Comparison(name, model, MembraneSolver(), objective))
+        tests.append(Comparison(name, model, MembraneSolver(), objective, must_be_stable=False))
     return tuple(tests)
 
 
