@@ -209,7 +209,8 @@ def test_a_finished_run_is_not_repeated(tmp_path: Path, formula: Path) -> None:
 
 
 def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path) -> None:
-    done = bend(write_project(tmp_path, soft=FAILS), "--out", "failed", cwd=tmp_path)
+    done = bend(write_project(tmp_path, soft=FAILS), "--out", "failed", cwd=tmp_path, code=4)
+    one_line(done, "2 of 4 runs failed (150 mm, 90 kPa with soft: made to fail)", "--resume")
     runs = result_in(tmp_path / "failed")["runs"]
     assert [r["ended"] for r in runs] == ["failed: made to fail", "finished"] * 2
     assert "load_N" not in runs[0]
@@ -233,6 +234,10 @@ def test_when_nothing_ends_well_the_exit_code_is_4(tmp_path: Path) -> None:
     done = bend(project, "--out", "out", "--card", "soft", cwd=tmp_path, code=4)
     one_line(done, "formula: no run ended well: made to fail")
     assert not (tmp_path / "out" / "result.json").exists()
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "This failed, and there is no result. formula: no run ended well: made to fail" in page
+    for test in ("150 mm, 90 kPa", "high"):
+        assert f"{test} with soft: failed: made to fail" in page
 
 
 def test_a_process_that_dies_is_noticed(tmp_path: Path) -> None:

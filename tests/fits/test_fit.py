@@ -180,6 +180,42 @@ def test_the_best_start_is_the_one_run_again(fitted: bf.Fit):
         assert again.objective == pytest.approx(fitted.objective, abs=1e-9)
 
 
+def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path, monkeypatch):
+    """A start whose moduli give another objective from the unloaded state: exit 4, a page."""
+    ended = replace(fitted.best.ranked[0], objective=fitted.objective + 1e-3)
+    monkeypatch.setattr(
+        "bubblefit.fits.fit.run_starts", lambda *a: iter([replace(ended, number=0)])
+    )
+    arguments = ("bubble", fitted.project.path, "--starts", 1, "--out", "out", "--json")
+    in_process("bubble", fitted.project.path, "--starts", 1, "--out", "out", cwd=tmp_path, code=4)
+    for name in ("report.html", "result.json", "material.toml"):
+        (tmp_path / "out" / name).write_text("of an earlier fit")
+    done = in_process(*arguments, "--overwrite", cwd=tmp_path, code=4)
+    assert done.stdout == "" and len(done.stderr.splitlines()) == 1
+    for word in (
+        "start 0 ended with an objective of",
+        "from the unloaded state",
+        "more increments",
+    ):
+        assert word in done.stderr
+        assert word in (tmp_path / "out" / "report.html").read_text()
+    assert not (tmp_path / "out" / "result.json").exists()
+    assert not (tmp_path / "out" / "material.toml").exists()
+    # Its start is kept, so that going on says the same at once.
+    done = in_process(*arguments, "--resume", cwd=tmp_path, code=4)
+    assert "from the unloaded state" in done.stderr
+
+
+def test_starts_that_a_failure_ended_are_told(fitted: bf.Fit):
+    from bubblefit.fits.numbers import warnings_of
+
+    cut = replace(fitted.best.records[1], failure="killed by SIGKILL at once")
+    best_of = replace(fitted.best, records=[fitted.best.records[0], cut])
+    told = [w for w in warnings_of(replace(fitted, best=best_of), {}) if "starts ended" in w]
+    assert told == ["1 of 2 starts ended because membrane failed (killed by SIGKILL at once): "
+                    "--resume tries them again"]  # fmt: skip
+
+
 def test_two_bubbles_with_offsets_of_their_own(tmp_path: Path):
     project = bf.read_project(small(tmp_path, ("[fit]", SECOND)))
     fit = bf.fit(project, starts=1, jobs=1)

@@ -6,6 +6,7 @@ import csv
 import errno
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,30 @@ def begin(
         {"law": project, "data": "d"}, resume, overwrite, (STARTS, HISTORY)
     )
     return folder.begin(going_on)
+
+
+def test_a_start_that_the_solvers_failure_ended_is_run_again(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    begin(folder)
+    cut = replace(finished(1), status="calculix failed: killed", failure="killed")
+    for record in (evaluation(0, 1), finished(0), evaluation(1, 1), cut):
+        folder.add(record)
+    folder.finish()
+    again = Folder(tmp_path)
+    assert list(begin(again, resume=True)) == [0]
+    again.close()
+    rows = (tmp_path / HISTORY).read_text().splitlines()[1:]
+    assert [row.split(",")[0] for row in rows] == ["0"]
+
+
+def test_page_and_card_of_an_earlier_result_go(tmp_path: Path) -> None:
+    """Beside a later fit that failed they would pass for its own."""
+    begin(Folder(tmp_path)).clear()
+    for name in (RESULT, "report.html", "material.toml", "notes.txt"):
+        (tmp_path / name).write_text("of the first fit")
+    begin(Folder(tmp_path), overwrite=True)
+    kept = {path.name for path in tmp_path.iterdir()}
+    assert "notes.txt" in kept and not kept & {RESULT, "report.html", "material.toml"}
 
 
 def study(path: Path) -> Folder:

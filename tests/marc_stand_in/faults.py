@@ -20,6 +20,7 @@ FAULTS = {
     "code0": "as 3015, and the return code is 0",
     "code1": "ends well, and the return code is 1",
     "licence": "no licence: nothing begins",
+    "disk full": "half-way a file cannot be written: it says so, and gives no exit number",
     "stale": "no licence, and what an earlier job left (the files in the folder `stale`) is there",
     "killed": "half-way the process is gone",
     "truncated": "ends well, and half of the .t19 is there",

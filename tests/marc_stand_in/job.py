@@ -48,6 +48,10 @@ def run(command: Command, environment: Mapping[str, str] | None = None) -> tuple
         journals.end(None)
         (command.folder / f"{command.job}.sts").unlink()
         return NOT_COMPILED, f"{error}\n compile or link error\n Exit number {NOT_COMPILED}"
+    except OSError as error:
+        journals.error(f"write error: {error.strerror}")
+        journals.end(None)
+        return 1, f"write error: {error.strerror}"
     except Ended as end:
         number = end.number
         if end.problem:

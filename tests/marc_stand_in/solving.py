@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+
 import numpy as np
 from bubblefit.errors import BubblefitError
 from bubblefit.materials.law import HypoelasticLaw
@@ -108,6 +111,8 @@ class Running:
 
     def _halfway(self, i: int, time: float, u: np.ndarray) -> None:
         self.fault.hang_or_die()
+        if self.fault.is_("disk full"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         if self.fault.is_("3015", "code0"):
             raise Ended(NO_SMALLER_STEP, "unable to reduce time step below minimum")
         if self.fault.is_("early"):

@@ -39,6 +39,7 @@ def failure(marc, fault, timeout=None, **settings):
         ("truncated", 3004, ["no usable results", "truncated"]),
         ("inside out", 3004, ["an element was turned inside out", "(element 1)"]),
         ("early", 3004, ["ended at time 2 of 4"]),
+        ("disk full", None, ["disk full after increment 2: ", "No space left on device"]),
         ("silent", None, ["wrote no job.sts", "is this Marc?"]),
     ],
 )
