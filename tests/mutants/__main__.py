@@ -39,6 +39,8 @@ def main(
 ) -> None:
     """Mutants of FILES (of all rooms that assess, report, resume, validate and convert units)."""
     end = time.monotonic() + 60.0 * minutes if minutes else float("inf")
+    # A sixth of the time at most for one mutant.
+    limit = min(limit, 10.0 * minutes) if minutes else limit
     chosen = list(files) or (rooms.changed(changed) if changed else rooms.files())
     if not chosen:
         click.echo("nothing to mutate: no file of these rooms was changed")

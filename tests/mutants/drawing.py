@@ -16,8 +16,8 @@ from .operators import operators
 #: How a figure looks, which is judged by eye: arguments of matplotlib.
 LOOKS = {
     "alpha", "capsize", "clip_on", "dpi", "figsize", "fontsize", "frameon", "handlelength",
-    "hspace", "labelpad", "linewidth", "linewidths", "markersize", "ncol", "ncols", "pad",
-    "rotation", "wspace", "zorder",
+    "hspace", "labelpad", "labelsize", "linewidth", "linewidths", "markersize", "ncol", "ncols",
+    "pad", "rotation", "wspace", "zorder",
 }  # fmt: skip
 
 

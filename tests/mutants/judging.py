@@ -17,7 +17,7 @@ from .house import environment, instead
 from .measured import Measured
 
 #: A test that takes this many times its own time, and so many seconds, runs for ever.
-PATIENCE = (8.0, 30.0)
+PATIENCE = (4.0, 20.0)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Measured:
     seconds: dict[str, float]
 
     def tests(self, file: str, first: int, last: int, limit: float) -> list[str]:
-        """Those that run a line of a statement, for a line that runs at import those of the file.
+        """Those that run a line of a statement; if it runs at import, those of the file, or all.
 
         Tests of the module's own name first, then the quick ones, for `limit` seconds in all.
         """
@@ -42,7 +42,9 @@ class Measured:
         found = set().union(*(known.get(line, set()) for line in range(first, last + 1)))
         if found <= {""}:
             at_import = any(line in known for line in range(first, last + 1))
-            found = set().union(*known.values()) if at_import else set()
+            found = set().union(*known.values()) - {""} if at_import else set()
+            # Nothing but declarations: any test may show it.
+            found = found or ({*self.seconds} if at_import else found)
         own = f"test_{Path(file).stem}"
         order = sorted(found & {*self.seconds}, key=lambda test: (own not in test, self.cost(test)))
         total, chosen = 0.0, []

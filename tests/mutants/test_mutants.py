@@ -77,6 +77,9 @@ def test_tests_of_a_line():
     assert known.tests("fits/store.py", 2, 3, 6.0) == ["test_store.py::own", "t::quick"]
     assert len(known.tests("fits/store.py", 1, 1, 60.0)) == 3  # runs when the module is loaded
     assert known.tests("fits/store.py", 7, 7, 60.0) == []
+    # A module of declarations: no test runs a line of it, and any may show it.
+    declared = Measured({"fits/schema.py": {1: {""}}}, known.seconds)
+    assert sorted(declared.tests("fits/schema.py", 1, 1, 60.0)) == sorted(known.seconds)
 
 
 def test_tests_near_a_module():
@@ -143,11 +146,11 @@ def test_caught_survived_and_unrun(little: Path):
     assert found["return 1e3 / mpa"].by == "tests/rooms/test_scale.py::test_kpa"
     verdicts = list(found.values())
     assert listing.summary(verdicts) == (
-        "5 mutants: 3 caught, 1 survived, 1 in lines that no test runs"
+        "5 mutants: 3 caught, 1 survived, 1 in lines that no test near them runs"
     )
     assert listing.survivors(verdicts) == (
         "rooms/scale.py:6\n  - return mpa > 2\n  + return mpa > 3\n  (1 tests run it and pass)\n"
-        "rooms/scale.py:14\n  - return mpa * 5\n  + return mpa // 5\n  (no test runs it)"
+        "rooms/scale.py:14\n  - return mpa * 5\n  + return mpa // 5\n  (no test near it runs it)"
     )
 
 
