@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,8 @@ import pytest
 from bubblefit.cli.main import main
 from bubblefit.fits.project import read_project
 from click.testing import CliRunner, Result
+
+from ..commands import bubblefit
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
 GAUGE = ["--lower", *LOWER, "--upper", *UPPER]
@@ -109,14 +109,8 @@ def test_from_pictures_to_a_project(tmp_path):
     write_frames(tmp_path / "frames", LOST)
     machine_export(tmp_path, end=5.3)
     pairing = "--loads machine.csv --frame-interval 0.5 --direction Warp".split()
-    command = [sys.executable, "-m", "bubblefit.cli", "gauge", "frames/f*.csv", *GAUGE, *pairing]
-    done = subprocess.run(
-        [*command, "--specimen", "W 1", "--out", "w1.csv"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    command = ("gauge", "frames/f*.csv", *GAUGE, *pairing, "--specimen", "W 1", "--out", "w1.csv")
+    done = bubblefit(*command, cwd=tmp_path)
     assert "correlation lost in 2 of 12 frames (4, 7)" in done.stderr
     assert "1 of 12 frames have no load at their time: 11" in done.stderr
     for words in ("gauge length 20.026 mm; 12 frames, lost in 2", "correlation lost: f4.csv, f7.c"):

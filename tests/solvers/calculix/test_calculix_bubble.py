@@ -37,6 +37,8 @@ TRILINEAR = HypoelasticLaw.trilinear(
     [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
 )  # fmt: skip
 PRESSURES = (0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.3)
+#: As far in fewer, larger increments; a spline's moduli change too much within them.
+SOME = (0.059, 0.132, 0.3)
 AGREEMENT = 0.003  # of the apex height
 
 
@@ -61,10 +63,10 @@ def differences(element, model, law):
     ("element", "elements", "law", "pressures"),
     [
         ("S8R", 432, CUBIC, PRESSURES),
-        ("S8R", 432, LINEAR, PRESSURES),
-        ("S8R", 432, TRILINEAR, PRESSURES),
+        ("S8R", 432, LINEAR, SOME),
+        ("S8R", 432, TRILINEAR, SOME),
         ("S8R", 432, LAWS["spline"], PRESSURES),
-        ("S4", 1728, LINEAR, PRESSURES),
+        ("S4", 1728, LINEAR, SOME),
         ("S4", 3072, CUBIC, PRESSURES[:-1]),
     ],
     ids=["S8R-cubic", "S8R-linear", "S8R-trilinear", "S8R-spline", "S4-linear", "S4-cubic"],

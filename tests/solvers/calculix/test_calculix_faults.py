@@ -23,6 +23,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 
 from ... import needs
+from ...commands import bubblefit
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 STA = """SUMMARY OF JOB INFORMATION
@@ -346,8 +347,7 @@ def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
     """Run 1 makes the data; run 2, the first of the first start, is killed."""
     script = f"echo x >> {tmp_path}/runs; [ $(wc -l < {tmp_path}/runs) = 2 ] && kill -9 $$\n"
     command = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", "1"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    bubblefit(*command[3:], cwd=tmp_path)
     with (tmp_path / "out" / "history.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["solver"] == "calculix"]
     assert "killed by SIGKILL" in rows[0]["status"]
