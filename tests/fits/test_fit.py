@@ -176,6 +176,9 @@ def test_the_best_start_is_the_one_run_again(fitted: bf.Fit):
         records = [best.replace(r, number=number) for number, r in enumerate(records)]
         again = best.best_fit(fitted.problem, records, fitted.project.fit.tolerance)
         assert again.ranked[0].number == k
+        # All records, in their order, and the best with the objective of the repeated run.
+        assert [r.number for r in again.records] == [r.number for r in records]
+        assert [r is again.ranked[0] for r in again.records] == [r.number == k for r in records]
         np.testing.assert_array_equal(again.law.beta, fitted.law.beta)
         assert again.objective == pytest.approx(fitted.objective, abs=1e-9)
 

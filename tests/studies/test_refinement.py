@@ -65,6 +65,7 @@ def test_order_and_limit_of_a_known_error(bars: BarSolver) -> None:
     assert quantity["own_error"] == pytest.approx(0.01 / 4**2, rel=1e-6)
     assert [run.level.elements for run in study.runs[name]] == [8, 32, 128, 512]
     assert [run.level.factor for run in study.runs[name]] == [0.5, 1.0, 2.0, 4.0]
+    assert all(0.0 <= run.seconds < 60.0 for run in study.runs[name])
     assert (steps[0].part, steps[0].analysis, steps[0].analyses) == ("a bar", 1, 4)
     assert steps[-1].done == steps[-1].increments == 4 and bars.progress is None
     assert study.result["solver"] == "bars" and study.result["card"] == "soft"
