@@ -115,6 +115,8 @@ def _quick(
 
     separator, width = layout.separator, len(layout.headings)
     texts = [text for _, text in layout.body]
+    if separator is None and {len(text.split()) for text in texts} != {width}:
+        return None
     if separator is not None:
         # pandas takes what it needs of a row that is too long, so that a cell with a decimal
         # comma would shift the rest.
@@ -167,7 +169,8 @@ def _slow(
         if row is None:
             problem = "a quotation mark that is opened and not closed"
             raise InputError(path, f"line {number}", problem)
-        if any(row[width:]):
+        # Blanks leave no empty cells: a short row has lost its place.
+        if any(row[width:]) or (layout.separator is None and len(row) < width):
             problem = f"expected {width} cells as in the header, found {len(row)}"
             if layout.separator == ",":
                 problem += "; decimal commas need another separator, or quotation marks"

@@ -116,7 +116,7 @@ def _best_header(
     lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
 ) -> tuple[int, str | None, list[str]] | None:
     """The row of names that tells most quantities, by any separator: index, separator, names."""
-    best: tuple[tuple[int, bool, int], int, str | None, list[str]] | None = None
+    best: tuple[tuple[int, bool, bool, bool, int], int, str | None, list[str]] | None = None
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:TOP]):
             names = cells_of(text, separator)
@@ -125,9 +125,12 @@ def _best_header(
             columns = columns_of([heading_of(name) for name in names], named, upper)
             known = {key.split()[0] for key, where in columns.items() if where}
             hits = len(known & {*quantities})
-            rows = (cells_of(text, separator) for _, text in lines[index + 1 : index + 3])
-            below = any(row is not None and _is_numbers(row) for row in rows)
-            score = (hits, below, len(names))
+            rows = [cells_of(text, separator) for _, text in lines[index + 1 : index + 3]]
+            numbers = [row for row in rows if row is not None and _is_numbers(row)]
+            # A heading with a blank in it makes more names than there are numbers.
+            fits = any(len(names) == len(row) - (not row[-1]) for row in numbers)
+            fits = fits or any(len(names) == len(row) for row in numbers)
+            score = (hits, bool(numbers), fits, separator is not None, len(names))
             if hits >= 2 and (best is None or score > best[0]):
                 best = score, index, separator, names
     return None if best is None else best[1:]

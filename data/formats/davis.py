@@ -19,11 +19,11 @@ from ..frames import Frame, FrameOptions
 from ..registry import Format, register_format
 from ..text_frames import read_text_rows
 
-_NAMES = re.compile(rb"\bx-displacement ?\[", re.IGNORECASE)
+_NAMES = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether a column is called x-displacement, with a unit right behind."""
+    """Whether columns are called x and x-displacement, with a unit right behind."""
     return bool(_NAMES.search(head[:4096]))
 
 

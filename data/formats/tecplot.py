@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -90,9 +91,8 @@ def _numbers(
         kind = f"{packing} {keys.get('ZONETYPE', '')}".strip()[:40]
         problem = f"a zone of points as POINT or BLOCK is needed, this is {kind!r}"
         raise InputError(path, f"line {line}", problem)
-    tokens = " ".join(text for _, text in lines).replace(",", " ").split()
     try:
-        flat = np.array(tokens, dtype=float)
+        flat = _flat([text for _, text in lines], width)
     except ValueError:
         raise InputError(path, *_first_bad(lines)) from None
     if flat.size == 0 or flat.size % width:
@@ -104,6 +104,24 @@ def _numbers(
         problem = f"the zone says {said} points, its numbers are {flat.size // width}"
         raise InputError(path, f"line {line}", problem)
     return flat.reshape(-1, width) if packing == "POINT" else flat.reshape(width, -1).T
+
+
+def _flat(lines: list[str], width: int) -> NDArray[np.float64]:
+    """All numbers, as they follow each other: rows of one length by pandas' reader.
+
+    Raises
+    ------
+    ValueError : some are no numbers.
+    """
+    import pandas as pd
+
+    if {len(line.split()) for line in lines} == {width} and not any("," in line for line in lines):
+        table = pd.read_csv(
+            StringIO("\n".join(lines)), sep=r"\s+", header=None, dtype=float, keep_default_na=False,
+            na_values=["nan", "NaN", "NAN"],
+        )  # fmt: skip
+        return table.to_numpy().ravel()
+    return np.array(" ".join(lines).replace(",", " ").split(), dtype=float)
 
 
 def _first_bad(lines: list[tuple[int, str]]) -> tuple[str, str]:

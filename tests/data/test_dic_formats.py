@@ -99,6 +99,54 @@ def test_one_file_with_all_frames_may_begin_with_the_reference(frames, tmp_path)
     assert "expected one frame for each of 2 pressures, found 4" in message
 
 
+TECPLOT = """\
+TITLE = "a"
+VARIABLES = x, y
+"dx", "dy" "dz" "valid"
+ZONE I=2, J=1, F=BLOCK
+1 2 3 4
+0.1 0.2 0.3
+0.4 0.5 0.6
+1 0
+ZONE T="next" I=1 DATAPACKING=POINT
+1 3 0.7 0.8 0.9 1
+"""
+
+
+def test_tecplot_zones_are_frames_in_points_or_blocks(tmp_path):
+    path = tmp_path / "a.dat"
+    path.write_text(TECPLOT)
+    first, second = read_fields([path], [0.1, 0.2])
+    np.testing.assert_array_equal(first.points, [[1, 3]])
+    np.testing.assert_array_equal(first.displacement, [[0.1, 0.3, 0.5]])
+    np.testing.assert_array_equal(second.displacement, [[0.7, 0.8, 0.9]])
+    for old, new, words in (
+        ("0.5 0.6", "0.5 x.6", "line 7: expected numbers, found '0.4 0.5 x.6'"),
+        ("0.5 0.6", "0.5 0.6.1", "line 7: expected a number, found '0.6.1'"),
+        ("0.4 0.5 0.6", "0.4 0.5", "line 4: expected 6 numbers a point, found 11 numbers"),
+        ("I=2", "I=3", "line 4: the zone says 3 x 1 points, its numbers are 2"),
+        ("F=BLOCK", "F=FEPOINT", "a zone of points as POINT or BLOCK is needed"),
+        ('"dz"', '"p"', "planar correlation, without dz; a stereo one is needed"),
+        ('"dy"', '"p"', "no column of dy; name them with columns"),
+    ):
+        path.write_text(TECPLOT.replace(old, new))
+        assert words in complaint(read_fields, [path], [0.1, 0.2])
+
+
+def test_a_short_row_is_not_filled_up_where_blanks_separate(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("x y dx dy dz\n1 2 3 4 5\n1 2 3 4\n")
+    message = complaint(read_fields, [path], [0.1])
+    assert "line 3: expected 5 cells as in the header, found 4" in message
+
+
+def test_names_in_a_comment_above_the_numbers(tmp_path):
+    path = tmp_path / "a.csv"
+    np.savetxt(path, [[1, 2, 3, 4, 5]], delimiter=",", header="made by us\nx,y,dx,dy,dz")
+    (field,) = read_fields([path], [0.1])
+    np.testing.assert_array_equal(field.displacement, [[3, 4, 5]])
+
+
 @pytest.mark.parametrize("version", [5, 7.3])
 def test_ncorr_is_planar(version, tmp_path):
     column, row = (grid.ravel() for grid in np.meshgrid(np.arange(1, 40), np.arange(1, 20)))
