@@ -1,0 +1,176 @@
+"""Every fault of every solver in every command, and docs/reference/failures.md beside it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from bubblefit.experiments.base import Exhibit
+from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.identification import correction
+from bubblefit.solvers import process
+
+from ..commands import in_process, result_in
+from ..failure_cases import MARC, failing_ccx
+from ..marc_stand_in_runs import stand_in
+from ..places import EXAMPLES, ROOT
+
+TEXT = (ROOT / "docs" / "reference" / "failures.md").read_text()
+FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collapse")
+COMMANDS = ("bubble", "uniaxial", "bend")
+#: A row of the table of reasons: fault, solver, and a reason a command.
+ROW = re.compile(r"^\| ([a-z -]+) \| (CalculiX|Marc) \| (.*) \|$", re.MULTILINE)
+REASONS = {
+    (fault, solver.lower(), command): cell.strip("` ")
+    for fault, solver, cells in ROW.findall(TEXT)
+    for command, cell in zip(COMMANDS, cells.split(" | "), strict=True)
+}
+HEAD = "[fabric]\nthickness = 0.81\n"
+BUBBLE = """
+[law]
+form = "constant"
+[law.bounds]
+lower = [0.03, 0.3, 0.3]
+upper = [0.2, 1.0, 1.0]
+[[bubble]]
+radius = 100.0
+pressures = [22, 59]
+elements = 32
+symmetry = "quarter"
+[bubble.data.known_solution]
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+"""
+BEND = """
+[[cylinder]]
+name = "tube"
+diameter = 150
+pressure = 140
+element_size = 60.0
+deflections = [2.0, 4.0]
+places = [4.0]
+slope_over = 2.0
+[[card]]
+name = "known"
+strain_range = [0.13, 0.13, 0.13]
+beta = [-7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1, -9.31830e-1,
+  1.39437e-1, -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1]
+"""
+
+
+def strips() -> str:
+    text = (EXAMPLES / "uniaxial-valmex7318/project.toml").read_text()
+    text = text.replace("increments = 100", "increments = 4").replace('"cubic"', '"constant"')
+    return text[: text.index("[fit]")]
+
+
+def test_the_table_is_whole() -> None:
+    assert set(REASONS) == {
+        (fault, solver, command)
+        for fault in FAULTS for solver in ("calculix", "marc") for command in COMMANDS
+    }  # fmt: skip
+    never = {key for key, reason in REASONS.items() if reason.startswith("cannot occur")}
+    assert never == {("no licence", "calculix", command) for command in COMMANDS}
+
+
+class Stage:
+    """A folder with a project whose solver fails."""
+
+    def __init__(self, folder: Path, fault: str, solver: str, command: str, real: Path) -> None:
+        self.folder, self.command, self.solver = folder, command, solver
+        text = {"bubble": HEAD + BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
+        if command == "uniaxial":
+            shutil.copy(EXAMPLES / "uniaxial-valmex7318/curves.csv", folder)
+        # What is known is computed first; a cylinder collapses when it is bent.
+        self.first = 1 if command == "bubble" else 0
+        late = fault == "collapse" and command == "bend"
+        settings = {"scratch": str(folder / "scratch")}
+        self.place = folder / solver
+        if solver == "calculix":
+            self.place.mkdir()
+            settings |= {"ccx": str(failing_ccx(self.place, real)), "element": "S4"}
+            (self.place / "fault").write_text(f"{fault} late" if late else fault)
+        else:
+            marc = stand_in(self.place)
+            settings |= {"executable": str(marc.program), "increments": "0"}
+            runs = "2" if late else ",".join(map(str, range(1 + self.first, 9)))
+            marc.told(f"{MARC[fault]}@{runs}")
+        (self.place / "good").write_text("1\n" if self.first or late else "")
+        lines = [f"{k} = {v if v[0].isdigit() else repr(v)}" for k, v in settings.items()]
+        (folder / "scratch").mkdir()
+        (folder / "project.toml").write_text(
+            f'{text}\n[fit]\nstarts = 1\nsolver = "{solver}"\n[solver.{solver}]\n'
+            + "\n".join(lines) + "\n"
+        )  # fmt: skip
+
+    @property
+    def runs(self) -> int:
+        path = self.place / "runs"
+        return len(path.read_text().splitlines()) if path.exists() else 0
+
+    def monotonic(self) -> float:
+        """A clock that has gone far beyond every time limit when the program is at rest."""
+        return time.monotonic() + (1e6 if (self.place / "pids").exists() else 0.0)
+
+    def run(self, *more: str, code: int):
+        (self.place / "pids").unlink(missing_ok=True)
+        return in_process(self.command, "project.toml", "--out", "out", "--jobs", 1, "--quiet",
+                          *more, cwd=self.folder, code=code)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One run that fails ends a start, and nothing is drawn."""
+    monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
+    monkeypatch.setattr(correction, "MOST_SHORTER", 0)
+    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+
+
+def of(text: str) -> re.Pattern[str]:
+    """A reason of the table, in which N is any number and ... anything."""
+    found = re.escape(text).replace(r"\.\.\.", ".*?")
+    return re.compile(re.sub(r"\bN\b", r"[0-9.]+", found))
+
+
+@pytest.mark.parametrize(
+    ("fault", "solver", "command"),
+    [key for key, reason in REASONS.items() if not reason.startswith("cannot occur")],
+)
+def test_a_fault_is_told_as_the_document_says(
+    ccx, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, solver: str, command: str
+) -> None:
+    reason = REASONS[fault, solver, command]
+    stage = Stage(tmp_path, fault, solver, command, ccx.path)
+    monkeypatch.setattr(process, "time", stage)
+    out = tmp_path / "out"
+    if reason.startswith("stopped at"):
+        done = stage.run(code=0)
+        page = (out / "report.html").read_text().replace("\u00a0", " ")
+        ended = result_in(out)["runs"][0]["ended"]
+        for told in (done.stdout, page, ended, (out / "runs.csv").read_text()):
+            assert of(reason).search(told), told
+        before = stage.runs
+        stage.run("--resume", code=0)
+        assert stage.runs == before and result_in(out)["runs"][0]["ended"] == ended
+        return
+    done = stage.run("--json", code=4)
+    page = (out / "report.html").read_text()
+    assert "This failed, and there is no result." in page
+    for told in (done.stderr, page):
+        assert of(reason).search(told) and "scratch kept in" in told, told
+    first = "no run ended well" if command == "bend" else "no start ended with a fit"
+    assert done.stderr.startswith(f"bubblefit: {solver}: {first}: ") and done.stdout == ""
+    assert not (out / "result.json").exists()
+    kept = Path(re.search(r"scratch kept in (\S+?)(;|$)", done.stderr.splitlines()[0])[1])
+    assert kept.is_dir() and kept.parent == tmp_path / "scratch"
+    if command != "bend":
+        assert of(reason).search((out / "history.csv").read_text())
+    before = stage.runs
+    if solver == "calculix" or fault == "no licence":
+        (stage.place / "good").write_text(f"{before + 1}\n" if stage.first else "")
+        if solver == "marc":
+            (stage.place / "fault").write_text(f"licence@{before + 1 + stage.first}")
+        stage.run("--resume", code=4)
+        assert stage.runs > before + stage.first
