@@ -105,7 +105,7 @@ def columns_of(
     """The columns that may hold each quantity; deformed coordinates are those of "x deformed".
 
     Of several, those with a unit of length come before those without, which come before pixels;
-    a column of exactly the quantity's own name before all.
+    a column of exactly the quantity's own name before all, unless `upper`.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def columns_of(
 
 def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) -> list[int]:
     own = [i for i in where if headings[i].name == key]
-    if own:
+    if own and not upper:
         return own
 
     def rank(index: int) -> tuple[int, int]:

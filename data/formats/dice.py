@@ -20,9 +20,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from ...errors import InputError
 from ..frame_rows import frame_of
 from ..frames import Frame, FrameOptions
 from ..registry import Format, register_format
+from ..tables import read_lines
 from ..text_frames import read_text_rows
 
 #: The states of DICe.h in which a subset was found; all others are failures of some step.
@@ -40,6 +42,10 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """The one frame of a file; without a stereo model it is refused."""
+    top = "\n".join(text for _, text in read_lines(path, "***", any_encoding=True)[:3])
+    if NAMES["x"] not in top and not options.columns:
+        problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
+        raise InputError(path, "", problem)
     status = ("STATUS_FLAG", SUCCESSFUL)
     rows = read_text_rows(
         path, options, comment="***", names=NAMES, status=status, camera_axes=True

@@ -140,6 +140,40 @@ def test_a_short_row_is_not_filled_up_where_blanks_separate(tmp_path):
     assert "line 3: expected 5 cells as in the header, found 4" in message
 
 
+def test_small_letters_of_vic3d_are_places_in_the_picture(tmp_path):
+    path = tmp_path / "old.csv"
+    heads = ", ".join(f'"{name}"' for name in ("x", "y", "u", "v", *"XYZUVW", "sigma"))
+    path.write_text(f"{heads}\n500,400,3,4,1,2,3,0.1,0.2,0.3,0.01\n0,0,0,0,0,0,0,0,0,0,-1\n")
+    (field,) = read_fields([path], [0.1])
+    assert field.source.format == "vic3d" and field.dropped == {"sigma below zero": 1}
+    np.testing.assert_array_equal(np.append(field.points, field.z), [1, 2, 3])
+    np.testing.assert_array_equal(field.displacement, [[0.1, 0.2, 0.3]])
+    # In a table of unknown origin nobody can tell.
+    message = complaint(read_fields, [path], [0.1], format="csv")
+    assert "the column of dx may be 'u' or 'U'; name one with columns" in message
+
+
+def test_both_states_without_displacements(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "x undeformed [mm];y undeformed [mm];z undeformed [mm];"
+        "x deformed [mm];y deformed [mm];z deformed [mm]\n1;2;3;1.5;2.25;13\n"
+    )
+    (field,) = read_fields([path], [0.1])
+    np.testing.assert_array_equal(field.points, [[1, 2]])
+    np.testing.assert_array_equal(field.displacement, [[0.5, 0.25, 10]])
+    assert "displacements along x, y, z are deformed less reference places" in field.source.notes
+
+
+def test_dice_without_a_stereo_model_is_refused(tmp_path):
+    path = tmp_path / "DICe_solution_0.txt"
+    path.write_text(
+        "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA\n0,9,9,1,1,0.1\n"
+    )
+    message = complaint(read_fields, [path], [0.1])
+    assert "has no MODEL_COORDINATES_X: planar and in pixels; run DICe with a stereo" in message
+
+
 def test_names_in_a_comment_above_the_numbers(tmp_path):
     path = tmp_path / "a.csv"
     np.savetxt(path, [[1, 2, 3, 4, 5]], delimiter=",", header="made by us\nx,y,dx,dy,dz")

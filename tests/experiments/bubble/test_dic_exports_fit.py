@@ -61,8 +61,12 @@ def test_the_fit_is_the_same_and_says_what_was_read(bubble, tmp_path):
         folder = tmp_path / case
         folder.mkdir()
         path = project_of(bubble, folder, case)
-        in_process("bubble", path, "--starts", 1, "--jobs", 1, "--out", folder / "out", cwd=folder)
+        done = in_process(
+            "bubble", path, "--starts", 1, "--jobs", 1, "--out", folder / "out", cwd=folder
+        )
         results.append(result_in(folder / "out"))
+    assert "data: y and z are turned over" in done.output
+    assert "data: x, y, z are places in the deformed state" in done.output
     plain, other = results
     np.testing.assert_allclose(other["beta"]["values"], plain["beta"]["values"], rtol=1e-6)
     assert plain["data"]["dropped"] == {} and plain["data"]["read"]["format"] == "csv"
