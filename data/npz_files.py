@@ -59,7 +59,7 @@ def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str
         version = npy.read_magic(stream)
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, dtype = read(stream)
-        if dtype.hasobject or dtype.kind not in "fiubU":
+        if dtype.kind not in "fiubU":
             problem = "holds Python objects or records, which are not read: save plain numbers"
             raise InputError(path, f"array {name!r}", problem)
         size = math.prod(shape) * dtype.itemsize

@@ -120,6 +120,8 @@ def test_tecplot_zones_are_frames_in_points_or_blocks(tmp_path):
     np.testing.assert_array_equal(first.points, [[1, 3]])
     np.testing.assert_array_equal(first.displacement, [[0.1, 0.3, 0.5]])
     np.testing.assert_array_equal(second.displacement, [[0.7, 0.8, 0.9]])
+    # Only a first frame in which nothing moves is a reference.
+    assert "for each of 1 pressures, found 2" in complaint(read_fields, [path], [0.1])
     for old, new, words in (
         ("0.5 0.6", "0.5 x.6", "line 7: expected numbers, found '0.4 0.5 x.6'"),
         ("0.5 0.6", "0.5 0.6.1", "line 7: expected a number, found '0.6.1'"),

@@ -226,3 +226,20 @@ def test_real_points(shared_data, tmp_path):
     scatter = [s.scatter for s in p.strips.values()]
     assert scatter == pytest.approx([21.7, 64.1, 40.3], abs=0.05)
     assert p.reach.strain == pytest.approx((ENDS["warp"], ENDS["fill"], 2 * ENDS["bias"]))
+
+
+def test_loads_per_width_are_multiplied_by_the_strips_own(small, tmp_path):
+    per_width = (tmp_path / "w1.csv").read_text().replace("mm,kN,sec", "mm,kN/m,sec")
+    (tmp_path / "w1.csv").write_text(per_width)
+    for width, said in ((25.0, ""), (50.0, "width = 50.0\n")):
+        first, _ = small(("[warp]", f"{said}[warp]")).strips["warp"].curves
+        np.testing.assert_allclose(first.load, 0.2 * first.elongation * width, rtol=1e-9, atol=1e-9)
+
+
+def test_a_choice_of_columns_is_kept_for_the_report(small, tmp_path):
+    text = (tmp_path / "b.csv").read_text().replace("Tensile stress", "Crosshead [mm]")
+    (tmp_path / "b.csv").write_text(text.replace("(MPa)", "(mm)"))
+    curves = small().strips["bias"].curves
+    assert len(curves) == 2
+    for curve in curves:
+        assert "the elongation is column 'Extension', not 'Crosshead [mm]'" in curve.notes[0]
