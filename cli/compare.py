@@ -36,6 +36,7 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     a folder for each form, into the output folder.
     """
     from ..fits.store import usual_folder
+    from ..notes import lines as note_lines
     from ..studies.law_words import lines_of
     from ..studies.laws import STARTS, compare_laws
 
@@ -61,7 +62,11 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
         )
     comparison.report(folder)
     result = comparison.result
-    lines = [*lines_of(result), f"written to {folder} (open report.html)"]
+    lines = [
+        *lines_of(result),
+        *note_lines(comparison.notes),
+        f"written to {folder} (open report.html)",
+    ]
     click.echo(json.dumps(result, indent=1) if options["as_json"] else "\n".join(lines))
 
 

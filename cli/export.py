@@ -12,6 +12,7 @@ from ..errors import InputError, OutputError
 from ..materials.card import read_card
 from ..materials.exports.base import Export
 from ..materials.exports.formats import Option, options_of
+from ..notes import rows
 from ..solvers.exports import FORMATS
 from ..writing import replacing
 from .options import exits
@@ -72,6 +73,7 @@ def command(
     if as_json:
         said = {"carries": export.says.carries, "loses": export.says.loses}
         content = {"format": name, **said, "confirm": export.says.confirm}
+        content["notes"] = rows(export.says.notes)
         click.echo(json.dumps({"files": [str(path) for path in paths], **content}, indent=1))
         return
     for line in export.says.lines():

@@ -108,6 +108,7 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
     import numpy as np
 
     from ..fits.page import sigma_words
+    from ..notes import lines as note_lines
 
     result, best = fit.result, fit.best
     runs = result["external_runs"]
@@ -127,5 +128,4 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
             for name, s in sigmas.items()
         )
         lines.append(f"1 sigma from {source}: {parts}")
-    lines += [f"note: {words}" for words in result["warnings"]]
-    return [*lines, f"written to {folder} (open report.html)"]
+    return [*lines, *note_lines(fit.notes), f"written to {folder} (open report.html)"]

@@ -18,6 +18,7 @@ from ..data.gauge import virtual_strain_gauge
 from ..data.gauge_loads import PairedLoads, loads_at_frames
 from ..data.gauge_table import GaugeTable
 from ..errors import InputError, OutputError
+from ..notes import lines as note_lines
 from ..sections import LENGTH_UNITS
 from .options import exits
 
@@ -100,13 +101,18 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         # At once: should the loads be refused, this may be why.
         for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
             click.echo(f"note: {words}", err=True)
-        for words in table.warnings:
-            click.echo(f"warning: {words}", err=True)
+        said = table.notes
+        for one in said:
+            click.echo(f"warning: {one.line}", err=True)
         if loads is not None:
             table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
-    click.echo(json.dumps(result, indent=1) if options["as_json"] else _lines(result))
+    if options["as_json"]:
+        click.echo(json.dumps(result, indent=1))
+        return
+    more = [note for note in table.notes if note not in said]
+    click.echo("\n".join([*_lines(result), *note_lines(more), f"written to {out}"]))
 
 
 def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
@@ -169,7 +175,7 @@ def _option(found: re.Match[str]) -> str:
     return f"--{found[0].replace('_', '-')}"
 
 
-def _lines(result: Mapping[str, Any]) -> str:
+def _lines(result: Mapping[str, Any]) -> list[str]:
     """The outcome in words."""
     end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
     lines = [
@@ -180,14 +186,12 @@ def _lines(result: Mapping[str, Any]) -> str:
     if result["lost"]:
         lines.append(f"correlation lost: {_few(result['lost'])}")
     if "points" in result:
-        if result["without_load"]:
-            lines.append(f"left out, no load: {_few(result['without_load'])}")
         lines.append(f"{result['points']} points, loads up to {result['largest_load_N']:.5g} N")
         lines.append(
             f"in a project: [strips.{result['direction']}] gauge_length = {length}, and"
             f" [strips.data] files = [{Path(result['out']).name!r}]"
         )
-    return "\n".join([*lines, f"written to {result['out']}"])
+    return lines
 
 
 def _few(names: Sequence[str], most: int = 8) -> str:

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..notes import Note, NoteKind
 
 
-def frame_files(given: Sequence[str], field: str = "files") -> tuple[list[Path], str | None]:
+def frame_files(given: Sequence[str], field: str = "files") -> tuple[list[Path], Note | None]:
     """The files, and a note where their order looks unmeant.
 
     given : names of files, taken in this order, and patterns, whose files are sorted by the
@@ -45,13 +46,14 @@ def _numbers(file: Path) -> list[tuple[bool, int, str]]:
     return [(not p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]
 
 
-def _shell_order(files: list[Path]) -> str | None:
+def _shell_order(files: list[Path]) -> Note | None:
     """A shell sorts frame_10 before frame_2: perhaps not the order of the test."""
     by_number = sorted(files, key=_numbers)
     if by_number == files or sorted(files, key=str) != files:
         return None
     first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
-    return (
+    words = (
         f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
         " them by number"
     )
+    return Note(NoteKind.ORDER, words)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..notes import Note, NoteKind
 from .curves import LoadCurve, direction_named
 from .frames import Frame
 from .surface_points import Surface, place_of, triangulated, usual_edge
@@ -41,7 +42,7 @@ class GaugeRecord:
     strain: Array
     log_strain: Array
     lost: tuple[int, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
 
 
 def virtual_strain_gauge(
@@ -102,14 +103,15 @@ def virtual_strain_gauge(
             problem = f"lost in every frame ({first}); move it onto the correlated surface"
             raise InputError(frames[0].path, at, problem)
         which = ", ".join(map(str, why))
-        warnings.append(
+        words = (
             f"{at}: correlation lost in {len(why)} of {len(frames)} frames ({which}): {first};"
             " these give no length. Move the gauge to keep them"
         )
+        warnings.append(Note(NoteKind.LOST, words))
     return _record(places[0], places[1], tuple(warnings))
 
 
-def _record(lower: Sequence, upper: Sequence, warnings: tuple[str, ...]) -> GaugeRecord:
+def _record(lower: Sequence, upper: Sequence, warnings: tuple[Note, ...]) -> GaugeRecord:
     pairs = [
         None if isinstance(a, str) or isinstance(b, str) else b - a
         for a, b in zip(lower, upper, strict=True)

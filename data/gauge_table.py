@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..notes import Note, NoteKind, as_note, rows
 from ..writing import replacing
 from .curves import LoadCurve
 from .gauge import GaugeRecord
@@ -39,9 +40,22 @@ class GaugeTable:
     note: str | None = None
 
     @property
-    def warnings(self) -> list[str]:
-        """One line each: lost ends of the gauge, and the note."""
-        return [*self.record.warnings, *([self.note] if self.note else [])]
+    def notes(self) -> list[Note]:
+        """Lost ends of the gauge, the order of the frames, frames that have no load."""
+        notes = [*self.record.warnings, *([as_note(self.note)] if self.note else [])]
+        if without := self.without_load:
+            words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
+            words += f"are left out: {', '.join(without)}"
+            notes.append(Note(NoteKind.NO_LOAD, words))
+        return notes
+
+    @property
+    def without_load(self) -> list[str]:
+        """Files of the frames that the load curve leaves out, though the gauge has a length."""
+        if self.curve is None:
+            return []
+        seen = np.flatnonzero(np.isfinite(self.record.length))
+        return [self.files[i] for i in sorted({*seen.tolist()} - {*self._used().tolist()})]
 
     def frame(self) -> pd.DataFrame:
         """A row a frame, NaN where the gauge was lost; with loads only the frames of the curve."""
@@ -65,7 +79,7 @@ class GaugeTable:
         return table
 
     def write(self, path: Path | str) -> None:
-        """Write the table; with loads, strips of a project read it as a load curve.
+        """Write the table with its notes; with loads, strips of a project read it as a curve.
 
         Raises
         ------
@@ -76,6 +90,8 @@ class GaugeTable:
             f"# virtual strain gauge between {ends[0]} and {ends[1]} mm,"
             f" {self.record.reference_length:.6g} mm long in the reference state\n"
         )
+        # A line each, whatever the names of the files hold.
+        about += "".join(f"# note: {' '.join(note.split())}\n" for note in self.notes)
         with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
             stream.write(about)
             self.frame().to_csv(stream, index=False, lineterminator="\n")
@@ -96,16 +112,16 @@ class GaugeTable:
             },
             "frames": len(self.files),
             "lost": [self.files[i] for i in record.lost],
-            "warnings": self.warnings,
+            "warnings": [note.line for note in self.notes],
+            "notes": rows(self.notes),
         }
         if curve is not None:
-            without = sorted({*seen.tolist()} - {*self._used().tolist()})
             numbers |= {
                 "direction": curve.direction,
                 "specimen": curve.specimen,
                 "points": len(curve.load),
                 "largest_load_N": float(curve.load.max()),
-                "without_load": [self.files[i] for i in without],
+                "without_load": self.without_load,
             }
         return numbers
 

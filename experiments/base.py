@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
+from ..notes import Note
 from ..sections import ModulusUnit
 
 if TYPE_CHECKING:  # a module of types: whoever reads a project need not wait for figures
@@ -234,7 +235,7 @@ class Findings:
     """
 
     numbers: dict[str, Any]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
     lines: tuple[str, ...] = ()
     quality: str = ""
     summary: str = ""
@@ -305,7 +306,7 @@ class RunRecord:
     arrays: Mapping[str, Array] = field(default_factory=dict)
     iterations: int = 0
     unstable: tuple[str, ...] | None = None
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +318,7 @@ class PredictedRun:
     material: MaterialCard
     model: Any
     record: RunRecord
-    notes: Sequence[str] = ()
+    notes: Sequence[Note] = ()
 
 
 class Predicted(Protocol):

@@ -1,4 +1,4 @@
-"""What a reader of a result should know: strains beyond a range, equilibria that no test shows."""
+"""Notes of analyses: what solvers say, strains beyond a range, equilibria that no test shows."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.card import MaterialCard, thickness_difference
+from ..notes import Note, NoteKind, as_note
 from ..solvers.base import History, instability
 from .base import RunRecord
 
@@ -19,10 +20,10 @@ STRAINS = ("warp", "fill", "shear")
 BEYOND = 1 + 1e-6
 
 
-def unstable_words(unstable: Sequence[str] | None) -> list[str]:
+def unstable_words(unstable: Sequence[str] | None) -> list[Note]:
     """That equilibria at these loads (in words) are unstable, where there are any."""
     words = instability(unstable)
-    return [f"{words}: the model would not stay there"] if words else []
+    return [Note(NoteKind.UNSTABLE, f"{words}: the model would not stay there")] if words else []
 
 
 def strains_of(history: History) -> Array:
@@ -36,40 +37,45 @@ def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
     return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
-def beyond_card(reached: Array, card: MaterialCard) -> list[str]:
+def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
     """Where strains (3,) leave the range that a card is valid for."""
     return [
-        f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there"
+        Note(
+            NoteKind.BEYOND_CARD,
+            f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there",
+        )
         for name, s, end in zip(STRAINS, reached, card.law.strain_range, strict=True)
         if s > end * BEYOND
     ]
 
 
-def other_thickness(card: MaterialCard, thickness: float) -> list[str]:
+def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
     """That a card that was run is of another thickness than the fabric's (mm), where it is."""
     words = thickness_difference(card, thickness)
-    return [] if words is None else [f"{words}; it was run with the card's thickness"]
+    if words is None:
+        return []
+    return [Note(NoteKind.THICKNESS, f"{words}; it was run with the card's thickness")]
 
 
-def beyond_range(reached: Array, ends: Array, where: str = "") -> list[str]:
-    """Where strains (3,) of a fitted test leave the range that its law was given.
-
-    where : " in the ... test", where there are several.
-    """
+def beyond_range(reached: Array, ends: Array) -> list[Note]:
+    """Where strains (3,) of a fitted test leave the range that its law was given."""
     return [
-        f"{name} strain reached {s:.3f}{where}, beyond law.strain_range {end:.4g}: the modulus was "
-        "held at its end value there; a wider range would let it vary"
+        Note(
+            NoteKind.BEYOND_LAW,
+            f"{name} strain reached {s:.3f}, beyond law.strain_range {end:.4g}: the modulus was "
+            "held at its end value there; a wider range would let it vary",
+        )
         for name, s, end in zip(STRAINS, reached, ends, strict=True)
         if s > end * BEYOND
     ]
 
 
-def notes_of(history: History, card: MaterialCard) -> list[str]:
+def notes_of(history: History, card: MaterialCard) -> list[Note]:
     """Everything to know of an analysis with a card."""
     return _notes(history.remarks, strains_of(history), history.unstable, card)
 
 
-def notes_of_record(record: RunRecord, card: MaterialCard) -> list[str]:
+def notes_of_record(record: RunRecord, card: MaterialCard) -> list[Note]:
     """The same of a run that is stored; nothing of one that failed, but its failure."""
     reached = np.zeros(3) if record.strain is None else record.strain
     return _notes(record.remarks, reached, record.unstable, card)
@@ -77,5 +83,5 @@ def notes_of_record(record: RunRecord, card: MaterialCard) -> list[str]:
 
 def _notes(
     remarks: Sequence[str], reached: Array, unstable: Sequence[str] | None, card: MaterialCard
-) -> list[str]:
-    return [*remarks, *beyond_card(reached, card), *unstable_words(unstable)]
+) -> list[Note]:
+    return [*map(as_note, remarks), *beyond_card(reached, card), *unstable_words(unstable)]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SolverFailure
+from ..notes import as_note
 from ..solvers.base import History
 from .base import Predicted, RunRecord
 
@@ -28,7 +29,7 @@ def record_of(
                 arrays=kind.arrays(model, outcome),
                 iterations=outcome.iterations,
                 unstable=outcome.unstable,
-                remarks=tuple(outcome.remarks),
+                remarks=tuple(map(as_note, outcome.remarks)),
             )
         except SolverFailure as failure:
             outcome = failure

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
 from ..identification.assessment import pinned_by
+from ..notes import Note, NoteKind, as_note, rows
 
 if TYPE_CHECKING:
     from .result import Fit
@@ -68,6 +70,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
         "warnings": [],
+        "notes": [],
         "wall_s": fit.wall_s,
         "versions": versions(),
     }
@@ -82,8 +85,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         result |= next(iter(fit.findings.values())).numbers
     else:
         result |= _together(fit)
-    result["warnings"] = warnings_of(fit, result.get("pinned", {}))
-    return result
+    warnings = [note.line for note in fit.notes]
+    return result | {"warnings": warnings, "notes": rows(fit.notes)}
 
 
 def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
@@ -105,6 +108,21 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
     return {**alone, TOGETHER: dict(sure.sigma)}
 
 
+def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
+    """The same along the strains: least, median and largest."""
+    return {
+        source: {
+            name: {
+                "least": float(s.min()),
+                "median": float(np.median(s)),
+                "largest": float(s.max()),
+            }
+            for name, s in sigmas.items()
+        }
+        for source, sigmas in pinned(fit).items()
+    }
+
+
 def _together(fit: Fit) -> dict[str, Any]:
     """What a fit of several tests says beside what each test says."""
     norms = fit.problem.blocks.norms(fit.best.point.residual)
@@ -119,47 +137,45 @@ def _together(fit: Fit) -> dict[str, Any]:
     return {
         "mean_relative_error": errors,
         "weights": {name: fit.project.tests[name].weight for name in fit.tests},
-        "pinned": {
-            source: {
-                name: {
-                    "least": float(s.min()),
-                    "median": float(np.median(s)),
-                    "largest": float(s.max()),
-                }
-                for name, s in sigmas.items()
-            }
-            for source, sigmas in pinned(fit).items()
-        },
+        "pinned": pinned_numbers(fit),
     }
 
 
-def warnings_of(fit: Fit, pins: dict[str, Any]) -> list[str]:
-    """What a reader must know before using the numbers: one place for page, terminal and json."""
+def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:
+    """What a reader must know before using the numbers: one place for page, terminal and json.
+
+    pins : 1 sigma of each modulus ("least", "median", "largest") by test.
+    """
     best, several = fit.best, len(fit.problem.comparisons) > 1
-    words = list(best.certainty.undetermined) if best.certainty is not None else []
+    notes = list(best.certainty.undetermined) if best.certainty is not None else []
     cut = [record for record in best.records if record.failure]
     if cut:
-        words.append(
+        said = (
             f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
             f"failed ({cut[0].failure}): --resume tries them again"
         )
+        notes.append(Note(NoteKind.STARTS, said))
     ends = np.asarray(fit.law.strain_range)
     # What the solver that counts does not look at, the one that leads may have.
     leading = (best.differentiated or best.point).histories
     every = zip(fit.problem.comparisons, best.point.histories, leading, strict=True)
     for comparison, history, beside in every:
         unstable = beside.unstable if history.unstable is None else history.unstable
-        words += [f"{comparison.name}: {w}" if several else w for w in unstable_words(unstable)]
-        where = f" in {comparison.name}" if several else ""
-        words += beyond_range(strains_of(history), ends, where)
-        words += [f"{comparison.name}: {r}" if several else r for r in history.remarks]
+        own = [*unstable_words(unstable), *beyond_range(strains_of(history), ends)]
+        own += map(as_note, history.remarks)
+        notes += [note.about(comparison.name) for note in own] if several else own
     for name, findings in fit.findings.items():
-        words += [f"{name}: {w}" if len(fit.findings) > 1 else w for w in findings.warnings]
-    words += [
-        f"{source} alone does not determine {name} (1 sigma above {100 * NOTHING:.0f} % everywhere)"
+        told = [as_note(note) for note in findings.warnings]
+        notes += [note.about(name) for note in told] if len(fit.findings) > 1 else told
+    notes += [
+        Note(
+            NoteKind.ALONE,
+            f"{source} alone does not determine {name} (1 sigma above {100 * NOTHING:.0f} % "
+            "everywhere)",
+        )
         for source, sigmas in pins.items()
         if source != TOGETHER
         for name, s in sigmas.items()
         if s["least"] > NOTHING
     ]
-    return words
+    return notes

@@ -13,6 +13,7 @@ from ..identification.assessment import PRIOR
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..notes import NOTES, NOTES_ARE, write_notes
 from ..reports import (
     Report,
     StartRow,
@@ -40,6 +41,7 @@ FILES = (
     (CARD, "the material card"),
     (MODULI, "tangent moduli along their strains"),
     (RESIDUALS, "every matched value beside the model's"),
+    (NOTES, NOTES_ARE),
     ("history.csv", "one row an analysis"),
 )
 
@@ -52,6 +54,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     for name, table in ((MODULI, fit.moduli()), (RESIDUALS, fit.residuals())):
         with replacing(folder / name) as path:
             table.to_csv(path, index=False, float_format="%.9g")
+    write_notes(folder, fit.notes)
     page = write_report(folder, _page(fit, folder))
     store.finish(fit.result)
     return page
@@ -95,7 +98,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         moduli_error=result.get("moduli_error", {}),
         strain_reached=result["strain_reached"],
         valid_strain=result["valid_strain"],
-        warnings=result["warnings"],
+        warnings=[note.line for note in fit.notes],
         figures=[
             _optima(fit, folder),
             _moduli(fit, folder),

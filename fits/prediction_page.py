@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..experiments.base import Exhibit, Output
+from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
 from ..reports import Report, Table, percent, write_report
 from ..writing import replacing
 from .store import RESULT, Store
@@ -25,6 +26,7 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
         kind: outcome.show(Output(folder, f"{kind}/" if several else ""))
         for kind, (outcome, _) in predictions.outcomes.items()
     }
+    write_notes(folder, predictions.notes)
     with replacing(folder / RUNS_TABLE) as path:
         predictions.runs().to_csv(path, index=False)
     page = write_report(folder, _page(predictions, exhibits))
@@ -40,6 +42,10 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     noted = sum(bool(run.notes) for run in each)
     if noted:
         summary += f" {noted} have notes."
+    for mark in MARKS:
+        count = sum(mark in marks(run.notes) for run in each)
+        if count:
+            summary += f" Marked {mark!r}: {count}."
     if predictions.worst is not None:
         summary += f" Largest error against measured values: {percent(predictions.worst)}."
     return Report(
@@ -65,6 +71,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"),
+            (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
             *(file for exhibit in exhibits.values() for file in exhibit.files),
         ],
@@ -74,9 +81,11 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 
 def _notes(predictions: Predictions) -> list[Table]:
     rows: list[list[object]] = [
-        [run.test.name, run.card, note] for run in predictions.each for note in run.notes
+        [run.test.name, run.card, as_note(note).kind.value, str(note)]
+        for run in predictions.each
+        for note in run.notes
     ]
     if not rows:
         return []
     what = "What a reader of the numbers above should know of each run."
-    return [Table("Notes", ["test", "card", "note"], rows, what, text=(1, 2))]
+    return [Table("Notes", ["test", "card", "kind", "note"], rows, what, text=(1, 2, 3))]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,17 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from ..experiments.base import Predicted, PredictedOutcome, PredictedRun
 from ..experiments.registry import kind_named
+from ..notes import Note, as_note, marks
+from ..notes import lines as note_lines
+from ..notes import rows as note_rows
 from .numbers import versions
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from .project import Project
-
-#: Notes that say the same of so many runs are each told on the terminal.
-FEW = 3
-#: What differs between notes that say the same: a number, or several in a row.
-NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 
 
 def predicted_kind(name: str) -> Predicted:
@@ -70,10 +67,20 @@ class Predictions:
             "tests": tests,
             "cards": list(dict.fromkeys(run.card for run in self.each)),
             "runs": [self._numbers(i) for i in range(len(self.each))],
+            "notes": note_rows(self.notes),
             "worst_relative_error": self.worst,
             "wall_s": self.wall_s,
             "versions": versions(),
         }
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader of each run should know, of "TEST with CARD"."""
+        return [
+            as_note(note).about(f"{run.test.name} with {run.card}")
+            for run in self.each
+            for note in run.notes
+        ]
 
     @property
     def worst(self) -> float | None:
@@ -103,7 +110,7 @@ class Predictions:
         return [i for i in measured if self.error(i) is None]
 
     def runs(self) -> pd.DataFrame:
-        """A row a run: test, card, numbers with their units, how it ended, notes, seconds."""
+        """A row a run: test, card, numbers with units, how it ended, marks, notes, seconds."""
         import pandas as pd
 
         rows = []
@@ -111,6 +118,7 @@ class Predictions:
             outcome, own = self._own(i)
             tail = {
                 "ended": self.ended(i),
+                "marks": "; ".join(marks(run.notes)),
                 "notes": "; ".join(run.notes),
                 "seconds": run.record.seconds,
             }
@@ -133,22 +141,9 @@ class Predictions:
         return pd.concat(curves, ignore_index=True)
 
     def lines(self) -> list[str]:
-        """For the terminal: a table of each kind of test, then the notes.
-
-        Notes that many runs share but for their numbers are one line; the page has each.
-        """
+        """For the terminal: a table of each kind of test, then the notes."""
         lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
-        alike: dict[str, list[str]] = {}
-        for run in self.each:
-            for note in run.notes:
-                words = f"{run.test.name} with {run.card}: {note}"
-                alike.setdefault(NUMBERS.sub("#", note), []).append(words)
-        for notes in alike.values():
-            if len(notes) <= FEW:
-                lines += [f"note: {words}" for words in notes]
-            else:
-                lines.append(f"note, {len(notes)} times (report.html has each), as {notes[0]}")
-        return lines
+        return [*lines, *note_lines(self.notes)]
 
     def report(self, folder: Path | str) -> Path:
         """Write tables, figures, files, report.html and last result.json; the page's path.
@@ -173,6 +168,7 @@ class Predictions:
             "test": run.test.name,
             "card": run.card,
             "ended": self.ended(number),
+            "marks": marks(run.notes),
             "seconds": run.record.seconds,
         }
         if run.record.failure:

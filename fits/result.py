@@ -15,6 +15,7 @@ from ..identification.problem import FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..notes import Note
 from .best import BestFit
 from .project import Project
 from .setup import FitSetup
@@ -94,6 +95,13 @@ class Fit:
         from .numbers import result_of
 
         return result_of(self)
+
+    @cached_property
+    def notes(self) -> list[Note]:
+        """What a reader must know before using the numbers: as everywhere that the fit is told."""
+        from .numbers import notes_of_fit, pinned_numbers
+
+        return notes_of_fit(self, pinned_numbers(self))
 
     def moduli(self) -> pd.DataFrame:
         """E1, E2 and G12 (MPa) along their strains, with one standard deviation.

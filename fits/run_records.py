@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments.base import RunRecord
+from ..notes import Note, NoteKind
 from ..writing import replacing
 from .store import Store
 
@@ -52,7 +53,7 @@ class RunRecords:
             "early": record.early,
             "iterations": record.iterations,
             "unstable": record.unstable,
-            "remarks": record.remarks,
+            "remarks": [(note.kind, note) for note in record.remarks],
             "arrays": list(record.arrays),
         }
         arrays: dict[str, Any] = {f"of_{name}": array for name, array in record.arrays.items()}
@@ -76,7 +77,7 @@ class RunRecords:
                 arrays=arrays,
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
-                remarks=tuple(map(str, words["remarks"])),
+                remarks=tuple(Note(NoteKind(kind), said) for kind, said in words["remarks"]),
             )
         return None
 

@@ -9,9 +9,11 @@ from typing import Any
 
 from ..errors import SolverFailure
 from ..experiments.base import CardRun, Output, Simulation, Test
-from ..experiments.notes import other_thickness
+from ..experiments.notes import notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
+from ..notes import Note, NoteKind, rows, write_notes
+from ..notes import lines as note_lines
 from ..solvers.base import History
 from ..solvers.registry import usable_solver
 from ..writing import write_text
@@ -47,7 +49,7 @@ def simulate_cards(
     progress: Progress | None = None,
     command: str = "simulate test",
 ) -> Simulation:
-    """Run tests with cards, write what their kinds write, and result.json.
+    """Run tests with cards, write what their kinds write, notes.csv and result.json.
 
     Parameters
     ----------
@@ -88,18 +90,24 @@ def simulate_cards(
         kind = kinds()[test.kind]
         told[test.name] = kind.simulate(test, cards, of_test, out, within_range)
     notes = [
-        f"{name}: {words}"
+        note.about(of) if len(tests) > 1 else note
+        for (of, name), parts in outcomes.items()
+        for note in _notes(name, cards[name], parts)
+    ]
+    notes += [
+        note.about(name)
         for name, card in cards.items()
-        for words in other_thickness(card, project.fabric.thickness)
+        for note in other_thickness(card, project.fabric.thickness)
     ]
     result = {
         "command": command,
         "project": str(project.path),
         "solver": analyses.solver.name,
-        "notes": notes,
+        "notes": rows(notes),
         "tests": {name: one.numbers for name, one in told.items()},
         **(told[tests[0].name].numbers if len(tests) == 1 else {}),
     }
+    write_notes(folder, notes)
     write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")
     return Simulation(result, _lines(told, notes))
 
@@ -113,8 +121,20 @@ def _outcome(
         return failure
 
 
-def _lines(told: Mapping[str, Simulation], notes: Sequence[str]) -> list[str]:
+def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[Note]:
+    """What a reader should know of a card's runs, part by part."""
+    notes = []
+    for part, run in parts.items():
+        if isinstance(run.outcome, SolverFailure):
+            own = [Note(NoteKind.FAILED, run.outcome.reason)]
+        else:
+            own = notes_of(run.outcome, card)
+        notes += [(note.about(part) if len(parts) > 1 else note).about(name) for note in own]
+    return notes
+
+
+def _lines(told: Mapping[str, Simulation], notes: Sequence[Note]) -> list[str]:
     several = len(told) > 1
     lines = [f"{name}: {line}" if several else line for name, one in told.items()
              for line in one.lines]  # fmt: skip
-    return [*lines, *(f"note: {words}" for words in notes)]
+    return [*lines, *note_lines(notes)]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..materials.forms.base import COMPONENTS, modulus_rows
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind
 from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
@@ -46,7 +47,7 @@ class Certainty:
     noise: dict[str, float]
     strain: dict[str, Array]
     sigma: dict[str, Array]
-    undetermined: tuple[str, ...]
+    undetermined: tuple[Note, ...]
 
 
 def certainty(
@@ -66,8 +67,11 @@ def certainty(
     if len(problem.comparisons) > 1:
         which = "with the tests' noise"
     words = [
-        f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
-        f"worst at strain {strains[name][relative.argmax()]:.3f}"
+        Note(
+            NoteKind.UNCERTAIN,
+            f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
+            f"worst at strain {strains[name][relative.argmax()]:.3f}",
+        )
         for name, relative in sigmas.items()
         if relative.max() > UNCERTAIN
     ]
@@ -147,27 +151,29 @@ def _along(
     return strains, sigmas
 
 
-def _limited(problem: FitProblem, best: Evaluation) -> list[str]:
+def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
     """Moduli on their margins or bounds, coefficients and nuisance on theirs."""
-    p, words = problem.unknowns, []
+    p, notes = problem.unknowns, []
     for name, rows in p.moduli.items():
         moduli, least = rows @ best.coefficients, p.bounds.least[name]
         if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
-            words.append(f"{name} touches its positivity margin: the data ask for less stiffness")
+            words = f"{name} touches its positivity margin: the data ask for less stiffness"
+            notes.append(Note(NoteKind.MARGIN, words))
         if p.bounds.largest is not None:
             most = p.bounds.largest[name]
             if (most - moduli <= ON_BOUND * most).any():
-                words.append(f"{name} touches its upper bound: the data ask for more stiffness")
+                words = f"{name} touches its upper bound: the data ask for more stiffness"
+                notes.append(Note(NoteKind.BOUND, words))
     if p.bounds.largest is None:
-        words += _on_bounds(p.labels, best.coefficients, *p.box)
-    return words + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
+        notes += _on_bounds(p.labels, best.coefficients, *p.box)
+    return notes + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
 
 
-def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[str]:
+def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
     width = upper - lower
     low = values - lower <= ON_BOUND * width
     high = upper - values <= ON_BOUND * width
     return [
-        f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound"
+        Note(NoteKind.BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
         for i in np.flatnonzero(low | high).tolist()
     ]

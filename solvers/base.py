@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.law import HypoelasticLaw
+from ..notes import Note
 
 Array = NDArray[np.float64]
 
@@ -51,9 +52,10 @@ class History:
     at which of the reported loads the equilibrium is, in words ("132 kPa"), empty where all are
     stable, None where the solver did not look; wrinkled: share of the reference surface that
     carries no stress in one direction (frames,), None likewise; iterations: what the solver
-    counts as its work; remarks: what a reader of the result should know; early: the solver's own
-    word for an end before the model's last frame (it found no equilibrium further on), "" where
-    there is none: fewer frames without it are no result.
+    counts as its work; remarks: what a reader of the result should know (plain words are notes of
+    the kind "of the solver"); early: the solver's own word for an end before the model's last
+    frame (it found no equilibrium further on), "" where there is none: fewer frames without it
+    are no result.
     """
 
     load: Array
@@ -69,7 +71,7 @@ class History:
     load_slope: Array | None = None
     unstable: tuple[str, ...] | None = None
     wrinkled: Array | None = None
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[Note, ...] = ()
     early: str = ""
 
     @property

@@ -10,6 +10,7 @@ from ..errors import SolverFailure
 from ..experiments.base import CardRun, Output, Shown
 from ..experiments.registry import kind_named
 from ..fits.store import RESULT, Store
+from ..notes import NOTES, NOTES_ARE, write_notes
 from ..reports import LawRow, Report, Table, plot_laws, write_report
 from ..writing import replacing
 from .law_words import conclusion, noise, table_of
@@ -26,6 +27,7 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
     result, table = comparison.result, table_of(comparison)
     with replacing(folder / COMPARISON) as path:
         table.to_csv(path, index=False, float_format="%.9g")
+    write_notes(folder, comparison.notes)
     first = comparison.forms[0]
     rows = [
         LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out())
@@ -37,6 +39,7 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         title=f"{comparison.project.title}: forms of the moduli",
         summary="; ".join(conclusion(result)),
         facts=[("error", result["objective_is"]), ("the data's own noise", total)],
+        warnings=[note.line for note in comparison.notes],
         figures=[
             ("laws.png", "Error of the fit, and at specimens left out of it"),
             *(f for test in first.fit.setup.tests for f in _side_by_side(comparison, test, folder)),
@@ -49,7 +52,11 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
                 "fitted: to all points; left out: at what the fits of the folds were not given",
             )
         ],
-        files=[(COMPARISON, "the table"), (RESULT, "all numbers, for programs")],
+        files=[
+            (COMPARISON, "the table"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers, for programs"),
+        ],
     )
     written = write_report(folder, page)
     Store(folder).finish(result)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..fits.best import noise_of
+from ..notes import rows
 from .laws import AS_GOOD
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def result_of(comparison: LawComparison) -> dict[str, Any]:
         "least_cross_validated": best.name if best else None,
         "simplest_as_good": simplest.name if simplest else None,
         "as_good_within": AS_GOOD,
+        "notes": rows(comparison.notes),
     }  # fmt: skip
 
 

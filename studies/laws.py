@@ -21,6 +21,7 @@ from ..fits.result import Fit
 from ..fits.setup import FitSetup, fingerprints, prepare_fit
 from ..fits.store import Store
 from ..materials.forms.registry import form_names, form_settings
+from ..notes import Note, NoteKind
 from .folds import FoldError, errors, part_of_objective, specimens_of, validate
 
 #: Of the smallest cross-validated error: a simpler form within it is as good.
@@ -31,6 +32,7 @@ FOLDS = 5
 #: Of a spline, where neither the project nor the caller says how many.
 KNOTS = 6
 VALIDATION = "validation.json"
+LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
 
 #: Told the name of each form as its turn comes, then the records of its starts and folds; None
 #: now and then.
@@ -136,6 +138,16 @@ class LawComparison:
     def project(self) -> Project:
         """The project, with the first of the forms."""
         return self.forms[0].fit.project
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader should know of every form's fit, and of its folds."""
+        notes = []
+        for form in self.forms:
+            lost = [fold.fold + 1 for fold in form.folds if fold.value is None]
+            own = [Note(NoteKind.FOLD, LOST, f"fold {fold}") for fold in lost]
+            notes += [note.about(form.name) for note in (*form.fit.notes, *own)]
+        return notes
 
     @property
     def result(self) -> dict[str, Any]:

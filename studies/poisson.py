@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, SolverFailure
-from ..experiments.notes import unstable_words
 from ..fits.analyses import Progress
 from ..fits.project import Project
 from ..materials.card import MaterialCard
+from ..notes import Note, NoteKind, rows
+from ..notes import lines as note_lines
 from ..solvers.base import History
 from .series import (
     Part,
@@ -82,14 +83,14 @@ def by_response(
 class PartRatios:
     """One part of a test.
 
-    response : what the responses are. failed : why a run failed, by nu12. warnings : what to know
-    of the runs.
+    response : what the responses are. failed : why a run failed, by nu12. notes : what to know of
+    the runs.
     """
 
     response: str
     responses: Mapping[str, Ratios]
     failed: Mapping[str, str]
-    warnings: Sequence[str]
+    notes: Sequence[Note]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ class Nu12Study:
     solver: str
     base: float
     parts: Mapping[str, PartRatios]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
     @property
     def response(self) -> str:
@@ -119,7 +120,7 @@ class Nu12Study:
             "base_nu12": self.base,
             "response": self.response,
             "models": {name: _numbers(part) for name, part in self.parts.items()},
-            "warnings": list(self.warnings),
+            "notes": rows(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
@@ -155,13 +156,16 @@ class Nu12Study:
             numbers = "".join(f"{v:9.4f}" for v in r.to_base)
             low, high = (100 * s for s in r.spread)
             words.append(f"{name:<{wide}}{numbers}   {low:+.1f} to {high:+.1f} %")
-        for name, part in self.parts.items():
-            words += [f"note: {name}, nu12 = {v}: {reason}" for v, reason in part.failed.items()]
-            words += [f"note: {name}: {warning}" for warning in part.warnings]
-        return [*words, *(f"note: {warning}" for warning in self.warnings)]
+        return [*words, *note_lines(self.notes)]
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader of the responses should know, of every run of its own."""
+        of_parts = [n.about(name) for name, part in self.parts.items() for n in part.notes]
+        return [*of_parts, *self.warnings]
 
     def write(self, folder: Path | str) -> None:
-        """Write nu12.csv, nu12.png and result.json.
+        """Write nu12.csv, nu12.png, notes.csv and result.json.
 
         Raises
         ------
@@ -179,6 +183,7 @@ class Nu12Study:
             self.table(),
             lambda path: plot_nu12(path, panels, self.base, self.response),
             self.result,
+            self.notes,
         )
 
 
@@ -223,7 +228,7 @@ def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
         return series.run(part, replace(series.card.law, nu12=nu12))
 
     base = run(series.card.law.nu12)
-    warnings, failed = series.notes(base), {}
+    notes, failed = [n.about(_at(series.card.law.nu12)) for n in series.notes(base)], {}
     responses: list[Mapping[str, float] | None] = []
     for value in values:
         try:
@@ -231,14 +236,14 @@ def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
         except SolverFailure as failure:
             responses.append(None)
             failed[f"{value:g}"] = failure.reason
+            notes.append(Note(NoteKind.FAILED, failure.reason, _at(value)))
             if len(failed) == len(values):
                 raise
             continue
         responses.append(part.studied.responses(part.model, history))
-        # Strains beyond the card's range are those of the base run, more or less.
-        warnings += [f"nu12 = {value:g}: {words}" for words in unstable_words(history.unstable)]
+        notes += [note.about(_at(value)) for note in series.notes(history)]
     own = part.studied.responses(part.model, base)
-    return PartRatios(part.studied.response, by_response(values, responses, own), failed, warnings)
+    return PartRatios(part.studied.response, by_response(values, responses, own), failed, notes)
 
 
 def _numbers(part: PartRatios) -> dict[str, Any]:
@@ -253,8 +258,11 @@ def _numbers(part: PartRatios) -> dict[str, Any]:
             for response, r in part.responses.items()
         },
         "failed": dict(part.failed),
-        "warnings": list(part.warnings),
     }
+
+
+def _at(nu12: float) -> str:
+    return f"nu12 = {nu12:g}"
 
 
 def _known(values: Array) -> list[float | None]:

@@ -19,6 +19,8 @@ from ..fits.analyses import Progress
 from ..fits.project import Project
 from ..materials.card import MaterialCard
 from ..meshes.mesh import Mesh
+from ..notes import Note, NoteKind, as_note
+from ..notes import lines as note_lines
 from .series import (
     Part,
     Series,
@@ -70,14 +72,15 @@ class LevelRun:
     values: Mapping[str, float] | None = None
     curve: Curve | None = None
     failure: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
     """What a study of refinement gave: runs by part, coarse to fine.
 
-    noise : relative accuracy of the solver's displacements and loads. warnings : on all of it.
+    noise : relative accuracy of the solver's displacements and loads. warnings : on all
+    of it, beside those of its runs.
     """
 
     project: Path
@@ -86,7 +89,7 @@ class Refinement:
     what: Refined
     runs: Mapping[str, Sequence[LevelRun]]
     noise: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
 
     @property
     def result(self) -> dict[str, Any]:
@@ -105,10 +108,23 @@ class Refinement:
         """The same for a terminal."""
         from .refinement_words import lines
 
-        return lines(self.result)
+        return [*lines(self.result), *note_lines(self.notes)]
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader of the values should know, of every level's own run."""
+        notes = []
+        for name, runs in self.runs.items():
+            for run in runs:
+                size = f"{run.level.elements} quads"
+                if self.what == "increments":
+                    size = f"{run.level.part.increments} increments"
+                failed = [Note(NoteKind.FAILED, run.failure)] if run.failure else []
+                notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
+        return [*notes, *self.warnings]
 
     def write(self, folder: Path | str) -> None:
-        """Write convergence.csv, convergence.png and result.json.
+        """Write convergence.csv, convergence.png, notes.csv and result.json.
 
         Raises
         ------
@@ -123,6 +139,7 @@ class Refinement:
             self.table(),
             lambda path: plot_convergence(path, panels(self), self.what),
             self.result,
+            self.notes,
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..notes import rows
 from .convergence import convergence, observed_order
 from .refinement import LevelRun, Refinement, ended, rms_between
 
@@ -28,7 +29,7 @@ def numbers(study: Refinement) -> dict[str, Any]:
         "solver": study.solver,
         "refined": study.what,
         "models": {name: _part(runs, study.noise) for name, runs in study.runs.items()},
-        "warnings": list(study.warnings),
+        "notes": rows(study.notes),
     }
 
 
@@ -103,7 +104,6 @@ def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
     said: dict[str, Any] = {
         "levels": [_level(run) for run in runs],
         "quantities": {},
-        "warnings": list(good[-1].notes) if good else [],
     }
     if len(good) < 2:
         return said

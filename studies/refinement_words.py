@@ -24,8 +24,7 @@ def lines(result: Mapping[str, Any]) -> list[str]:
         words += [_quantity(*item) for item in model["quantities"].items()]
         if "rms_N" in model:
             words.append(_rms(model["rms_N"]))
-        words += [f"note: {name}, finest: {note}" for note in model["warnings"]]
-    return [*words, *(f"note: {note}" for note in result["warnings"])]
+    return words
 
 
 def _number(value: float | None, width: int) -> str:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..experiments.base import Refined, Studied, Test
-from ..experiments.notes import notes_of
+from ..experiments.notes import notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..fits.analyses import Analyses, Progress
 from ..fits.cards import chosen_cards
 from ..fits.project import Project
-from ..materials.card import MaterialCard, thickness_difference
+from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
+from ..notes import Note, write_notes
 from ..solvers.base import History, Solver
 from ..writing import replacing, write_text
 
@@ -74,7 +75,7 @@ class Series:
         """The next analysis; raises SolverFailure."""
         return self._analyses.run(part.name, part.model, law, part.increments)
 
-    def notes(self, history: History) -> list[str]:
+    def notes(self, history: History) -> list[Note]:
         """What a reader of a run's values should know."""
         return notes_of(history, self.card)
 
@@ -148,10 +149,9 @@ def card_words(card: MaterialCard | Path | str) -> str:
     return card.name if isinstance(card, MaterialCard) else str(card)
 
 
-def thickness_notes(project: Project, card: MaterialCard) -> list[str]:
+def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
     """The card's thickness where it is not the fabric's: the card's counts."""
-    words = thickness_difference(card, project.fabric.thickness)
-    return [] if words is None else [f"{words}; it was run with the card's thickness"]
+    return other_thickness(card, project.fabric.thickness)
 
 
 def write_study(
@@ -160,8 +160,9 @@ def write_study(
     table: pd.DataFrame,
     draw: Callable[[Path], Any],
     result: Mapping[str, Any],
+    notes: Sequence[Note],
 ) -> None:
-    """Write the table NAME.csv, the figure NAME.png and, last, result.json.
+    """Write the table NAME.csv, the figure NAME.png, notes.csv and, last, result.json.
 
     Raises
     ------
@@ -170,4 +171,5 @@ def write_study(
     with replacing(folder / f"{name}.csv") as path:
         table.to_csv(path, index=False, lineterminator="\n")
     draw(folder / f"{name}.png")
+    write_notes(folder, notes)
     write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")

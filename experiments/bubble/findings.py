@@ -8,6 +8,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from ...identification.assessment import moduli_error
+from ...notes import Note, NoteKind
 from ..base import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
 from .registration import registration_line, registration_numbers
@@ -85,14 +86,15 @@ def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:
     return [f"nuisance: {said}"]
 
 
-def _warnings(prepared: PreparedBubble) -> list[str]:
+def _warnings(prepared: PreparedBubble) -> list[Note]:
     test = prepared.test
     if test.match_by != "surfaces" or test.match_degree >= FAITHFUL:
         return []
-    return [
+    words = (
         f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk closely "
         "and bias the moduli, also without noise; matching by points does not"
-    ]
+    )
+    return [Note(NoteKind.SURFACES, words)]
 
 
 def _percent(value: float) -> str:

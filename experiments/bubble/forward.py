@@ -14,7 +14,7 @@ from ...reports import plot_profiles, write_vtu
 from ...solvers.base import History
 from ...writing import replacing
 from ..base import CardRun, Output, Simulation, Studied
-from ..notes import STRAINS, notes_of, strains_of
+from ..notes import STRAINS, strains_of
 from .test import PART, BubbleTest
 
 
@@ -67,12 +67,10 @@ def simulate(
         history, model = run.outcome, run.model
         heights = apex_heights(model, history)
         reached = strains_of(history)
-        warnings = notes_of(history, cards[name])
         numbers[name] = {
             "pressure_kPa": (1e3 * history.load).tolist(),
             "apex_mm": heights.tolist(),
             "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
-            "warnings": warnings,
         }
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
@@ -88,7 +86,6 @@ def simulate(
             f"{p:8.1f} kPa   apex {z:8.3f} mm"
             for p, z in zip(1e3 * history.load, heights, strict=True)
         ]
-        lines += [f"note: {words}" for words in warnings]
     only = numbers[next(iter(cards))] if len(cards) == 1 else {}
     return Simulation({**only, "cards": numbers}, lines)
 

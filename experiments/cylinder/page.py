@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from ...notes import marks
 from ...reports import Table, percent
 from ...writing import replacing
 from ..base import Exhibit, Output, Shown
@@ -82,7 +83,8 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
     for i, run in enumerate(outcome.runs):
         m = outcome.measures.get(i)
         head: list[object] = [run.test.name, run.card]
-        tail: list[object] = [outcome.ended(i), len(run.notes), round(run.record.seconds, 1)]
+        tail: list[object] = [outcome.ended(i), ", ".join(marks(run.notes)) or None]
+        tail += [len(run.notes), round(run.record.seconds, 1)]
         if m is None:
             rows.append([*head, *[None] * (5 + len(places)), *tail])
             continue
@@ -98,7 +100,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
     header = [
         "test", "card", "stiffness, N/mm", "buckles", "wrinkles from",
         *(f"load at {place}, N" for place in places),
-        "inflation strain", "pressure, kPa", "ended", "notes", "s",
+        "inflation strain", "pressure, kPa", "ended", "marked", "notes", "s",
     ]  # fmt: skip
     slopes = _slopes(tests)
     note = (
@@ -106,8 +108,9 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         f"afterwards, else the knee, where the slope over {slopes} has fallen to half. Wrinkles: "
         "more of the surface than when inflated. Inflation strain: the largest along warp or fill "
         "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
+        " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
     )
-    text = (1, header.index("ended"))
+    text = (1, header.index("ended"), header.index("marked"))
     return Table("Runs", header, [_unbroken(row) for row in rows], note, text=text)
 
 

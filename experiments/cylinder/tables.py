@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ...data.bending_scatter import scatter
+from ...notes import marks
 from ..base import PredictedRun
 from .measures import BendingMeasures
 from .record import BendingRun
@@ -87,7 +88,8 @@ def terminal_table(
             text += f"{'-' if load is None else f'{load:.0f} N':>{width}}"
         if compared:
             text += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
-        if run.record.early:
-            text += f"  {ended[i]}"
-        lines.append(text)
+        words = [ended[i]] if run.record.early else []
+        if marked := marks(run.notes):
+            words.append(f"[{', '.join(marked)}]")
+        lines.append("  ".join([text, *words]))
     return lines

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ...notes import Note, NoteKind
 from ..base import Findings
 from .prepared import FittedStrip
 from .test import StripsTest
@@ -43,23 +44,30 @@ def _numbers(test: StripsTest, fitted: FittedStrip) -> dict[str, Any]:
     }
 
 
-def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[str]:
+def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[Note]:
     """What the data leave open before any fit."""
     directions = {s.direction for s in strips}
-    words = [
-        f"no {direction} strip of {test.name} is matched: {modulus} rests on the other directions"
+    notes = [
+        Note(
+            NoteKind.UNMATCHED,
+            f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
+            "directions",
+        )
         for direction, modulus in PINS.items()
         if direction not in directions
     ]
     words += dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
     if test.match_by == "points":
-        words += [
-            f"{s.direction}: {s.strip.beyond} points beyond the final length (or before zero) "
-            "were left out"
+        notes += [
+            Note(
+                NoteKind.LEFT_OUT,
+                f"{s.strip.beyond} points beyond the final length (or before zero) were left out",
+                s.direction,
+            )
             for s in strips
             if s.strip.beyond
         ]
-    return words
+    return notes
 
 
 def _line(strips: Sequence[FittedStrip], total: float) -> str:

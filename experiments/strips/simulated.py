@@ -17,7 +17,7 @@ from ...reports import plot_loads
 from ...solvers.base import History
 from ...writing import replacing
 from ..base import CardRun, Output, Simulation
-from ..notes import STRAINS, beyond_card, strains_of
+from ..notes import STRAINS, strains_of
 from .figures import Array, Curve, draw_bias, load_panels
 from .test import StripsTest
 
@@ -106,7 +106,6 @@ def _card(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict
             "end_load_N": float(pull.history.load[-1]),
             "shown_to_mm": float(pull.elongation[pull.shown - 1]) if pull.shown else 0.0,
             "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
-            "warnings": [*pull.history.remarks, *beyond_card(reached, card)],
         }
         # A sum of errors over parts of the curves could be compared with nothing.
         known = pull.whole and pull.rms is not None and total is not None
@@ -159,7 +158,4 @@ def _lines(cards: Mapping[str, dict[str, Any]]) -> list[str]:
         total = card["e_uniaxial_N"]
         words = "" if total is None else f"; sum {total:.4g} N"
         lines.append(f"{name}: RMS {', '.join(parts)}{words}")
-        for direction, told in card["directions"].items():
-            notes = [told["failed"]] if "failed" in told else told["warnings"]
-            lines += [f"note: {name}, {direction}: {w}" for w in notes]
     return lines

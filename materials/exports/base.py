@@ -13,6 +13,7 @@ import numpy as np
 
 from ... import __version__
 from ...errors import InputError
+from ...notes import Note, NoteKind
 from ..card import MaterialCard
 from ..forms.base import COMPONENTS, UNLIMITED
 
@@ -31,6 +32,12 @@ class Says:
     carries: tuple[str, ...]
     loses: tuple[str, ...] = ()
     confirm: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> list[Note]:
+        """What the user should know: all that is lost, and all that is to be confirmed."""
+        lost = [Note(NoteKind.LOSES, words) for words in self.loses]
+        return [*lost, *(Note(NoteKind.CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
         """The same as lines of at most WIDTH characters."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
 from ...models.cylinder import CylinderModel
+from ...notes import Note, NoteKind
 from ..base import History
 from .analysis import Converged, Run, Setup
 from .cylinder import cylinder_decks
@@ -68,6 +69,6 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
         gas = GasCurve(found.deflection, better)
     history = bending_history(model, found, gas)
     rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)
-    remark = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
-    remark += f"pressure {rise:+.3g} kPa at the end"
-    return replace(history, remarks=(*history.remarks, remark))
+    words = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
+    words += f"pressure {rise:+.3g} kPa at the end"
+    return replace(history, remarks=(*history.remarks, Note(NoteKind.GAS, words)))

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from ...errors import InputError, SolverFailure
 from ...meshes.volume import enclosed_volume
 from ...models.cylinder import CylinderModel
+from ...notes import Note, NoteKind
 from ..base import History
 from .cylinder_bending import ABOVE, body_nodes
 from .cylinder_gas import GasCurve
@@ -165,7 +166,7 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         cavity_volume=at(bent.volume),
         iterations=bent.iterations,
         path=bent.displacement,
-        remarks=(early,) if early else (),
+        remarks=(Note(NoteKind.EARLY, early),) if early else (),
         early=early if len(wanted) <= len(model.deflections) else "",
     )
 

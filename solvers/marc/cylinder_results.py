@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, SolverFailure
 from ...meshes.volume import enclosed_volume
 from ...models.cylinder import CylinderModel
+from ...notes import Note, NoteKind
 from ..base import History
 from ..strains import extremes, log_strain
 from .cylinder import APPROACH
@@ -70,7 +71,7 @@ def cylinder_history(
     if len(times) < len(wanted):
         last = wanted[times[-1]]
         early = f"the run stopped early; the last increment is at {last:g} mm of deflection"
-        remarks.append(early)
+        remarks.append(Note(NoteKind.EARLY, early))
     mesh = model.mesh
     volume = model.copies * np.array([enclosed_volume(mesh.points + one, mesh.quads) for one in u])
     full = float(volume[0])
@@ -105,7 +106,7 @@ def may_touch(model: CylinderModel) -> dict[str, Numbers]:
 
 def _forces(
     model: CylinderModel, frames: list[dict[str, Array]]
-) -> tuple[dict[str, Array], list[str]]:
+) -> tuple[dict[str, Array], list[Note]]:
     """What the bodies do to the whole cylinder, (frames, 3) N, and what is to be said of it."""
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
@@ -115,13 +116,15 @@ def _forces(
         # Along x and z the forces of a quarter cancel against those of the others. The inflated
         # cylinder has not touched the bodies yet.
         found[body][1:, 1] = [model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]]
-    remarks = [
+    words = (
         f"the collar's force is the sum of {name!r}, which is not confirmed (docs/how-to/marc.md)"
-    ]
+    )
+    remarks = [Note(NoteKind.UNCONFIRMED, words)]
     collar, supports = found["collar"][-1, 1], found["supports"][-1, 1]
     if abs(collar + supports) > UNBALANCED * abs(collar):
-        remarks.append(
+        words = (
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
             "see run 5 in docs/how-to/marc.md"
         )
+        remarks.append(Note(NoteKind.UNBALANCED, words))
     return found, remarks

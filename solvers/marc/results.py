@@ -12,6 +12,7 @@ from ...errors import InputError, SolverFailure
 from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
 from ...models.uniaxial import UniaxialModel
+from ...notes import Note, NoteKind
 from ..base import History
 from ..pulls import at_elongations
 from ..strains import extremes, log_strain
@@ -109,7 +110,7 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
         sums,
         iterations=iterations,
         path=u,
-        remarks=() if forces is not None else (NO_REACTIONS,),
+        remarks=() if forces is not None else (Note(NoteKind.NO_REACTIONS, NO_REACTIONS),),
     )
 
 

@@ -13,6 +13,7 @@ from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.uniaxial import UniaxialModel
+from ...notes import Note, NoteKind
 from ..analyses import analysis_of
 from ..base import History, Progress, SolverCheck
 from ..identity import file_mark, in_words, templates_mark
@@ -119,9 +120,12 @@ class MarcSolver:
             return found
 
         history = analysis_of(ANALYSES, model, self.name)(model, law, settings, once)
-        remarks = [*history.remarks, *([early] if early else [])]
+        remarks = [*history.remarks]
+        if early:
+            remarks.append(Note(NoteKind.EARLY, early))
         if repeats:
-            remarks.append(f"{repeats} increments were repeated after they did not converge")
+            words = f"{repeats} increments were repeated after they did not converge"
+            remarks.append(Note(NoteKind.REPEATED, words))
         why = f"{history.early}: {early}" if history.early and early else history.early
         return replace(history, remarks=tuple(remarks), early=why)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...models.inflated import InflatedModel, RigidCylinder
+from ...notes import Note, NoteKind
 from ..base import History
 from .closed import ClosedMembrane
 from .contact import brought_to_touch, gaps
@@ -61,7 +62,8 @@ def analyse(
     low, high = (extreme.copy() for extreme in extremes)
     path, moves = [inflated], [0.0]
     wrinkle = membrane.wrinkle.copy()
-    gas, pushes, remarks = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))], []
+    gas, pushes = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))]
+    remarks: list[Note] = []
     snaps: list[float] = []
     early = ""
     wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
@@ -89,7 +91,7 @@ def analyse(
             np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
     except NoEquilibrium as failure:
         early = f"the run stopped early: {failure.reason}"
-        remarks.append(early)
+        remarks.append(Note(NoteKind.EARLY, early))
     frames = [0]
     for i in range(len(plan.displacements)) if plan.reported is None else plan.reported:
         if i + 1 < len(path):
@@ -97,16 +99,18 @@ def analyse(
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
     if snaps:
-        remarks.append(
-            f"snaps, or nearly, before {', '.join(f'{d:.4g}' for d in snaps)} mm of deflection"
-        )
-    remarks.append(f"rigid bodies penetrate {deepest:.3g} mm at most")
+        where = ", ".join(f"{d:.4g}" for d in snaps)
+        words = f"snaps, or nearly, before {where} mm of deflection"
+        remarks.append(Note(NoteKind.SNAP, words))
+    words = f"rigid bodies penetrate {deepest:.3g} mm at most"
+    remarks.append(Note(NoteKind.PENETRATION, words))
     most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
-        remarks.append(
+        words = (
             f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
             f"fabric's) carries {100 * of_wrinkles / most:.2g} % of the largest load"
         )
+        remarks.append(Note(NoteKind.WRINKLES, words))
     # What is normal to a symmetry plane is taken up by the other half.
     force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
     reactions: dict[str, Array] = {}

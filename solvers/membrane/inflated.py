@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...models.inflated import InflatedModel
+from ...notes import Note, NoteKind
 from ..base import History
 from . import bending
 from .closed import ClosedMembrane
@@ -45,8 +46,11 @@ def analyse(membrane: ClosedMembrane, model: InflatedModel, asked: Asked) -> tup
         record.accept(i, u)
         volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
     remarks = tuple(
-        f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
-        "leading the volume"
+        Note(
+            NoteKind.SNAP,
+            f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
+            "leading the volume",
+        )
         for before, level in filling.snaps
     )
     if model.bending is not None:

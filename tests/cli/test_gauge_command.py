@@ -115,7 +115,9 @@ def test_from_pictures_to_a_project(tmp_path):
     assert "1 of 12 frames have no load at their time: 11" in done.stderr
     for words in ("gauge length 20.026 mm; 12 frames, lost in 2", "correlation lost: f4.csv, f7.c"):
         assert words in done.stdout
-    assert "left out, no load: f11.csv" in done.stdout
+    left_out = "1 of 12 frames have a length and no load; they are left out: f11.csv"
+    assert f"note: {left_out}" in done.stdout
+    assert f"# note: {left_out}\n" in (tmp_path / "w1.csv").read_text()
     assert "[strips.warp] gauge_length = 20.026" in done.stdout
     # All defaults but the gauge length: header, units, specimen and direction are found.
     project = tmp_path / "project.toml"

@@ -137,8 +137,13 @@ def test_what_a_reader_should_know_is_said(bubble: Path) -> None:
         done = study(name, "project.toml", "--card", "card.toml", *options, "--out", name,
                      cwd=bubble)  # fmt: skip
         result = json.loads((bubble / name / "result.json").read_text())
-        (words,) = result["models"]["bubble"]["warnings"]
-        assert "beyond the card's valid range 0.050" in words and words in done
+        told = [note for note in result["notes"] if note["kind"] == "beyond card range"]
+        assert told == result["notes"] and len(told) == 2
+        for note in told:
+            assert "beyond the card's valid range 0.050" in note["note"]
+            assert f"note: {note['of']}: {note['note']}" in done
+        table = pd.read_csv(bubble / name / "notes.csv")
+        assert table.to_dict("records") == told
 
 
 def test_a_nu12_that_fails_is_named_and_left_out(

@@ -389,9 +389,8 @@ def test_simulate_within_the_range_of_the_card(study, tmp_path):
         step = (LENGTHS[direction][1] - start) / 10
         assert shown <= start * np.expm1(end) < shown + step
     assert 0 < found["directions"]["bias"]["shown_to_mm"] < 5
-    assert any(
-        "beyond the card's valid range" in w for w in found["directions"]["warp"]["warnings"]
-    )
+    notes = result_in(tmp_path / "sim")["notes"]
+    assert any(n["of"].endswith("warp") and n["kind"] == "beyond card range" for n in notes)
 
 
 def test_simulate_a_card_that_fails_on_a_strip(study, tmp_path):

@@ -13,11 +13,12 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.base import RunRecord
 from bubblefit.experiments.notes import notes_of_record
 from bubblefit.fits.cards import chosen_cards
-from bubblefit.fits.prediction_result import FEW, Predictions
+from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import RunEvent, predict
 from bubblefit.fits.project import Project, read_project
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import FEW
 from bubblefit.reports.style import NAMED
 from bubblefit.solvers import registry
 from matplotlib.figure import Figure
@@ -54,7 +55,7 @@ def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
     runs, curves = done.runs(), done.curves()
     keys = [(test, card) for test in TESTS for card in CARDS]
     assert list(zip(runs["test"], runs["card"], strict=True)) == keys
-    assert list(runs.columns[-3:]) == ["ended", "notes", "seconds"]
+    assert list(runs.columns[-4:]) == ["ended", "marks", "notes", "seconds"]
     assert set(runs["ended"]) == {"finished"} and set(runs["notes"]) == {"made up"}
     assert len(curves) == 4 * 25 and list(curves.columns[:3]) == ["test", "card", "deflection_mm"]
     stiff = curves[(curves["test"] == "high") & (curves["card"] == "stiff")]

@@ -40,8 +40,8 @@ def test_cards_in_tests(bars: BarSolver, tmp_path: Path) -> None:
     }  # fmt: skip
     assert steps[0].analyses == 6 and steps[-1].analysis == 6
     (note,) = done.numbers["notes"]
-    assert note.startswith("thick: ") and "1 mm" in note and "0.5 mm" in note
-    assert done.lines[-1] == f"note: {note}" and "one: soft: pulled" in done.lines
+    assert note["of"] == "thick" and "1 mm" in note["note"] and "0.5 mm" in note["note"]
+    assert done.lines[-1] == f"note: thick: {note['note']}" and "one: soft: pulled" in done.lines
 
 
 def test_numbers_of_a_single_test_stand_at_the_top(bars: BarSolver, tmp_path: Path) -> None:

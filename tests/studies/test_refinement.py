@@ -146,7 +146,8 @@ def test_the_cards_thickness_counts_and_is_said(bars: BarSolver) -> None:
     thick = MaterialCard(CARD.law, 1.0, "thick")
     study = refine(project_of(BarTest("a bar"), cards={"thick": thick}), "thick", levels=2)
     assert {model.thickness for model in bars.seen} == {1.0}
-    (words,) = study.result["warnings"]
+    (note,) = study.result["notes"]
+    words = note["note"]
     assert "1 mm" in words and "0.5 mm" in words and f"note: {words}" in study.lines()
     with pytest.raises(InputError, match="no card"):
         refine(project_of(BarTest("a bar"), cards={"thick": thick}), "thin")

@@ -1,0 +1,145 @@
+"""Notes: what a reader of a result should know, each of a kind, told alike by every command.
+
+Whoever knows something makes a `Note` of a `NoteKind`; commands collect them and lay them out by
+the functions here: `line` by line on the terminal and on the page, `rows` in result.json, and
+notes.csv (`write_notes`). A run is marked in its tables by the kinds of its notes (`marks`).
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from pathlib import Path
+
+from .writing import replacing
+
+#: The table of the notes in an output folder, and what a page says of it.
+NOTES = "notes.csv"
+NOTES_ARE = "what a reader of the numbers should know, note by note"
+#: Notes that say the same of so many things are each told on the terminal.
+FEW = 3
+#: What differs between notes that say the same: a number, or several in a row.
+NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
+
+
+class NoteKind(StrEnum):
+    """Every kind of note that there is, by the words that tables and result.json have for it."""
+
+    #: Of an analysis, by its solver.
+    EARLY = "stopped early"
+    SNAP = "snap"
+    PENETRATION = "penetration"
+    WRINKLES = "wrinkle stiffness"
+    GAS = "gas"
+    REPEATED = "repeated increments"
+    UNCONFIRMED = "unconfirmed"
+    UNBALANCED = "unbalanced forces"
+    NO_REACTIONS = "no reactions"
+    #: Whatever a solver of another distribution says.
+    SOLVER = "of the solver"
+    #: Of an analysis with a card.
+    BEYOND_CARD = "beyond card range"
+    UNSTABLE = "unstable"
+    THICKNESS = "other thickness"
+    FAILED = "failed"
+    #: Of a fit and its data.
+    BEYOND_LAW = "beyond law.strain_range"
+    STARTS = "starts that failed"
+    UNCERTAIN = "uncertain"
+    MARGIN = "on its margin"
+    BOUND = "on a bound"
+    ALONE = "undetermined alone"
+    INVERSE_CRIME = "inverse crime"
+    ABOVE_NOISE = "above the noise"
+    SURFACES = "unfaithful surfaces"
+    UNMATCHED = "unmatched direction"
+    LEFT_OUT = "points left out"
+    FOLD = "fold without an error"
+    #: Of a virtual strain gauge.
+    LOST = "correlation lost"
+    ORDER = "order of frames"
+    NO_LOAD = "frames without load"
+    #: Of an export: what the other program makes of a card.
+    LOSES = "loses"
+    CONFIRM = "to confirm"
+
+
+#: A run that has a note of these kinds is marked in the tables of runs.
+MARKS = (NoteKind.BEYOND_CARD, NoteKind.SNAP, NoteKind.UNSTABLE, NoteKind.EARLY)
+
+
+class Note(str):
+    """A sentence, of which kind it is, and of what it is said ("" : of all)."""
+
+    kind: NoteKind
+    of: str
+
+    def __new__(cls, kind: NoteKind, words: str, of: str = "") -> Note:
+        note = super().__new__(cls, words)
+        note.kind, note.of = kind, of
+        return note
+
+    def __getnewargs__(self) -> tuple[NoteKind, str, str]:  # type: ignore[override]
+        """So that it comes whole out of another process."""
+        return self.kind, str(self), self.of
+
+    def about(self, name: str) -> Note:
+        """The same note, said of `name` (of a part of it, where it is said of something)."""
+        return Note(self.kind, str(self), f"{name}, {self.of}" if self.of else name)
+
+    @property
+    def line(self) -> str:
+        """With what it is said of."""
+        return f"{self.of}: {self}" if self.of else str(self)
+
+
+def as_note(words: str) -> Note:
+    """A note as it is; plain words, as solvers of other distributions say them, as a note."""
+    return words if isinstance(words, Note) else Note(NoteKind.SOLVER, words)
+
+
+def marks(notes: Iterable[str]) -> list[str]:
+    """What a run is marked with in a table of runs, by its notes."""
+    kinds = {as_note(note).kind for note in notes}
+    return [kind.value for kind in MARKS if kind in kinds]
+
+
+def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
+    """The notes as plain values, for result.json and tables."""
+    return [{"of": note.of, "kind": note.kind.value, "note": str(note)} for note in notes]
+
+
+def lines(notes: Sequence[Note]) -> list[str]:
+    """The notes for the terminal.
+
+    Notes that more than a few things share but for their numbers are one line; notes.csv has each.
+    """
+    alike: dict[tuple[NoteKind, str], list[Note]] = {}
+    for note in notes:
+        alike.setdefault((note.kind, NUMBERS.sub("#", note)), []).append(note)
+    said = []
+    for same in alike.values():
+        if len(same) <= FEW:
+            said += [f"note: {note.line}" for note in same]
+        else:
+            where = f"{NOTES} has each"
+            said.append(f"note, {len(same)} times ({where}), as {same[0].line}")
+    return said
+
+
+def write_notes(folder: Path, notes: Iterable[Note]) -> None:
+    """Write notes.csv: of, kind, note; a header alone where there is nothing to say.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    with (
+        replacing(folder / NOTES) as path,
+        open(path, "w", encoding="utf-8", newline="") as stream,
+    ):
+        table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows(notes))
