@@ -71,9 +71,9 @@ def command(
         with replacing(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
     if as_json:
-        said = {"carries": export.says.carries, "loses": export.says.loses}
-        content = {"format": name, **said, "confirm": export.says.confirm}
-        content["notes"] = rows(export.says.notes)
+        said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
+        said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
+        content = {"format": name, **said}
         click.echo(json.dumps({"files": [str(path) for path in paths], **content}, indent=1))
         return
     for line in export.says.lines():

@@ -122,6 +122,11 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
     several = len(fit.findings) > 1
     for name, findings in fit.findings.items():
         lines += [f"{name}: {line}" if several else line for line in findings.lines]
+    left = "; ".join(
+        f"{name} {m.rms:.3g} {m.unit} (noise {m.noise:.3g} {m.unit}, {m.noise_is})"
+        for name, m in fit.misfits.items()
+    )
+    lines.append(f"RMS residual beside the noise: {left}")
     for source, sigmas in result.get("pinned", {}).items():
         parts = ", ".join(
             f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"

@@ -32,8 +32,9 @@ if TYPE_CHECKING:  # a module of types: whoever reads a project need not wait fo
     from ..solvers.base import History, Solver
 
 Array = NDArray[np.float64]
-#: Makes a solver of its own for a model, so that what it prepares for the model is not shared.
-MakeSolver = Callable[[], "Solver"]
+#: Makes a solver of its own for a model, so that what it prepares for the model is not shared:
+#: the project's, or another by its name, with the settings that the project has for it.
+MakeSolver = Callable[..., "Solver"]
 #: Which of the measured points a fit matches, by name of the comparison.
 Masks = Mapping[str, NDArray[np.bool_]]
 #: A file below the output folder, and its caption or what it is.

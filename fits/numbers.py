@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
-from ..identification.assessment import pinned_by
+from ..identification.assessment import notes_of_misfits, pinned_by
 from ..notes import Note, NoteKind, as_note, rows
 
 if TYPE_CHECKING:
@@ -73,6 +74,10 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "notes": [],
         "wall_s": fit.wall_s,
         "versions": versions(),
+    }
+    result["misfit"] = {
+        name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
+        for name, m in fit.misfits.items()
     }
     if sure is not None:
         result["uncertainty"] = {
@@ -164,6 +169,8 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         own = [*unstable_words(unstable), *beyond_range(strains_of(history), ends)]
         own += map(as_note, history.remarks)
         notes += [note.about(comparison.name) for note in own] if several else own
+    left = notes_of_misfits(fit.misfits)
+    notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():
         told = [as_note(note) for note in findings.warnings]
         notes += [note.about(name) for note in told] if len(fit.findings) > 1 else told

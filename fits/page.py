@@ -96,6 +96,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         coefficients=_coefficients(fit),
         unit=project.scales.modulus_unit,
         moduli_error=result.get("moduli_error", {}),
+        moduli_error_range=result.get("moduli_error_range", {}),
         strain_reached=result["strain_reached"],
         valid_strain=result["valid_strain"],
         warnings=[note.line for note in fit.notes],
@@ -107,6 +108,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         ],
         tables=[
             *_determined(fit),
+            _left(fit),
             *_pinned_table(pins),
             *(t for exhibit in shown for t in exhibit.tables),
         ],
@@ -114,6 +116,20 @@ def _page(fit: Fit, folder: Path) -> Report:
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
         versions=result["versions"],
     )
+
+
+def _left(fit: Fit) -> Table:
+    """The residual of every comparison beside the noise of its data."""
+    rows: list[list[object]] = [
+        [name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()
+    ]
+    header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
+    note = (
+        "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "
+        "else what such an instrument is good for. The uncertainty reckons with the larger of "
+        "noise and residual."
+    )
+    return Table("Residual beside the noise", header, rows, note, text=(3, 4))
 
 
 def _summary(fit: Fit) -> str:

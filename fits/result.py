@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import __version__
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
+from ..identification.assessment import Misfit, misfits
 from ..identification.problem import FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
@@ -95,6 +96,11 @@ class Fit:
         from .numbers import result_of
 
         return result_of(self)
+
+    @cached_property
+    def misfits(self) -> dict[str, Misfit]:
+        """What is left of every comparison beside the noise of its data, by name."""
+        return misfits(self.problem, self.best.point)
 
     @cached_property
     def notes(self) -> list[Note]:

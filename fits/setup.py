@@ -67,10 +67,9 @@ class FitSetup:
             problem.surrogate = problem.with_solvers([solver_named(SURROGATE) for _ in comparisons])
         return problem
 
-    def make_solver(self) -> Solver:
-        """A new solver as the project names it."""
-        name = self.project.fit.solver
-        return solver_named(name, **self.project.solver_options.get(name, {}))
+    def make_solver(self, name: str | None = None) -> Solver:
+        """A new solver as the project names it, or another by name, with the project's settings."""
+        return make_solver(self.project, name)
 
     def own(self, test: PreparedTest) -> tuple[Comparison, ...]:
         """The comparisons of one test with its own objective."""
@@ -98,8 +97,19 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
     usable_solver(fit.solver, options, project.path, SOLVER_KEY)
     law = law_of(project, [test.reach for test in tests])
     bounds = bounds_of(project, law.form)
-    make = functools.partial(solver_named, fit.solver, **options)
+    make = functools.partial(make_solver, project)
     return FitSetup(project, law, bounds, tuple(test.prepare(law, make) for test in tests))
+
+
+def make_solver(project: Project, name: str | None = None) -> Solver:
+    """A new solver: the project's own, or another by name, with the project's settings of it.
+
+    Raises
+    ------
+    InputError : there is none of that name.
+    """
+    named = name or project.fit.solver
+    return solver_named(named, **project.solver_options.get(named, {}))
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..materials.forms.base import COMPONENTS, modulus_rows
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
+from .comparison import NoiseIs
 from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
@@ -23,6 +24,8 @@ PRIOR = 10.0
 #: Of the largest curvature of the misfit: below, the data say nothing of a direction.
 FLAT = 1e-13
 ON_BOUND = 1e-6
+#: A residual of so many times the noise is no noise: that of many points is near once.
+BEYOND_NOISE = 1.5
 
 
 def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
@@ -34,6 +37,48 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
             np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
         )
     return errors
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """RMS residual of a comparison beside the noise of its data, both in `unit`s."""
+
+    rms: float
+    noise: float
+    noise_is: NoiseIs
+    unit: str
+
+    @property
+    def ratio(self) -> float:
+        """How many times the noise is left."""
+        return self.rms / self.noise if self.noise > 0 else np.inf
+
+
+def misfits(problem: FitProblem, best: Evaluation) -> dict[str, Misfit]:
+    """Of every comparison, by its name."""
+    misfit, found = best.residual * problem.scale, {}
+    for k, comparison in enumerate(problem.comparisons):
+        rms = float(np.sqrt(np.mean(misfit[problem.rows(k)] ** 2)))
+        own = comparison.objective
+        found[comparison.name] = Misfit(
+            rms, own.least_noise, getattr(own, "noise_is", "assumed"), own.unit
+        )
+    return found
+
+
+def notes_of_misfits(found: Mapping[str, Misfit]) -> list[Note]:
+    """Where more is left than the noise that the project gives."""
+    return [
+        Note(
+            NoteKind.ABOVE_NOISE,
+            f"the fit leaves {m.rms:.3g} {m.unit} RMS, {m.ratio:.3g} times the noise given "
+            f"({m.noise:.3g} {m.unit}): model or data are off by more than noise, and the "
+            "uncertainty reckons with what is left as if it were",
+            name,
+        )
+        for name, m in found.items()
+        if m.noise_is == "given" and m.ratio > BEYOND_NOISE
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +171,12 @@ def _covariance(problem: FitProblem, best: Evaluation, sigma: Array) -> Array:
 
 def _noise(problem: FitProblem, best: Evaluation) -> tuple[dict[str, float], Array]:
     """Noise of each comparison in its unit, and of each residual (m,)."""
-    misfit, scale = best.residual * problem.scale, problem.scale
+    scale = problem.scale
     noise, sigma = {}, np.empty_like(scale)
-    for k, comparison in enumerate(problem.comparisons):
+    for k, (name, misfit) in enumerate(misfits(problem, best).items()):
         rows = problem.rows(k)
-        rms = float(np.sqrt(np.mean(misfit[rows] ** 2)))
-        noise[comparison.name] = max(comparison.objective.least_noise, rms)
-        sigma[rows] = noise[comparison.name] / scale[rows]
+        noise[name] = max(misfit.noise, misfit.rms)
+        sigma[rows] = noise[name] / scale[rows]
     return noise, sigma
 
 

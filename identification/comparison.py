@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,17 @@ Array = NDArray[np.float64]
 NEAR = 0.02
 
 
+#: Where the noise of an objective's data is from: the project says it, it is the scatter of the
+#: specimens, or what such an instrument is good for.
+NoiseIs = Literal["given", "specimens' scatter", "assumed"]
+
+
 class Objective(Protocol):
     """Residual blocks of one comparison.
 
     sizes : length of each block, together m; scale (m,): `unit`s in one unit of each residual;
-    least_noise in `unit`s, to reckon with where the data are exact; data: all that was measured.
+    least_noise in `unit`s, to reckon with at least (its `noise_is`, a `NoiseIs`, is "assumed"
+    where the objective has none); data: all that was measured.
     """
 
     @property

@@ -50,7 +50,8 @@ class Report:
     coefficients : rows (name, value, lower bound, upper bound) in `unit`.
     unit : of the coefficients, "GPa" unless the project says otherwise.
     moduli_error : largest relative error of E1, E2, G12 over the strain reached (0.01 is 1 %),
-        where the solution is known.
+        where the solution is known; moduli_error_range : by the same names, the strain from and
+        to which each was compared.
     strain_reached : largest warp, fill and shear strain in any test.
     valid_strain : by the same names, the ends up to which the moduli are fitted; as far as was
         reached unless given.
@@ -68,6 +69,7 @@ class Report:
     coefficients: Sequence[tuple[str, float, float, float]] = ()
     unit: str = "GPa"
     moduli_error: Mapping[str, float] = field(default_factory=dict)
+    moduli_error_range: Mapping[str, Sequence[float]] = field(default_factory=dict)
     strain_reached: Mapping[str, float] = field(default_factory=dict)
     valid_strain: Mapping[str, float] = field(default_factory=dict)
     warnings: Sequence[str] = ()

@@ -8,6 +8,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from ...identification.assessment import moduli_error
+from ...materials.forms.base import COMPONENTS
 from ...notes import Note, NoteKind
 from ..base import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 
 #: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
 FAITHFUL = 6
+CRIME = (
+    "the data were computed by the very model that is fitted to them (same mesh, same increments, "
+    "same solver): an inverse crime, so that the errors are smaller than any test could make them"
+)
 
 
 def objective_of(fitted: FittedTest) -> FieldObjective:
@@ -54,7 +59,11 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     if prepared.known is not None:
         errors = moduli_error(fitted.law, prepared.known, fitted.reached)
         numbers["moduli_error"] = errors
-        said = ", ".join(f"{name} {_percent(value)}" for name, value in errors.items())
+        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
+        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
+        said = ", ".join(
+            f"{name} {_percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
+        )
         lines.append(f"largest error of the moduli over the strain reached: {said}")
     if prepared.registration is not None:
         numbers["registration"] = registration_numbers(prepared.registration)
@@ -87,14 +96,16 @@ def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:
 
 
 def _warnings(prepared: PreparedBubble) -> list[Note]:
-    test = prepared.test
+    test, notes = prepared.test, []
+    if prepared.by_this_model:
+        notes.append(Note(NoteKind.INVERSE_CRIME, CRIME))
     if test.match_by != "surfaces" or test.match_degree >= FAITHFUL:
-        return []
+        return notes
     words = (
         f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk closely "
         "and bias the moduli, also without noise; matching by points does not"
     )
-    return [Note(NoteKind.SURFACES, words)]
+    return [*notes, Note(NoteKind.SURFACES, words)]
 
 
 def _percent(value: float) -> str:

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...identification.comparison import NoiseIs
 from ...solvers.base import History
 
 Array = NDArray[np.float64]
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Nuisance of a measured field: a rigid displacement, mm.
 OFFSETS = ("offset_x", "offset_y", "offset_z")
+#: mm, noise of a displacement by a good image correlation.
+CORRELATION = 0.05
 
 
 def displacement_offset(nuisance: Mapping[str, float]) -> Array:
@@ -58,22 +61,26 @@ class FieldObjective:
     targets : one a reported pressure, in the order of the model's frames.
     normalise : "e" (Eq. 4.8) or "mm".
     weight : of every block in e.
+    noise : mm, of one measured displacement, to reckon with at least; that of a good image
+        correlation unless given.
 
     Raises
     ------
     InputError : a direction without any displacement cannot be normalised by it.
     """
 
-    #: What the residuals are in after `scale`, and the least noise to reckon with where the data
-    #: are exact (computed): that of a good image correlation.
-    unit, least_noise = "mm", 0.05
+    #: What the residuals are in after `scale`.
+    unit = "mm"
 
     def __init__(
         self,
         targets: Sequence[FieldTarget],
         normalise: Literal["e", "mm"] = "e",
         weight: float = 1.0,
+        noise: float | None = None,
     ) -> None:
+        self.least_noise = CORRELATION if noise is None else noise
+        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
         self.targets = tuple(targets)
         self.scales = []
         for target in self.targets:

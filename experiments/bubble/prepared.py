@@ -41,7 +41,8 @@ class PreparedBubble:
     """The test, what was measured (or computed) as read, and polynomial surfaces of it.
 
     known : the law behind computed data. surfaces : for the match or the report. registration :
-    of the fields, None where the files were in the test's coordinates.
+    of the fields, None where the files were in the test's coordinates. by_this_model : the data
+    were computed with the mesh, the increments and the solver of the fit.
     """
 
     test: BubbleTest
@@ -49,6 +50,7 @@ class PreparedBubble:
     surfaces: tuple[DisplacementSurface, ...]
     known: HypoelasticLaw | None
     registration: Registration | None = None
+    by_this_model: bool = False
 
     @property
     def objective_is(self) -> str:
@@ -90,7 +92,7 @@ class PreparedBubble:
             targets, _ = at_points(test, fields, model.mesh)
         try:
             objective = FieldObjective(
-                targets, "e" if weighting.relative else test.objective, weight
+                targets, "e" if weighting.relative else test.objective, weight, test.noise
             )
         except InputError as error:
             raise in_section(test.place, error) from None
@@ -141,14 +143,37 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     ------
     InputError : in the data. SolverFailure : the known solution cannot be run.
     """
-    known, registration = None, None
+    known, registration, same = None, None, False
     if isinstance(test.data, KnownSolution):
-        known = _known_law(test, test.data, law)
-        fields = _computed(test, test.data, known, make_solver())
+        known, solver = _known_law(test, test.data, law), _solver(test, test.data, make_solver)
+        fields = _computed(test, test.data, known, solver)
+        own = test.data.solver is None or solver.identity == make_solver().identity
+        same = own and _same_steps_and_mesh(test, test.data)
     else:
         fields, registration = _measured(test, test.data)
     surfaces = _surfaces(test, fields, known is not None)
-    return PreparedBubble(test, fields, surfaces, known, registration)
+    return PreparedBubble(test, fields, surfaces, known, registration, same)
+
+
+def _solver(test: BubbleTest, data: KnownSolution, make_solver: MakeSolver) -> Solver:
+    """Who computes the data: the solver that fits unless another is named."""
+    if data.solver is None:
+        return make_solver()
+    try:
+        return make_solver(data.solver)
+    except InputError as error:
+        field = "data.known_solution.solver"
+        raise test.place.error(field, error.problem) from None
+
+
+def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
+    """Whether the data are of the increments and the mesh that the fit has, whole or folded."""
+    if len(data.increments) != len(test.increments):
+        return False
+    if not np.allclose(data.increments, test.increments, rtol=1e-9, atol=0.0):
+        return False
+    own, other = (test.model(elements=n).mesh for n in (test.elements, data.elements))
+    return own.points.shape == other.points.shape and np.allclose(own.points, other.points)
 
 
 def _known_law(test: BubbleTest, data: KnownSolution, law: HypoelasticLaw) -> HypoelasticLaw:
@@ -180,7 +205,7 @@ def _surfaces(
 def _computed(
     test: BubbleTest, data: KnownSolution, known: HypoelasticLaw, solver: Solver
 ) -> tuple[DisplacementField, ...]:
-    """Displacements of the known solution by the solver that fits, on the data's own mesh."""
+    """Displacements of the known solution by a solver, on the data's own mesh."""
     if data.symmetry == "quarter" and test.symmetry == "full":
         problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
         raise test.place.error("data.known_solution.symmetry", problem)

@@ -22,6 +22,7 @@ class KnownSolutionSection(Section):
     elements: Elements | None = None
     increments: list[Positive] | None = None
     symmetry: Symmetry | None = None
+    solver: Annotated[str, Field(min_length=1, max_length=300)] | None = None
 
 
 class ColumnsSection(Section):
@@ -87,6 +88,7 @@ class BubbleSection(Section):
     symmetry: Symmetry = "full"
     generator: Literal["blocks", "gmsh"] = "blocks"
     objective: Literal["e", "mm"] = "e"
+    noise: Positive | None = None
     match: MatchSection = MatchSection()
     nuisance: NuisanceSection = NuisanceSection()
     data: DataSection

@@ -26,7 +26,7 @@ class KnownSolution:
     """Data to be computed by the forward model.
 
     beta : MPa, of the form `form`. elements : of the full disk. increments : MPa, containing the
-    pressures.
+    pressures. solver : who computes them, the one that fits unless named.
     """
 
     beta: NDArray[np.float64]
@@ -34,6 +34,7 @@ class KnownSolution:
     elements: int
     increments: tuple[float, ...]
     symmetry: Literal["full", "quarter"]
+    solver: str | None = None
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,7 @@ def _known(
         elements=known.elements or section.elements,
         increments=tuple(increments),
         symmetry=known.symmetry or section.symmetry,
+        solver=known.solver,
     )
 
 

@@ -25,6 +25,7 @@ class BubbleTest:
     """A clamped disk that is inflated. Lengths mm, pressures MPa.
 
     `pressures` are reported and matched, `increments` are the load steps and contain them.
+    `noise` (mm) of one measured displacement, None where it is not given.
     """
 
     name: str
@@ -42,6 +43,7 @@ class BubbleTest:
     objective: Literal["e", "mm"]
     displacement_offset: bool
     pressure_offset: bool
+    noise: float | None = None
     kind: str = "bubble"
 
     @property
@@ -164,6 +166,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         objective=section.objective,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
+        noise=None if section.noise is None else section.noise * scales.length,
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from ...errors import InputError
+from ...identification.comparison import NoiseIs
 from ...solvers.base import History
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ class LoadObjective:
         interpolated by a cubic spline from the origin through its increments.
     scale : N: 1 for errors in N (Eq. 3.7), the largest load for relative errors.
     weight : of the block in e.
-    least_noise : N, to reckon with where the data are exact.
+    least_noise : N, to reckon with at least; noise_is : where it is from.
 
     Raises
     ------
@@ -42,6 +43,7 @@ class LoadObjective:
         scale: float = 1.0,
         weight: float = 1.0,
         least_noise: float = 0.0,
+        noise_is: NoiseIs = "assumed",
     ) -> None:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
@@ -54,7 +56,7 @@ class LoadObjective:
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
         self.sizes = (len(self.load),)
-        self.weight, self.least_noise = weight, least_noise
+        self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
         self._unit = scale * np.sqrt(len(self.load)) / weight
 
     @property

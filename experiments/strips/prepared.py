@@ -121,9 +121,8 @@ class PreparedStrips:
             raise test.place.error(direction, "the measured load is zero")
         scale = largest if relative else 1.0
         weight = share * test.weights[direction]
-        return LoadObjective(
-            model.elongations, elongation, load, scale, weight, strip.noise(largest)
-        )
+        noise = strip.noise(largest, test.noise)
+        return LoadObjective(model.elongations, elongation, load, scale, weight, *noise)
 
     def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
         """The strips that a fit matched, each with its model, objective and history."""

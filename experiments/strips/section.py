@@ -81,6 +81,7 @@ class StripsSection(Section):
     fill: GaugeSection | None = None
     bias: GaugeSection | None = None
     data: CurvesSection
+    noise: Positive | None = None
     match: Match = "polynomial"
     objective: Unit = "N"
     weight: Weight = 1.0

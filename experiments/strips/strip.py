@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...data.curves import LoadCurve
 from ...data.load_polynomials import LoadPolynomial, fit_load_polynomial
 from ...data.regions import strain_regions
+from ...identification.comparison import NoiseIs
 
 Array = NDArray[np.float64]
 
@@ -69,9 +70,16 @@ class Strip:
         """Number of measured points that are not among the `points`."""
         return sum(len(c.load) for c in self.curves) - len(self.points[0])
 
-    def noise(self, largest: float) -> float:
-        """Least noise of a load to reckon with, N; `largest` is the largest load measured."""
-        return LOAD_CELL * largest if self.scatter is None else self.scatter
+    def noise(self, largest: float, given: float | None = None) -> tuple[float, NoiseIs]:
+        """Least noise of a load to reckon with, N, and what it is.
+
+        largest : load measured. given : what the project says of it.
+        """
+        if given is not None:
+            return given, "given"
+        if self.scatter is not None:
+            return self.scatter, "specimens' scatter"
+        return LOAD_CELL * largest, "assumed"
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
         """Two shares of the gauge's strain between which three lines follow the load curve best.

@@ -35,7 +35,8 @@ Mask = NDArray[np.bool_]
 class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
 
-    `strips` and `weights` by direction (warp, fill, bias).
+    `strips` and `weights` by direction (warp, fill, bias). `noise` (N) of one measured load, None
+    where it is not given.
     """
 
     name: str
@@ -49,6 +50,7 @@ class StripsTest:
     match_by: Match
     weights: Mapping[str, float]
     objective: Unit
+    noise: float | None = None
     kind: str = "strips"
 
     @property
@@ -142,6 +144,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         match_by=section.match,
         weights=weights,
         objective=section.objective,
+        noise=section.noise,
     )
 
 

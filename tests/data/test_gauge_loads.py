@@ -40,7 +40,7 @@ def test_the_table_of_a_gauge_reads_back_as_a_load_curve(record, tmp_path):
     np.testing.assert_array_equal(back.elongation, curve.elongation)
     np.testing.assert_array_equal(back.load, curve.load)
     numbers = table.numbers()
-    assert numbers["lost"] == ["b"] and numbers["points"] == 2 and "a note" in table.warnings
+    assert numbers["lost"] == ["b"] and numbers["points"] == 2 and "a note" in table.notes
     assert numbers["longest"] == {
         "file": "c",
         "length_mm": pytest.approx(1.2 * table.record.reference_length),

@@ -36,7 +36,7 @@ def test_cards_in_tests(bars: BarSolver, tmp_path: Path) -> None:
     assert thick["warp"] == pytest.approx(2 * soft["warp"])
     # Each test has files of its own.
     assert {path.name for path in tmp_path.iterdir()} == {
-        "one-bars.txt", "two-bars.txt", "result.json"
+        "one-bars.txt", "two-bars.txt", "notes.csv", "result.json"
     }  # fmt: skip
     assert steps[0].analyses == 6 and steps[-1].analysis == 6
     (note,) = done.numbers["notes"]
