@@ -52,8 +52,9 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
 def validate(setup: FitSetup, count: int, starts: int, jobs: int) -> Iterator[FoldError | None]:
     """Fit without the points of each fold and judge at these points; None now and then.
 
-    What follows from the data (breaks of a law with regions) follows from the points matched, and
-    the fits begin at random starts of their own: nothing of the points left out is in them.
+    What follows from the data (strain range and breaks of the law, what a relative error is over)
+    follows from the points matched, and the fits begin at random starts of their own: nothing of
+    the points left out is in them but how far the models are strained, to be judged there.
 
     Parameters
     ----------
@@ -70,10 +71,15 @@ def _task(
     return lambda fold, tell: _fold(setup, fold, parts[fold], starts)
 
 
-def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
+def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.ndarray | None]:
+    """The fit with a law of the points that the masks keep; unknowns None where all starts fail."""
     law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
     own = replace(setup, law=law)
-    unknowns = _best(own, own.problem(masks), starts)
+    return own, _best(own, own.problem(masks), starts)
+
+
+def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
+    own, unknowns = fit_of(setup, masks, starts)
     if unknowns is None:
         return FoldError(fold, None, {})
     whole = own.problem({name: ~mask for name, mask in masks.items()})

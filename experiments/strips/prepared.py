@@ -113,10 +113,10 @@ class PreparedStrips:
     ) -> LoadObjective:
         test, strip = self.test, self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
-        largest = float(np.abs(load).max(initial=0.0))
         mask = masks.get(self.part(direction))
         if mask is not None:
             elongation, load = elongation[mask], load[mask]
+        largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
         scale = largest if relative else 1.0

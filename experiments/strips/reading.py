@@ -129,6 +129,7 @@ def _measured(
             curves=curves,
             scatter=scatter,
             through_origin=data.through_origin,
+            open_end=own.final_length is None,
         )
     return strips
 

@@ -34,6 +34,7 @@ class Strip:
     curves : the specimens' points, empty where only the polynomial is given.
     scatter : standard deviation of the points about the polynomial; None where not known.
     through_origin : whether a polynomial through the points starts in the origin.
+    open_end : nobody said the final length: it is where the points end.
     """
 
     direction: str
@@ -43,6 +44,7 @@ class Strip:
     curves: tuple[LoadCurve, ...] = ()
     scatter: float | None = None
     through_origin: bool = True
+    open_end: bool = False
 
     @property
     def elongation(self) -> float:
@@ -52,7 +54,12 @@ class Strip:
     @property
     def strain(self) -> float:
         """Logarithmic strain of the gauge at the end."""
-        return float(np.log(self.final_length / self.gauge_length))
+        return float(np.log1p(self.elongation / self.gauge_length))
+
+    def strain_by(self, mask: NDArray[np.bool_] | None) -> float:
+        """The same by the points of a mask, which alone say where the end is if nobody else did."""
+        end = self._end_of(mask) if self.open_end else self.elongation
+        return float(np.log1p(end / self.gauge_length))
 
     @property
     def points(self) -> tuple[Array, Array]:
@@ -99,10 +106,16 @@ class Strip:
             polynomial = fit_load_polynomial(
                 elongation[mask], load[mask], order, self.through_origin
             )
-        u = np.linspace(0.0, self.elongation, PLACES)[1:]
-        strain = np.log1p(u / self.gauge_length)
+        u = np.linspace(0.0, self._end_of(mask), PLACES)[1:]
+        strain, whole = np.log1p(u / self.gauge_length), self.strain_by(mask)
         first, second = strain_regions(strain, polynomial(u))
-        return float(first / strain[-1]), float(second / strain[-1])
+        return float(first / whole), float(second / whole)
+
+    def _end_of(self, mask: NDArray[np.bool_] | None) -> float:
+        """How far (mm) the points of a mask go, at most to the end of the gauge."""
+        if mask is None or not self.curves:
+            return self.elongation
+        return min(self.elongation, float(self.points[0][mask].max()))
 
     @cached_property
     def _inside(self) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -167,12 +167,11 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
 
     masks : which of the points a curve follows, by direction; all unless given.
     """
-    masks = masks or {}
-    strips = test.strips
+    masks, strips = masks or {}, test.strips
     per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
     ends, shares = {}, {}
     for direction, strip in strips.items():
-        ends[direction] = per_stretch.get(direction, 1.0) * strip.strain
+        ends[direction] = per_stretch.get(direction, 1.0) * strip.strain_by(masks.get(direction))
         shares[direction] = strip.break_shares(masks.get(direction))
     return Reach(
         (ends.get("warp"), ends.get("fill"), ends.get("bias")),
