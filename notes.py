@@ -56,6 +56,7 @@ class NoteKind(StrEnum):
     SURFACES = "unfaithful surfaces"
     UNMATCHED = "unmatched direction"
     LEFT_OUT = "points left out"
+    READING = "how a file was read"
     FOLD = "fold without an error"
     #: Of a virtual strain gauge.
     LOST = "correlation lost"

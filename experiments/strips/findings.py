@@ -56,7 +56,8 @@ def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[Note]:
         for direction, modulus in PINS.items()
         if direction not in directions
     ]
-    words += dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
+    said = dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
+    notes += [Note(NoteKind.READING, words) for words in said]
     if test.match_by == "points":
         notes += [
             Note(

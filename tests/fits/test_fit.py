@@ -277,11 +277,11 @@ def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
 
 
 def test_a_test_that_says_nothing_of_a_modulus_is_named(fitted: bf.Fit):
-    from bubblefit.fits.numbers import warnings_of
+    from bubblefit.fits.numbers import notes_of_fit
 
     def said(least: float) -> list[str]:
         sigma = {"least": least, "median": 2.0, "largest": 9.0}
-        return [w for w in warnings_of(fitted, {"bubble": {"G12": sigma}}) if "alone" in w]
+        return [w for w in notes_of_fit(fitted, {"bubble": {"G12": sigma}}) if "alone" in w]
 
     assert said(0.9) == []
     assert len(said(1.1)) == 1 and "bubble alone does not determine G12" in said(1.1)[0]
