@@ -33,6 +33,7 @@ class NoteKind(StrEnum):
     PENETRATION = "penetration"
     WRINKLES = "wrinkle stiffness"
     GAS = "gas"
+    TILT = "tilted sheet"
     REPEATED = "repeated increments"
     UNCONFIRMED = "unconfirmed"
     UNBALANCED = "unbalanced forces"

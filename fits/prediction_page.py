@@ -45,7 +45,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     for mark in MARKS:
         count = sum(mark in marks(run.notes) for run in each)
         if count:
-            summary += f" Marked {mark!r}: {count}."
+            summary += f" Marked {mark.value!r}: {count}."
     if predictions.worst is not None:
         summary += f" Largest error against measured values: {percent(predictions.worst)}."
     return Report(

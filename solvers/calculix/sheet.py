@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...models.bubble import BubbleModel
+from ...notes import Note, NoteKind
 from .shells import ShellMesh
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Arra
     return moved
 
 
-def tilt_remarks(shells: ShellMesh) -> tuple[str, ...]:
+def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
     """What the tilt of the sheet does to the law, where that is worth a word.
 
     Warp and fill are x and y of the deck, not laid onto every shell: where a shell stands at a
@@ -88,4 +89,5 @@ def tilt_remarks(shells: ShellMesh) -> tuple[str, ...]:
     if slope <= STEEP:
         return ()
     lower = f"the sheet's slopes of up to {slope:.2f} lower its stiffness there by up to"
-    return (f"CalculiX takes warp and fill as x and y: {lower} {200 * slope**2:.1f} %",)
+    words = f"CalculiX takes warp and fill as x and y: {lower} {200 * slope**2:.1f} %"
+    return (Note(NoteKind.TILT, words),)
