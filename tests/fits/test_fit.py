@@ -210,11 +210,11 @@ def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path
 
 
 def test_starts_that_a_failure_ended_are_told(fitted: bf.Fit):
-    from bubblefit.fits.numbers import warnings_of
+    from bubblefit.fits.numbers import notes_of_fit
 
     cut = replace(fitted.best.records[1], failure="killed by SIGKILL at once")
     best_of = replace(fitted.best, records=[fitted.best.records[0], cut])
-    told = [w for w in warnings_of(replace(fitted, best=best_of), {}) if "starts ended" in w]
+    told = [w for w in notes_of_fit(replace(fitted, best=best_of), {}) if "starts ended" in w]
     assert told == ["1 of 2 starts ended because membrane failed (killed by SIGKILL at once): "
                     "--resume tries them again"]  # fmt: skip
 
@@ -257,7 +257,7 @@ def test_another_form_of_the_moduli(tmp_path: Path, form: str):
 
 
 def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
-    from bubblefit.fits.numbers import warnings_of
+    from bubblefit.fits.numbers import notes_of_fit
 
     def with_unstable(point, words):
         (history,) = point.histories
@@ -267,7 +267,7 @@ def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
         best = fitted.best
         best = replace(best, point=with_unstable(best.point, counts),
                        differentiated=with_unstable(best.differentiated, leads))  # fmt: skip
-        return [w for w in warnings_of(replace(fitted, best=best), {}) if "unstable" in w]
+        return [w for w in notes_of_fit(replace(fitted, best=best), {}) if "unstable" in w]
 
     told = ["unstable equilibrium at 59 kPa: the model would not stay there"]
     assert said((), ()) == []
