@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,12 @@ from .measured import Measured
 
 #: A test that takes this many times its own time, and so many seconds, runs for ever.
 PATIENCE = (4.0, 20.0)
+#: What the tests load anyway, once for all of them.
+LIBRARIES = (
+    "click", "gmsh", "hypothesis", "jinja2", "matplotlib.backends.backend_agg", "meshio", "nlopt",
+    "numba", "pandas", "pydantic", "pytest", "quadprog", "rich.console", "scipy.interpolate",
+    "scipy.optimize", "scipy.sparse.linalg", "tomli_w",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -32,16 +38,18 @@ class Verdict:
 
 
 class Judge:
-    """Tests run by a process of its own (`server`) in the copy `house`."""
+    """Tests run by a process of its own (`server`) in the copy `house`, libraries loaded before."""
 
-    def __init__(self, house: Path, measured: Measured, limit: float) -> None:
-        self.house, self.measured, self.limit = house, measured, limit
+    def __init__(
+        self, house: Path, measured: Measured, limit: float, libraries: Sequence[str] = LIBRARIES
+    ) -> None:
+        self.house, self.measured, self.limit, self.libraries = house, measured, limit, libraries
         self.unfit: set[str] = set()
         self.process: subprocess.Popen[str]
 
     def __enter__(self) -> Judge:
         self.process = subprocess.Popen(
-            [sys.executable, server.__file__],
+            [sys.executable, server.__file__, *self.libraries],
             cwd=self.house,
             env=environment(self.house),
             stdin=subprocess.PIPE,
@@ -89,7 +97,9 @@ class Judge:
 
 
 @contextmanager
-def judge(house: Path, measured: Measured, limit: float) -> Iterator[Judge]:
+def judge(
+    house: Path, measured: Measured, limit: float, libraries: Sequence[str] = LIBRARIES
+) -> Iterator[Judge]:
     """A judge whose process ends with the block."""
-    with Judge(house, measured, limit) as one:
+    with Judge(house, measured, limit, libraries) as one:
         yield one

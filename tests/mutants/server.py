@@ -1,8 +1,8 @@
 """Runs pytest again and again in children of one process that has loaded the libraries.
 
 A script, run inside the copy of the repository; it must not load bubblefit, which changes from
-one run to the next. Every line that it reads is {"tests": [...], "seconds": ...}, and every line
-that it writes {"outcome": ..., "test": ...}.
+one run to the next. Its arguments are the libraries to load. Every line that it reads is
+{"tests": [...], "seconds": ...}, and every line that it writes {"outcome": ..., "test": ...}.
 """
 
 import importlib
@@ -12,12 +12,6 @@ import signal
 import sys
 import tempfile
 import time
-
-LIBRARIES = (
-    "click", "gmsh", "hypothesis", "jinja2", "matplotlib.backends.backend_agg", "meshio", "nlopt",
-    "numba", "pandas", "pydantic", "pytest", "quadprog", "rich.console", "scipy.interpolate",
-    "scipy.optimize", "scipy.sparse.linalg", "tomli_w",
-)  # fmt: skip
 
 
 def child(tests: list[str], log: int) -> None:
@@ -64,7 +58,7 @@ def outcome(tests: list[str], seconds: float) -> dict[str, str]:
 def main() -> None:
     """Until there is nothing more to read."""
     sys.path[0] = ""  # not the folder of this script
-    for name in LIBRARIES:
+    for name in sys.argv[1:]:
         importlib.import_module(name)
     answers = os.fdopen(os.dup(1), "w")
     for line in sys.stdin:

@@ -134,7 +134,7 @@ def test_caught_survived_and_unrun(little: Path):
     mutants = {mutant.after: mutant for seed in range(60) for mutant in draw({file: source}, seed)}
     with house.copy(little) as copy:
         known = measure(copy, near(copy, file), copy.parent / "run", processes=1)
-        with judge(copy, known, 60.0) as one:
+        with judge(copy, known, 60.0, ["pytest"]) as one:
             found = {after: one.judge(mutants[after]) for after in WANTED}
             assert one.fit("tests/rooms/test_scale.py::test_kpa")
             assert not one.fit("tests/rooms/test_scale.py::test_alone")
