@@ -25,7 +25,7 @@ from ..reports import (
     write_report,
 )
 from ..writing import replacing
-from .numbers import NOTHING, pinned
+from .numbers import pinned
 from .store import RESULT, Store
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
 #: Strains at which curves are drawn.
 SMOOTH = 121
+#: A modulus is said to be unknown from here on: as uncertain as it was before, but for rounding.
+UNKNOWN = 0.999 * PRIOR
 FILES = (
     (RESULT, "all numbers of this page, for programs"),
     (CARD, "the material card"),
@@ -203,7 +205,7 @@ def _pinned(fit: Fit, folder: Path, pins: dict[str, dict[str, Array]]) -> list[t
 
 def sigma_words(value: float) -> str:
     """A relative uncertainty as percent, as long as it says anything."""
-    return percent(value) if value < 10 * NOTHING else "unknown"
+    return percent(value) if value < UNKNOWN else "unknown"
 
 
 def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:

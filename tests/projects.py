@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from .places import KNOWN
 
 #: The easy form of bounds, which serves every form of the moduli.
@@ -29,4 +31,70 @@ def with_form(folder: Path, form: str) -> Path:
     margin = next(line for line in text.splitlines() if line.startswith("margin"))
     path = folder / "project.toml"
     path.write_text(text.replace(margin, "").replace('form = "cubic"', form))
+    return path
+
+
+#: Strips of a fabric of constant moduli in two tests, the second of the warp only.
+STRIPS = """
+[fabric]
+name = "made"
+thickness = 0.8
+[units]
+modulus = "GPa"
+[law]
+form = "constant"
+nu12 = 0.0
+strain_range = [0.12, 0.14, 0.1]
+[law.bounds]
+E1 = [0.02, 2.0]
+E2 = [0.03, 1.0]
+G12 = [0.005, 0.2]
+[defaults.strips]
+increments = 8
+match = "points"
+[[strips]]
+name = "one"
+warp = { gauge_length = 20, final_length = 22.9 }
+fill = { gauge_length = 20, final_length = 22.9 }
+[strips.data]
+files = ["one.csv"]
+[[strips]]
+name = "two"
+weight = 3.0
+warp = { gauge_length = 20, final_length = 22.5 }
+[strips.data]
+files = ["two.csv"]
+[fit]
+starts = 2
+seed = 7
+"""
+#: MPa, of two specimens a direction.
+MODULI = {
+    "one": {"warp": (300.0, 360.0), "fill": (200.0, 180.0)},
+    "two": {"warp": (330.0, 410.0)},
+}
+ELONGATION = np.linspace(0.2, 3.0, 12)
+
+
+def constant_strips(folder: Path, *changes: tuple[str, str]) -> Path:
+    """A project of `STRIPS`, changed by replacing text, and its points.
+
+    Without contraction a load is 0.8 mm times 25 mm times E ln(1 + elongation / 20).
+    """
+    for test, directions in MODULI.items():
+        lines = ["direction,specimen,elongation (mm),load (N)"]
+        for direction, moduli in directions.items():
+            for specimen, modulus in zip("ab", moduli, strict=True):
+                loads = 20 * modulus * np.log1p(ELONGATION / 20)
+                lines += [
+                    f"{direction},{specimen},{u!r},{load!r}"
+                    for u, load in zip(ELONGATION.tolist(), loads.tolist(), strict=True)
+                ]
+        (folder / f"{test}.csv").write_text("\n".join(lines) + "\n")
+    text = STRIPS
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = folder / "project.toml"
+    path.write_text(text)
     return path

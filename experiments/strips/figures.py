@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.polynomial_order import compare_orders
+from ...errors import InputError
 from ...materials.forms.base import COMPONENTS
 from ...meshes.strain import middle_strain
 from ...models.uniaxial import UniaxialModel
@@ -105,13 +106,16 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
     """Which order the load polynomials should have; False where there are no points to ask."""
     panels = []
     for strip in strips:
-        if strip.polynomial is None or len(strip.points[0]) < max(ORDERS) + 2:
+        if strip.polynomial is None:
             continue
         whose = strip.specimen_of.tolist()
         specimens = whose if len(set(whose)) > 1 else None
-        scores = compare_orders(
-            *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
-        ).scores
+        try:
+            scores = compare_orders(
+                *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
+            ).scores
+        except InputError:  # too few points for the highest order, or at too few elongations
+            continue
         panels.append(
             OrderErrors(
                 strip.direction,

@@ -1,0 +1,125 @@
+"""All that result.json says of a fit, and every warning, word by word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.fits.numbers import TOGETHER, versions, warnings_of
+
+OPEN = "rests on the other directions"
+LEFT = "points beyond the final length (or before zero) were left out"
+
+
+def test_everything_of_two_tests(together: bf.Fit) -> None:
+    fit, law = together, together.law
+    result = dict(fit.result)
+    sure = fit.best.certainty
+    assert sure is not None
+    pinned = result.pop("pinned")
+    assert list(pinned) == ["one", "two", TOGETHER]
+    for name, sigma in sure.sigma.items():
+        least, most = float(sigma.min()), float(sigma.max())
+        own = {"least": least, "median": float(np.median(sigma)), "largest": most}
+        assert pinned[TOGETHER][name] == own
+    assert set(result.pop("tests")) == {"one", "two"}
+    assert list(result.pop("mean_relative_error")) == ["one", "two"]
+    assert result.pop("warnings") == warnings_of(fit, pinned)
+    ends = dict(zip(("warp", "fill", "shear"), fit.best.reached.tolist(), strict=True))
+    assert result == {
+        "command": "strips",
+        "title": "made",
+        "solver": "membrane",
+        "method": "lm",
+        "objective": fit.objective,
+        "objective_is": "weighted sum of the tests' mean relative RMS errors",
+        "moduli": "constant",
+        "beta": {
+            "unit": "GPa",
+            "labels": [f"beta_{i}" for i in range(12)],
+            "values": pytest.approx((1e-3 * law.beta).tolist()),
+        },
+        "nu12": 0.0,
+        "strain_reached": ends,
+        "valid_strain": {**ends, "warp": 0.12},
+        "seed": 7,
+        "starts": [
+            {
+                "start": number,
+                "seed": [7, number],
+                "objective": record.objective,
+                "status": "converged",
+                "analyses": record.analyses,
+                "external_runs": 0,
+            }
+            for number, record in enumerate(fit.best.records)
+        ],
+        "analyses": sum(record.analyses for record in fit.best.records),
+        "external_runs": 0,
+        "wall_s": fit.wall_s,
+        "versions": versions(),
+        "uncertainty": {
+            "noise": sure.noise,
+            "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
+            "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+        },
+        "weights": {"one": 1.0, "two": 3.0},
+    }
+
+
+def test_every_warning_of_two_tests(together: bf.Fit) -> None:
+    words = "(1 sigma above 100 % everywhere)"
+    assert together.result["warnings"] == [
+        "G12 is uncertain by up to 1000 % (1 sigma with the tests' noise), worst at strain 0.000",
+        "warp strain reached 0.135 in one: warp, beyond law.strain_range 0.12: the modulus was "
+        "held at its end value there; a wider range would let it vary",
+        f"one: no bias strip of one is matched: G12 {OPEN}",
+        f"one: warp: 2 {LEFT}",
+        f"one: fill: 2 {LEFT}",
+        f"two: no fill strip of two is matched: E2 {OPEN}",
+        f"two: no bias strip of two is matched: G12 {OPEN}",
+        f"two: warp: 4 {LEFT}",
+        f"one alone does not determine G12 {words}",
+        f"two alone does not determine E2 {words}",
+        f"two alone does not determine G12 {words}",
+    ]
+
+
+def test_every_warning_of_one_test(alone: bf.Fit) -> None:
+    """Its name stands before none of them; nothing else could be meant."""
+    noise = alone.result["uncertainty"]["noise"]["two: warp"]
+    words = f"is uncertain by up to 1000 % (1 sigma at {noise:.2g} N noise), worst at strain 0.000"
+    assert alone.result["warnings"] == [
+        f"E2 {words}",
+        f"G12 {words}",
+        f"no fill strip of two is matched: E2 {OPEN}",
+        f"no bias strip of two is matched: G12 {OPEN}",
+        f"warp: 4 {LEFT}",
+    ]
+    assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
+    assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
+    assert "weights" not in alone.result and "mean_relative_error" not in alone.result
+
+
+def test_remarks_and_unstable_equilibria_with_the_name_of_the_part(together: bf.Fit) -> None:
+    best = together.best
+    marked = [
+        replace(h, unstable=("1 mm",) if k == 1 else (), remarks=("snaps",) if k == 2 else ())
+        for k, h in enumerate(best.point.histories)
+    ]
+    point = replace(best.point, histories=tuple(marked))
+    fit = replace(together, best=replace(best, point=point))
+    said = [w for w in warnings_of(fit, {}) if "unstable" in w or "snaps" in w]
+    assert said == [
+        "one: fill: unstable equilibrium at 1 mm: the model would not stay there",
+        "two: warp: snaps",
+    ]
+
+
+def test_versions_of_what_computes() -> None:
+    found = versions()
+    names = ("bubblefit", "python", "numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
+    assert tuple(found) == names
+    assert (found["bubblefit"], found["numpy"]) == (bf.__version__, np.__version__)

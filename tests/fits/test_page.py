@@ -1,0 +1,302 @@
+"""The whole page of a fit: facts, tables, figures, warnings, files, each as reckoned here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.experiments.base import Exhibit
+from bubblefit.fits import page
+from bubblefit.fits.numbers import versions
+from bubblefit.reports import Report, StartRow, Table, percent
+
+from ..projects import ELONGATION, MODULI
+
+ENDS = {"one": 2.9, "two": 2.5}
+NOISE_NOTE = (
+    " on everything matched: neighbouring values err together, so this flatters; single "
+    "coefficients are far less certain than the moduli they make"
+)
+
+
+class Told:
+    """What is drawn and written, without drawing it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.calls: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
+        for name in ("plot_optima", "plot_moduli", "plot_pinned"):
+            monkeypatch.setattr(page, name, self.keep(name))
+
+    def keep(self, name: str) -> Any:
+        return lambda path, *args, **named: self.calls.update({name: (args, named)})
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> Told:
+    return Told(monkeypatch)
+
+
+def reported(fit: bf.Fit, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Report:
+    seen: list[Report] = []
+
+    def keep(folder: Path, report: Report) -> Path:
+        seen.append(report)
+        return folder / "report.html"
+
+    monkeypatch.setattr(page, "write_report", keep)
+    assert fit.report(folder) == folder / "report.html"
+    return seen[0]
+
+
+@pytest.fixture(scope="module")
+def written(together: bf.Fit, tmp_path_factory: pytest.TempPathFactory) -> tuple[Report, Told]:
+    """The page of both tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        told = Told(patch)
+        return reported(together, tmp_path_factory.mktemp("page"), patch), told
+
+
+@pytest.fixture
+def nothing_shown(together: bf.Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No picture of a test, which takes longest."""
+    monkeypatch.setattr(type(together.setup.tests[0]), "show", lambda *_: Exhibit())
+
+
+def points(test: str, direction: str) -> tuple[np.ndarray, np.ndarray]:
+    """Strain and load (N) of both specimens, as far as the model goes."""
+    strain = np.log1p(ELONGATION[ELONGATION <= ENDS[test]] / 20)
+    loads = [20 * e * strain for e in MODULI[test][direction]]
+    return np.tile(strain, 2), np.concatenate(loads)
+
+
+def rms(fit: bf.Fit, test: str, direction: str) -> float:
+    """N, of a constant modulus in closed form."""
+    strain, load = points(test, direction)
+    modulus = fit.law.beta[11 if direction == "warp" else 7]
+    return float(np.sqrt(np.mean((20 * modulus * strain - load) ** 2)))
+
+
+def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
+    fit, result, (found, _) = together, together.result, written
+    errors = {(t, d): rms(fit, t, d) for t, own in MODULI.items() for d in own}
+    largest = {key: points(*key)[1].max() for key in errors}
+    means = [
+        0.5 * sum(errors["one", d] / largest["one", d] for d in ("warp", "fill")),
+        errors["two", "warp"] / largest["two", "warp"],
+    ]
+    assert fit.objective == pytest.approx(means[0] + 3 * means[1], rel=2e-3)
+    relative = result["mean_relative_error"]
+    assert list(relative.values()) == pytest.approx(means, rel=2e-3)
+    one, two = (result["tests"][name]["directions"] for name in ("one", "two"))
+    shown = {("one", d): one[d]["rms_N"] for d in one} | {("two", "warp"): two["warp"]["rms_N"]}
+    assert shown == {key: pytest.approx(error, rel=2e-3) for key, error in errors.items()}
+
+    assert found.title == "made" and found.unit == "GPa" and found.moduli_error == {}
+    a, b, c = (shown[key] for key in (("one", "warp"), ("one", "fill"), ("two", "warp")))
+    assert found.summary == (
+        f"Best of 2 starts: objective {fit.objective:.3g}; one: RMS errors in N: warp {a:.3g}, "
+        f"fill {b:.3g}, together {a + b:.4g}; two: RMS errors in N: warp {c:.3g}, together {c:.4g}."
+    )
+    objective_is = "weighted sum of the tests' mean relative RMS errors"
+    assert found.facts == [
+        (f"objective: {objective_is}", fit.objective),
+        ("method", "lm on membrane"),
+        ("form of the moduli", "constant"),
+        ("starts", "2 feasible of 2"),
+        ("analyses", sum(r.analyses for r in fit.best.records)),
+        ("wall time, s", fit.wall_s),
+        ("Poisson's ratio nu12 (fixed)", 0.0),
+        ("thickness", "0.8 mm, constant"),
+        ("one: matched", "measured points"),
+        ("two: matched", "measured points"),
+    ]
+    assert found.coefficients == [
+        ("beta_3", pytest.approx(1e-3 * fit.law.beta[3]), 0.005, 0.2),
+        ("beta_7", pytest.approx(1e-3 * fit.law.beta[7]), 0.03, 1.0),
+        ("beta_11", pytest.approx(1e-3 * fit.law.beta[11]), 0.02, 2.0),
+    ]
+    assert fit.law.beta[7] == pytest.approx(190, abs=0.1)  # the middle of two specimens
+    reached = np.log(22.9 / 20)
+    for strains, warp in ((found.strain_reached, reached), (found.valid_strain, 0.12)):
+        assert strains == {
+            "warp": pytest.approx(warp), "fill": pytest.approx(reached), "shear": 1e-6
+        }  # fmt: skip
+    assert found.starts == [
+        StartRow(r.number, r.objective, r.status, r.analyses) for r in fit.best.records
+    ]
+    assert found.files == [
+        ("result.json", "all numbers of this page, for programs"),
+        ("material.toml", "the material card"),
+        ("moduli.csv", "tangent moduli along their strains"),
+        ("residuals.csv", "every matched value beside the model's"),
+        ("one-loads.csv", "load curves of the best fit"),
+        ("two-loads.csv", "load curves of the best fit"),
+    ]
+    assert found.versions == versions()
+    strips = [
+        ("loads", "Load over gauge elongation: measured and modelled"),
+        ("failure", "Tangent moduli up to the strains at the end of each strip"),
+        ("orders", "Error of load polynomials by order, and with a specimen left out"),
+    ]
+    assert found.figures == [
+        ("optima.png", f"Optimum of every start: {objective_is}, from worst to best"),
+        (
+            "moduli.png",
+            "Tangent moduli of the best fits over the strains reached, with one standard deviation",
+        ),
+        ("pinned.png", "What each test pins down: one standard deviation of the moduli"),
+        *((f"{test}-{name}.png", words) for test in ("one", "two") for name, words in strips),
+    ]
+
+
+def test_what_is_determined_in_closed_form(
+    together: bf.Fit, written: tuple[Report, Told]
+) -> None:
+    """One standard deviation of a constant modulus E is noise / sqrt(sum x^2), x the load over E.
+
+    The noise is the misfit or the specimens' scatter about their polynomial, if that is larger.
+    """
+    fit, (found, told) = together, written
+    determined, pins = found.tables[:2]
+    noise = {}
+    for prepared in fit.setup.tests:
+        for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
+            noise[prepared.part(strip.direction)] = max(strip.rms, strip.strip.scatter)
+    said = ", ".join(f"{value:.2g} N ({name})" for name, value in noise.items())
+    assert determined.note == f"white noise of {said}{NOISE_NOTE}"
+    alone = {}
+    for part, value in noise.items():
+        test, direction = part.split(": ")
+        strain, _ = points(test, direction)
+        modulus = fit.law.beta[11 if direction == "warp" else 7]
+        alone[part] = value / np.sqrt(np.sum((20 * modulus * strain) ** 2))
+    from_one, from_two = alone["one: warp"], alone["two: warp"]
+    pinned = fit.result["pinned"]
+    for source, name, sigma in (
+        ("one", "E1", from_one), ("one", "E2", alone["one: fill"]), ("two", "E1", from_two),
+        ("all together", "E2", alone["one: fill"]),
+    ):  # fmt: skip
+        assert pinned[source][name]["median"] == pytest.approx(sigma, rel=5e-3)
+        assert pinned[source][name]["largest"] == pytest.approx(sigma, rel=5e-3)
+    e1 = fit.result["uncertainty"]["median_relative_sigma"]["E1"]
+    assert min(from_one, from_two) / np.sqrt(2) < e1 < max(from_one, from_two)
+    e2 = percent(pinned["one"]["E2"]["median"])
+    assert determined == Table(
+        "What the data determine",
+        ["modulus", "median 1 sigma", "largest 1 sigma"],
+        [["E1", percent(e1), percent(e1)], ["E2", e2, e2], ["G12", "1000 %", "1000 %"]],
+        determined.note,
+    )
+    ones, twos = (percent(pinned[name]["E1"]["median"]) for name in ("one", "two"))
+    unknown = ["unknown", "unknown"]
+    assert pins == Table(
+        "What each test pins down",
+        ["test", "modulus", "median 1 sigma", "largest 1 sigma"],
+        [
+            ["one", "E1", ones, ones], ["one", "E2", e2, e2], ["one", "G12", *unknown],
+            ["two", "E1", twos, twos], ["two", "E2", *unknown], ["two", "G12", *unknown],
+            ["all together", "E1", percent(e1), percent(e1)], ["all together", "E2", e2, e2],
+            ["all together", "G12", *unknown],
+        ],
+        "white noise of every test, its misfit or its scatter, whichever is larger; before the "
+        "tests every modulus is taken to be known to 1000 %",
+    )  # fmt: skip
+    (strains, curves, known), drawn = told.calls["plot_moduli"]
+    assert known is None and len(curves) == 2
+    assert strains == pytest.approx(np.linspace(0, fit.best.valid, len(strains[0])).T)
+    assert curves[0][0] == pytest.approx(np.full(121, fit.law.beta[11]))
+    assert drawn["sigma"][0] == pytest.approx(np.full(121, e1 * fit.law.beta[11]))
+    assert drawn["sigma"][1] == pytest.approx(
+        np.full(121, pinned["one"]["E2"]["median"] * fit.law.beta[7]), rel=1e-4
+    )
+    (strains, sigma), _ = told.calls["plot_pinned"]
+    assert strains[:, -1] == pytest.approx(fit.best.valid) and strains[:, 0].tolist() == [0, 0, 0]
+    assert list(sigma) == ["one", "two", "all together"]
+    assert sigma["two"][0] == pytest.approx(np.full(61, 100 * pinned["two"]["E1"]["median"]))
+
+
+def test_misfit_by_strip(together: bf.Fit, written: tuple[Report, Told]) -> None:
+    fit, (found, _) = together, written
+    one = found.tables[2]
+    assert [table.title for table in found.tables[2:]] == ["Misfit by strip"] * 2
+    assert one.header == [
+        "strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial", "its RMSE, N",
+        "points matched", "load at the end, N",
+    ]  # fmt: skip
+    assert one.note == (
+        "RMS error: root mean square of modelled less measured load; scatter: standard deviation "
+        "of the measured loads about the polynomial"
+    )
+    for row, direction in zip(one.rows, ("warp", "fill"), strict=True):
+        # A polynomial of order four is as good as the logarithm: the scatter is half the
+        # specimens' difference at every strain, also beyond the final length.
+        strain = np.tile(np.log1p(ELONGATION / 20), 2)
+        load = 20 * np.repeat(MODULI["one"][direction], len(ELONGATION)) * strain
+        modulus = fit.law.beta[11 if direction == "warp" else 7]
+        off = 10 * abs(np.subtract(*MODULI["one"][direction])) * strain
+        rmse = float(np.sqrt(np.mean(off**2)))
+        assert row == [
+            direction,
+            pytest.approx(rms(fit, "one", direction), rel=2e-3),
+            pytest.approx(rmse * np.sqrt(len(off) / (len(off) - 1)), rel=1e-3),
+            pytest.approx(1 - (off**2).sum() / ((load - load.mean()) ** 2).sum(), rel=1e-5),
+            pytest.approx(rmse, rel=1e-4),
+            22,
+            pytest.approx(20 * modulus * np.log(22.9 / 20), rel=1e-5),
+        ]
+
+
+@pytest.mark.usefixtures("nothing_shown")
+def test_starts_that_failed_other_programs_and_no_certainty(
+    together: bf.Fit, told: Told, tmp_path: Path, monkeypatch
+) -> None:
+    """Nothing is said of what is not known."""
+    one, two = together.best.records
+    lost = replace(two, objective=None, external_runs=4, failure="no licence")
+    best = replace(together.best, records=[one, lost], ranked=[one], certainty=None)
+    fit = replace(together, best=best)
+    found = reported(fit, tmp_path, monkeypatch)
+    facts = dict(found.facts)
+    assert facts["starts"] == "1 feasible of 2" and facts["of them by membrane"] == 4
+    (values,), _ = told.calls["plot_optima"]
+    assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
+    assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
+    assert found.tables == []
+    assert told.calls["plot_moduli"][1] == {"sigma": None}
+    assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
+    assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
+    assert fit.moduli()["sigma_relative"].isna().all()
+
+
+def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) -> None:
+    """Its own objective whatever its weight, and its name before nothing."""
+    found = reported(alone, tmp_path, monkeypatch)
+    error = rms(alone, "two", "warp")
+    assert alone.objective == pytest.approx(error, rel=2e-3)
+    assert found.summary == (
+        f"Best of 1 starts: objective {alone.objective:.3g}; RMS errors in N: warp "
+        f"{alone.objective:.3g}, together {alone.objective:.4g}."
+    )
+    assert found.facts[0] == ("objective: sum of the strips' RMS errors, N", alone.objective)
+    assert found.facts[-1] == ("matched", "measured points")
+    names = ["optima.png", "moduli.png", "loads.png", "failure.png", "orders.png"]
+    assert [name for name, _ in found.figures] == names
+    assert found.files[-1] == ("loads.csv", "load curves of the best fit")
+    assert [t.title for t in found.tables] == ["What the data determine", "Misfit by strip"]
+    said = f"objective {alone.objective:.4g}, RMS errors in N: warp {alone.objective:.4g}"
+    assert alone.card.source == f"bubblefit {bf.__version__} strips, project.toml, {said}"
+
+
+@pytest.mark.usefixtures("nothing_shown")
+def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Path, monkeypatch):
+    """Beside the deviation from it, what the noise might do says nothing."""
+    monkeypatch.setattr(type(together.setup.tests[0]), "known", together.law)
+    found = reported(together, tmp_path, monkeypatch)
+    (_, curves, known), drawn = told.calls["plot_moduli"]
+    np.testing.assert_array_equal(known, curves[0])
+    assert drawn == {"sigma": None}
+    assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
