@@ -153,9 +153,7 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
     ]
 
 
-def test_what_is_determined_in_closed_form(
-    together: bf.Fit, written: tuple[Report, Told]
-) -> None:
+def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Report, Told]) -> None:
     """One standard deviation of a constant modulus E is noise / sqrt(sum x^2), x the load over E.
 
     The noise is the misfit or the specimens' scatter about their polynomial, if that is larger.

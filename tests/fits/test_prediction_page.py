@@ -100,9 +100,7 @@ def test_nothing_to_tell(tmp_path: Path, seen: list[Report]) -> None:
     (found,) = seen
     assert found.summary == "2 of 4 runs finished."
     stopped = "stopped at 120 of 240 mm: the run stopped early: so asked"
-    assert found.warnings == [
-        f"{test} with soft: {stopped}" for test in ("150 mm, 90 kPa", "high")
-    ]
+    assert found.warnings == [f"{test} with soft: {stopped}" for test in ("150 mm, 90 kPa", "high")]
     assert [table.title for table in found.tables] == ["Runs"]
     assert quiet.worst is None and not quiet.failed() and not quiet.silent()
 
@@ -123,7 +121,8 @@ def test_result_json(tmp_path: Path) -> None:
     assert runs[0] == {
         "test": "150 mm, 90 kPa", "card": "soft", "ended": "failed: made to fail", "seconds": 2.0
     }  # fmt: skip
-    assert {key: runs[1][key] for key in ("card", "ended", "seconds", "iterations", "warnings")} == {
+    told = ("card", "ended", "seconds", "iterations", "warnings")
+    assert {key: runs[1][key] for key in told} == {
         "card": "stiff", "ended": "finished", "seconds": 3.0, "iterations": 0,
         "warnings": ["made up", "also"],
     }  # fmt: skip

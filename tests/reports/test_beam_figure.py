@@ -33,6 +33,8 @@ def test_the_side_is_the_half_that_is_seen(figure: Figure) -> None:
         assert len(faces.get_paths()) == 4 and np.abs(z_of_first).max() <= 600.0
         # What lies behind (0.9) is left out of the drawing.
         assert faces.get_array().max() == pytest.approx(0.03)
+        # Colours go as far as the fabric is stretched anywhere; a wrinkle has the lowest.
+        assert faces.get_clim() == pytest.approx((-0.9, 0.9))
         assert axes.get_aspect() == 1.0
         (before,) = axes.lines
         np.testing.assert_array_equal(np.transpose(before.get_data()), OUTLINE)
@@ -76,3 +78,20 @@ def test_the_cut_is_the_ring_before_and_now(figure: Figure) -> None:
         assert line.get_label() == name
     assert cut.get_aspect() == 1.0
     assert (cut.get_xlabel(), cut.get_ylabel()) == ("x, mm", "y, mm")
+
+
+@pytest.mark.parametrize(
+    ("strain", "ends", "beyond"),
+    [
+        ([0.01, 0.02, 0.03, -0.4, 0.0, 0.0], (-0.03, 0.03), "min"),
+        ([0.01, 0.02, 0.03, 0.0, 0.0, 0.0], (0.0, 0.03), "neither"),
+        ([0.01, 0.02, 0.03, -0.02, 0.0, 0.0], (-0.03, 0.03), "neither"),
+    ],
+)
+def test_colours_of_wrinkles(figures: list[Figure], strain, ends, beyond) -> None:
+    """All of them one colour, and the bar says that there is more."""
+    plot_beam("b.png", POINTS, QUADS, np.array(strain), OUTLINE, RING, BODIES)
+    (faces,) = (c for c in figures[0].axes[0].collections if isinstance(c, PolyCollection))
+    assert faces.get_clim() == pytest.approx(ends)
+    bars = [c.colorbar for axes in figures[0].axes for c in axes.collections if c.colorbar]
+    assert [bar.extend for bar in bars] == [beyond]

@@ -21,8 +21,10 @@ from bubblefit.reports import (
     plot_strip,
 )
 from bubblefit.reports.pinned import NOT_DETERMINED
+from bubblefit.reports.strip import GRIP
 from bubblefit.reports.style import BLACK, GREY, NAMED, SKY, named_look
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ..drawings import legend, lines
@@ -211,6 +213,10 @@ def draw_strip(path: Path, shear: np.ndarray, grips: bool = True) -> None:
     plot_strip(path, mesh.points, mesh.quads, u, shear, gauge, "bias", grips)
 
 
+def upper_height(axes) -> float:
+    return axes.patches[0].get_height()
+
+
 def test_deformed_strip(tmp_path: Path, drawn: list[Figure]) -> None:
     shear = np.linspace(0.1, 0.6, 32)
     draw_strip(tmp_path / "s.png", shear)
@@ -227,6 +233,16 @@ def test_deformed_strip(tmp_path: Path, drawn: list[Figure]) -> None:
     before, after = (np.array(line.get_data()) for line in axes.lines)
     assert np.ptp(before, axis=1) == pytest.approx([0.0, 3.0])
     assert np.ptp(after, axis=1) == pytest.approx([0.0, 4.5])
+    # At rest grey and open, now black and filled, as the outlines.
+    marks = [(line.get_color(), line.get_markerfacecolor()) for line in axes.lines]
+    assert marks == [(GREY, "none"), (BLACK, "white")]
+    assert [to_hex(c.get_edgecolor()[0]) for c in (rest, now)] == [
+        to_hex(GREY), to_hex(BLACK)
+    ]  # fmt: skip
+    assert [(p.get_x(), p.get_width()) for p in axes.patches] == [
+        (corners[:, 0].min(), pytest.approx(np.ptp(corners[:, 0])))
+    ] * 2
+    assert upper_height(axes) == pytest.approx(GRIP * 8.0)
     upper, lower = axes.patches
     assert (upper.get_y(), lower.get_y() + lower.get_height()) == pytest.approx((8.0, -4.0))
     assert axes.get_aspect() == 1.0 and "gamma" in bar.get_ylabel()

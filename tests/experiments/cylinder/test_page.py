@@ -70,7 +70,10 @@ def test_every_cell(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> No
     ]  # fmt: skip
     assert shown.figures == [("a.png", "a picture")]
     assert shown.files == [
-        ("c/load_deflection.csv", "every curve: deflection, load, pressure, volume, wrinkled share"),
+        (
+            "c/load_deflection.csv",
+            "every curve: deflection, load, pressure, volume, wrinkled share",
+        ),
         ("c/measured.csv", "mean and scatter of the repetitions on a grid"),
         ("b.vtu", "a beam"),
     ]
@@ -121,7 +124,9 @@ def unbroken(row: list[object]) -> list[object]:
     return [c.replace("\u00a0", " ") if isinstance(c, str) else c for c in row]
 
 
-def test_without_readings_there_is_nothing_to_compare(outcome: CylinderOutcome, tmp_path, monkeypatch):
+def test_without_readings_there_is_nothing_to_compare(
+    outcome: CylinderOutcome, tmp_path, monkeypatch
+):
     monkeypatch.setattr(page, "draw_figures", lambda *_: [])
     monkeypatch.setattr(page, "write_beams", lambda *_: [])
     plain = CylinderOutcome([run(case("a"), "soft"), run(case("b", size=20.0, length=1e3), "soft")])

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.data.curves import LoadCurve
+from bubblefit.data.load_polynomials import fit_load_polynomial
 from bubblefit.data.polynomial_order import compare_orders
 from bubblefit.experiments.base import FittedTest, Output, Weighting
 from bubblefit.experiments.strips import figures
 from bubblefit.experiments.strips.prepared import PreparedStrips
+from bubblefit.experiments.strips.strip import Strip
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -286,6 +289,36 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
     assert told[0].left_out == [s.left_out for s in expected.scores]
     # A load at rest of 50 N: only a polynomial with a constant can follow it.
     assert (min(told[0].rmse) < 1.0) == (not through_origin)
+
+
+def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path: Path) -> None:
+    """Many specimens read at the same seven places settle no polynomial of order eight."""
+    u = np.linspace(0.5, 3.5, 7)
+    curves = tuple(LoadCurve("warp", s, u, 100 * u + i, None) for i, s in enumerate("abc"))
+    strip = Strip("warp", 20.0, 23.5, fit_load_polynomial(u, 100 * u), curves)
+    assert not figures.draw_orders([strip], tmp_path / "orders.png")
+    assert not (tmp_path / "orders.png").exists()
+
+
+def test_what_the_panels_of_loads_show() -> None:
+    """The polynomial from rest to the end of the model; points only where there are any."""
+    u = np.linspace(0.5, 4.5, 9)
+    polynomial = fit_load_polynomial(u, 100 * u + 3 * u**2)
+    curves = (LoadCurve("warp", "a", u, 100 * u, None),)
+    warp = Strip("warp", 20.0, 23.5, polynomial, curves, scatter=7.0)
+    models = {"warp": [("model", u, 90 * u)]}
+    one, bare = figures.load_panels([warp, Strip("fill", 20.0, 23.0)], models, {"warp": [4.2]})
+    places, loads = one.polynomial
+    assert (places[0], places[-1], len(places)) == (0.0, pytest.approx(3.5), 200)
+    assert loads == pytest.approx(100 * places + 3 * places**2, abs=1e-6)
+    assert one.points[0].tolist() == u[u <= 3.5].tolist()
+    assert (one.direction, one.scatter, one.rms, one.models) == (
+        "warp", 7.0, [4.2], models["warp"]
+    )  # fmt: skip
+    assert (bare.direction, bare.points, bare.polynomial, bare.scatter) == (
+        "fill", None, None, None
+    )  # fmt: skip
+    assert (bare.models, bare.rms) == ((), ())
 
 
 def write_offset(folder: Path) -> None:
