@@ -5,7 +5,11 @@ Needs h5py, which is not among bubblefit's own dependencies (`pip install "bubbl
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import signal
+import time
+import warnings
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +22,39 @@ from ..errors import InputError
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Bytes of one array at most: a frame of a million points has 48 MB.
 LARGEST = 2**30
+#: Within which a file must be read once.
+SECONDS = 60.0
+
+
+def check_readable(path: Path, read: Callable[[], object], seconds: float = SECONDS) -> None:
+    """Try a reading in a process of its own: on some damaged files HDF5 loops for ever, or crashes.
+
+    read : what is about to be done; what it raises is left to the caller's own reading.
+
+    Raises
+    ------
+    InputError : it does not come to an end.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # the child runs nothing but `read`
+        child = os.fork()
+    if child == 0:
+        try:
+            read()
+        finally:
+            os._exit(0)
+    end = time.monotonic() + seconds
+    while True:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done and status == 0:
+            return
+        if done or time.monotonic() > end:
+            break
+        time.sleep(0.002)
+    if not done:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    raise InputError(path, "", "cannot be read as HDF5: its library fails on it; is it damaged?")
 
 
 @contextmanager

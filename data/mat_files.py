@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .hdf5_files import SIGNATURE, array_of, member, open_hdf5
+from .hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
 
 #: Bytes that one compressed variable may have when it is unpacked: at most, always, and by what it
 #: has packed (numbers do not pack a hundredfold).
@@ -40,8 +40,8 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
     """Names of the variables; None where they cannot be told, as of a damaged file."""
     try:
         if head[512:520] == SIGNATURE:
-            with open_hdf5(path) as file:
-                return [str(name) for name in file]
+            check_readable(path, lambda: _names_73(path))
+            return _names_73(path)
         return [name for name, _, _ in _variables(path)]
     except InputError:
         return None
@@ -62,14 +62,8 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
     if head[512:520] == SIGNATURE:
-        with open_hdf5(path) as file:
-            parts = iter(range(MOST_PARTS))
-            there = {name: member(path, file, name) for name in wanted}
-            return {
-                name: _of_hdf5(path, item, name, 0, parts)
-                for name, item in there.items()
-                if item is not None
-            }
+        check_readable(path, lambda: _variables_73(path, wanted))
+        return _variables_73(path, wanted)
     found = {}
     for name, order, body in _variables(path, wanted):
         try:
@@ -78,6 +72,23 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
             problem = f"cannot be read; is the file damaged? ({str(error)[:100]})"
             raise InputError(path, f"variable {name!r}", problem) from None
     return found
+
+
+def _names_73(path: Path) -> list[str]:
+    with open_hdf5(path) as file:
+        return [str(name) for name in file]
+
+
+def _variables_73(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+    """The variables of version 7.3."""
+    with open_hdf5(path) as file:
+        parts = iter(range(MOST_PARTS))
+        there = {name: member(path, file, name) for name in wanted}
+        return {
+            name: _of_hdf5(path, item, name, 0, parts)
+            for name, item in there.items()
+            if item is not None
+        }
 
 
 def _variables(

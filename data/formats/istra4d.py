@@ -14,11 +14,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..frame_rows import FrameRows, frame_of
 from ..frames import Frame, FrameOptions
-from ..hdf5_files import SIGNATURE, array_of, member, open_hdf5
+from ..hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
 from ..registry import Format, register_format
 
 NAMES = {
@@ -35,13 +36,8 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """The one frame of a file."""
-    with open_hdf5(path) as file:
-        found = {key: member(path, file, name) for key, name in [*NAMES.items(), ("mask", MASK)]}
-        there = {
-            key: array_of(path, item, NAMES.get(key, MASK)).ravel()
-            for key, item in found.items()
-            if item is not None
-        }
+    check_readable(path, lambda: _arrays(path))
+    there = _arrays(path)
     mask = there.pop("mask", None)
     if not {"x deformed", "y deformed", "dx", "dy"} <= {*there}:
         problem = "expected coordinates/coordinate_x and so on: export coordinates, displacements"
@@ -51,6 +47,17 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     valid = None if mask is None else np.asarray(mask != 0)
     rows = FrameRows(there, {key: NAMES[key] for key in there}, valid=valid)
     return [frame_of(rows, options, path, "istra4d")]
+
+
+def _arrays(path: Path) -> dict[str, NDArray[np.float64]]:
+    """The arrays that there are, flat."""
+    with open_hdf5(path) as file:
+        found = {key: member(path, file, name) for key, name in [*NAMES.items(), ("mask", MASK)]}
+        return {
+            key: array_of(path, item, NAMES.get(key, MASK)).ravel()
+            for key, item in found.items()
+            if item is not None
+        }
 
 
 register_format(Format("istra4d", "frame", "HDF5 of Istra4D", read, recognises))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import builtins
 import io
+import os
 import pickle
 import struct
 import sys
+import time
 import zipfile
 import zlib
 from pathlib import Path
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 from bubblefit.data.fields import read_fields
 from bubblefit.data.frames import FrameOptions, read_frames
+from bubblefit.data.hdf5_files import check_readable
 from bubblefit.data.mat_files import read_variables
 from bubblefit.errors import InputError
 from hypothesis import example, given, settings
@@ -241,6 +244,12 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
     with h5py.File(tmp_path / "c.hdf5", "w") as file:
         file.create_dataset("coordinates/coordinate_x", (10**6, 10**6), dtype="f8", chunks=(9, 9))
     assert "numbers; is it damaged?" in complaint(read_frames, [tmp_path / "c.hdf5"])
+
+
+@pytest.mark.parametrize("read", [lambda: time.sleep(60), lambda: os.kill(os.getpid(), 9)])
+def test_what_hdf5_hangs_or_crashes_on_is_refused(tmp_path, read):
+    assert "its library fails on it" in complaint(check_readable, tmp_path / "a", read, 0.2)
+    check_readable(tmp_path / "a", lambda: None)
 
 
 def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
