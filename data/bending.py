@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .column_names import LENGTH_UNITS, LOAD_UNITS, scale_of
-from .machine_tables import MachineTable, TableOptions, column_of, read_machine_table
+from .channels import AS_FOUND, Channel, channel_values
+from .column_names import LENGTH_UNITS, LOAD_UNITS
+from .machine_tables import TableOptions, column_of, read_machine_table
 
 Array = NDArray[np.float64]
 Zero = Literal["none", "first", "line"]
@@ -23,23 +24,6 @@ FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
 #: Readings that the straight line of zero = "line" goes through.
 FIRST_READINGS = 4
-
-
-@dataclass(frozen=True)
-class Channel:
-    """What a column of readings means: scale * reading + offset, in `unit`.
-
-    Parameters
-    ----------
-    column : its name in the file; found by what names mean unless given.
-    unit : mm, cm, m; N, kN, kg. The file's own unless given; needed with a scale.
-    scale, offset : of a sensor, such as 200 mm per volt.
-    """
-
-    column: str | None = None
-    unit: str | None = None
-    scale: float = 1.0
-    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +44,8 @@ class BendingCurve:
 def read_bending_curves(
     path: Path | str,
     *,
-    deflection: Channel = Channel(),
-    load: Channel = Channel(),
+    deflection: Channel = AS_FOUND,
+    load: Channel = AS_FOUND,
     repetition: str | None = None,
     preload: float = 0.0,
     zero: Zero = "none",
@@ -93,8 +77,10 @@ def read_bending_curves(
     if repetition is not None:
         named["repetition"] = repetition
     found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
-    way = _quantity(found, column_of(found, "deflection", named, NEEDED), deflection, LENGTH_UNITS)
-    force = _quantity(found, column_of(found, "load", named, NEEDED), load, FORCE_UNITS) + preload
+    column = column_of(found, "deflection", named, NEEDED)
+    way = channel_values(found, column, deflection, LENGTH_UNITS)
+    column = column_of(found, "load", named, NEEDED)
+    force = channel_values(found, column, load, FORCE_UNITS) + preload
     which = column_of(found, "repetition", named, NEEDED)
     names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
     curves = []
@@ -106,31 +92,6 @@ def read_bending_curves(
         full = f"{path.stem} {name}" if which else name
         curves.append(_zeroed(BendingCurve(full, way[rows], force[rows], path), zero, at))
     return tuple(_loading(curve) for curve in curves)
-
-
-def _quantity(
-    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
-) -> Array:
-    """A column (rows,) in mm or N."""
-    path, at = found.table.path, f"line {found.header}, column {column!r}"
-    known, own = dict(units), found.units[column]
-    said = scale_of(own, known) if own else None
-    raw = channel.scale != 1.0
-    if raw and said is not None:
-        problem = f"is in {own} already: leave the scale {channel.scale:g} out"
-        raise InputError(path, at, problem)
-    unit = channel.unit or ("" if raw else own)
-    if not unit:
-        what = "after scaling" if raw else "of the readings"
-        raise InputError(path, at, f"say the unit {what}, one of {', '.join(known)}")
-    scale = scale_of(unit, known)
-    if scale is None:
-        advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
-        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {', '.join(known)}; {advice}")
-    if channel.unit and own and not raw and said != scale:
-        problem = f"the file says {own!r}, the project {channel.unit!r}; correct one of them"
-        raise InputError(path, at, problem)
-    return (channel.scale * found.table.numbers(column) + channel.offset) * scale
 
 
 def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...data.bending import BendingCurve, Channel, read_bending_curves
+from ...data.bending import BendingCurve, read_bending_curves
 from ..base import Place
+from ..channels import channel_of
 from ..formats import named_format
 from .section import MeasuredSection
 
@@ -33,8 +34,8 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
             raise place.error(key, f"there is no file {file}; --data DIR names another folder")
         curves += read_bending_curves(
             file,
-            deflection=Channel(**section.deflection.model_dump()),
-            load=Channel(**section.load.model_dump()),
+            deflection=channel_of(section.deflection),
+            load=channel_of(section.load),
             repetition=section.repetition,
             preload=section.preload,
             zero=section.zero,

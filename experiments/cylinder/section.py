@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...sections import Number, Positive, Section
+from ..channels import ChannelSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -28,15 +29,6 @@ class GasSection(Section):
     ambient: Positive | None = None
     temperature: Positive | None = None
     density: Positive | None = None
-
-
-class ChannelSection(Section):
-    """How a column of a measured file is meant."""
-
-    column: str | None = None
-    unit: str | None = None
-    scale: Number = 1.0
-    offset: Number = 0.0
 
 
 class MeasuredSection(Section):

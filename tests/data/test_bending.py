@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.bending import BendingCurve, Channel, read_bending_curves
+from bubblefit.data.bending import BendingCurve, read_bending_curves
 from bubblefit.data.bending_scatter import model_error, scatter
+from bubblefit.data.channels import Channel
 from bubblefit.errors import InputError
 
 from ..cylinder_cases import write_readings
