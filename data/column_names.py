@@ -13,6 +13,7 @@ WORDS = {
     ),
     "load": frozenset("load force kraft standardkraft prüfkraft".split()),
     "time": frozenset("time zeit prüfzeit".split()),
+    "pressure": frozenset("pressure druck überdruck innendruck p".split()),
     "deflection": frozenset("deflection displacement durchbiegung weg".split()),
 }
 #: Words of columns of elongation: those measured on the strip, then those of the machine's travel,
@@ -41,10 +42,15 @@ LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
 LOAD_UNITS = {"N": 1.0, "kN": 1e3}
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {"kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02}
+#: MPa in one of each unit of pressure.
+PRESSURE_UNITS = {
+    "Pa": 1e-6, "hPa": 1e-4, "mbar": 1e-4, "kPa": 1e-3, "psi": 6.894757293168e-3, "bar": 0.1,
+    "MPa": 1.0,
+}  # fmt: skip
 #: Seconds in one of each unit of time.
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
-_KNOWN = r"kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m"
+_KNOWN = r"kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%][A-Za-z0-9µμ°%/^*·²-]{0,5}"
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")

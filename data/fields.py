@@ -55,6 +55,7 @@ def read_fields(
     length_scale: float = 1.0,
     format: str | None = None,
     options: FrameOptions | None = None,
+    frames: Sequence[int] | None = None,
 ) -> tuple[DisplacementField, ...]:
     """Read one frame a pressure.
 
@@ -68,6 +69,8 @@ def read_fields(
         `y`, `dx`, `dy`, `dz`, and `z` where it is there.
     format : its name; found by the files' content unless given.
     options : in place of the four before, where there is more to say of the files.
+    frames : numbers from 0 of the frames taken, one a pressure, among all of the files; all of
+        them unless given.
 
     Raises
     ------
@@ -75,20 +78,22 @@ def read_fields(
         cells that are not finite numbers, nothing left without the doubtful rows, more or fewer
         frames than pressures.
     """
-    if len(files) > len(pressures):
+    if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
     if options is None:
         options = FrameOptions(QUANTITIES, columns, flag_column, comment, length_scale)
-    frames = read_frames(files, options, format)
-    if len(frames) == len(pressures) + 1 and len(files) == 1 and _at_rest(frames[0]):
-        frames = frames[1:]
-    if len(frames) != len(pressures):
-        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(frames)}"
+    read = read_frames(files, options, format)
+    if frames is not None:
+        read = tuple(read[number] for number in frames)
+    elif len(read) == len(pressures) + 1 and len(files) == 1 and _at_rest(read[0]):
+        read = read[1:]
+    if len(read) != len(pressures):
+        problem = f"expected one frame for each of {len(pressures)} pressures, found {len(read)}"
         raise InputError(None, "files", problem)
     return tuple(
         field_of(frame, float(pressure), options)
-        for frame, pressure in zip(frames, pressures, strict=True)
+        for frame, pressure in zip(read, pressures, strict=True)
     )
 
 

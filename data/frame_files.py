@@ -11,21 +11,27 @@ from ..errors import InputError
 from ..notes import Note, NoteKind
 
 
-def frame_files(given: Sequence[str], field: str = "files") -> tuple[list[Path], Note | None]:
+def frame_files(
+    given: Sequence[str], field: str = "files", folder: Path | None = None
+) -> tuple[list[Path], Note | None]:
     """The files, and a note where their order looks unmeant.
 
     given : names of files, taken in this order, and patterns, whose files are sorted by the
         numbers in their names (frame 2 before frame 10).
     field : what complaints call them.
+    folder : where they are; the working folder unless given.
 
     Raises
     ------
     InputError : a pattern that nothing matches, no such file, a folder, a file given twice.
     """
     files: list[Path] = []
-    for name in given:
+    for own in given:
+        name = own if folder is None else str(folder / own)
         if not Path(name).exists() and glob.has_magic(name):
-            found = [Path(f) for f in glob.glob(name, recursive=True) if not Path(f).is_dir()]
+            # The folder's own name is no pattern.
+            wanted = own if folder is None else str(Path(glob.escape(str(folder))) / own)
+            found = [Path(f) for f in glob.glob(wanted, recursive=True) if not Path(f).is_dir()]
             if not found:
                 raise InputError(None, field, f"no file matches {name!r}")
             files += sorted(found, key=_numbers)
@@ -37,7 +43,8 @@ def frame_files(given: Sequence[str], field: str = "files") -> tuple[list[Path],
     for i, file in enumerate(files):
         if file in files[:i]:
             raise InputError(file, field, "is given twice")
-    return files, _shell_order(files) if list(map(str, files)) == list(given) else None
+    plain = [str(name if folder is None else folder / name) for name in given]
+    return files, _shell_order(files) if list(map(str, files)) == plain else None
 
 
 def _numbers(file: Path) -> list[tuple[bool, int, str]]:

@@ -9,6 +9,7 @@ from .bending import (
     plot_bending_cases,
     plot_gas,
 )
+from .clock import plot_clock
 from .convergence import ConvergencePanel, plot_convergence
 from .html import Report, StartRow, Table, percent, write_report
 from .laws import LawRow, plot_laws
@@ -41,6 +42,7 @@ __all__ = [
     "plot_beam",
     "plot_bending",
     "plot_bending_cases",
+    "plot_clock",
     "plot_convergence",
     "plot_gas",
     "plot_heights",

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from ...reports import plot_heights, plot_profiles, write_vtu
 from ..base import Exhibit, Findings, FittedTest, Output, Shown
-from .findings import objective_of
+from .findings import objective_of, recorded_of
 from .objective import displacement_offset
+from .recorded_words import clock_pictures, recorded_table
 from .registration import registration_picture, registration_table
 from .tables import misfit_table, surface_tables, write_surface_table
 
@@ -32,6 +33,10 @@ def exhibit(
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.radius, out))
         tables.insert(0, registration_table(prepared.registration))
+    taken = recorded_of(prepared)
+    if taken is not None:
+        tables.insert(0, recorded_table(taken))
+        figures += clock_pictures(taken, out)
     return Exhibit(
         facts=_facts(prepared, findings),
         figures=figures,

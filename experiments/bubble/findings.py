@@ -12,7 +12,10 @@ from ...materials.forms.base import COMPONENTS
 from ...notes import Note, NoteKind
 from ..base import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
+from .recorded import RecordedFrames
+from .recorded_words import recorded_lines, recorded_numbers
 from .registration import registration_line, registration_numbers
+from .sources import PointFiles
 
 if TYPE_CHECKING:
     from .prepared import PreparedBubble
@@ -51,9 +54,13 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "outside_dropped": prepared.outside,
         },
     }
+    taken = recorded_of(prepared)
+    if taken is not None:
+        numbers["data"]["pressures"] = recorded_numbers(taken)
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    lines += [] if taken is None else recorded_lines(taken)
     notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
     lines += [f"data: {note}" for note in notes]
     if prepared.known is not None:
@@ -76,6 +83,12 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
         f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
     )
+
+
+def recorded_of(prepared: PreparedBubble) -> RecordedFrames | None:
+    """By which pressures its frames were taken; None where the project names them all."""
+    data = prepared.test.data
+    return data.recorded if isinstance(data, PointFiles) else None
 
 
 def _as_read(prepared: PreparedBubble) -> dict[str, Any]:

@@ -230,7 +230,10 @@ def _measured(
     test: BubbleTest, data: PointFiles
 ) -> tuple[tuple[DisplacementField, ...], Registration | None]:
     try:
-        fields = read_fields(data.files, test.pressures, options=data.options, format=data.format)
+        frames = None if data.recorded is None else data.recorded.frames
+        fields = read_fields(
+            data.files, test.pressures, options=data.options, format=data.format, frames=frames
+        )
     except InputError as error:
         if error.path is not None:
             raise

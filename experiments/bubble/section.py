@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
+from .pressure_section import PressureSection
 from .registration_section import RegistrationSection
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
@@ -52,6 +53,7 @@ class PointsSection(Section):
     camera_axes: bool | None = None
     comment: str = "#"
     length_unit: LengthUnit | None = None
+    pressure: PressureSection | None = None
     registration: RegistrationSection | None = None
 
 
@@ -82,7 +84,7 @@ class BubbleSection(Section):
     name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
     weight: Positive = 1.0
     radius: Positive
-    pressures: Annotated[list[Positive], Field(min_length=1)]
+    pressures: Annotated[list[Positive], Field(min_length=1)] | None = None
     increments: list[Positive] | None = None
     elements: Elements = 800
     symmetry: Symmetry = "full"

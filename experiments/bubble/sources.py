@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.fields import QUANTITIES as FIELD
+from ...data.frame_files import frame_files
 from ...data.frames import FrameOptions
 from ...data.registration.register import RegistrationOptions
 from ...errors import InputError
 from ...sections import LENGTH_UNITS
 from ..base import Place
 from ..formats import named_format
+from .recorded import RecordedFrames, recorded_frames
 from .registration_section import registration_options
 from .section import BubbleSection, KnownSolutionSection, PointsSection
 
@@ -39,12 +41,17 @@ class KnownSolution:
 
 @dataclass(frozen=True)
 class PointFiles:
-    """Measured displacements: files in the order of the pressures, and how they are read."""
+    """Measured displacements: files in the order of the pressures, and how they are read.
+
+    recorded : which of their frames are taken, and at which pressures; None where the pressures are
+    the project's own, one a frame.
+    """
 
     files: tuple[Path, ...]
     options: FrameOptions
     format: str | None = None
     registration: RegistrationOptions | None = None
+    recorded: RecordedFrames | None = None
 
 
 def data_source(
@@ -52,21 +59,66 @@ def data_source(
     place: Place,
     pressures: Sequence[float],
     increments: Sequence[float],
+    measured: PointFiles | None,
 ) -> KnownSolution | PointFiles:
-    """The one sub-table of [bubble.data], converted; pressures and increments are in MPa.
+    """What was measured, or the known solution; pressures and increments are in MPa.
 
     Raises
     ------
-    InputError : both or none, a folder of files for computed data, files that are not there.
+    InputError : a folder of files for computed data, more or fewer files than pressures.
+    """
+    known, points = section.data.known_solution, section.data.points
+    if known is not None:
+        return _known(section, known, place, pressures, increments)
+    assert points is not None and measured is not None
+    found, count = len(measured.files), len(pressures)
+    # Where no data are needed, the files may not be there to be counted.
+    counted = place.need_data or found
+    if (
+        measured.recorded is None
+        and points.pressure is None
+        and counted
+        and found not in (count, 1)
+    ):
+        field = "data.points.files" if points.files is not None else "data.points.indices"
+        problem = f"expected one file for each of the {count} pressures, got {found}"
+        if points.files is not None:
+            problem += "; [bubble.data.points.pressure] says at which pressures they were recorded"
+        raise place.error(field, problem)
+    return measured
+
+
+def measured_files(
+    section: BubbleSection, place: Place, pressures: Sequence[float] | None
+) -> PointFiles | None:
+    """The files of [bubble.data.points] and how they are read; None for a known solution.
+
+    pressures : MPa, None where the project names none.
+
+    Raises
+    ------
+    InputError : both sources of data or none, files that are not there, pressures of frames that
+        cannot be read or do not fit those asked for.
     """
     known, points = section.data.known_solution, section.data.points
     if (known is None) == (points is None):
         problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
         raise place.error("data", problem)
-    if known is not None:
-        return _known(section, known, place, pressures, increments)
-    assert points is not None
-    return _points(points, place, len(pressures))
+    if points is None:
+        return None
+    measured = _points(points, place)
+    if points.pressure is None or (pressures is not None and not place.need_data):
+        return measured
+    recorded = recorded_frames(
+        points.pressure,
+        pressures,
+        measured.files,
+        measured.options,
+        measured.format,
+        place,
+        _folder(points, place),
+    )
+    return replace(measured, files=recorded.files, recorded=recorded)
 
 
 def merge_increments(
@@ -108,24 +160,14 @@ def _known(
     )
 
 
-def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
-    names = _file_names(points, place)
+def _points(points: PointsSection, place: Place) -> PointFiles:
     columns = points.columns.model_dump(exclude_none=True)
     for name, column in columns.items():
         first = next(other for other in columns if columns[other] == column)
         if first != name:
             problem = f"column {column!r} is named for {first} and for {name}"
             raise place.error(f"data.points.columns.{name}", problem)
-    if len(names) != count and len(names) != 1:
-        field = "data.points.files" if points.files is not None else "data.points.indices"
-        problem = f"expected one file for each of the {count} pressures, got {len(names)}"
-        raise place.error(field, problem)
-    folder = place.path.parent / points.folder
-    if place.data_folder is not None:
-        folder = Path(place.data_folder)
-    files = tuple(folder / name for name in names)
-    if place.need_data:
-        _check_there(place, folder, files)
+    files = _files(points, place)
     unit = points.length_unit or place.scales.length_unit
     options = FrameOptions(
         FIELD,
@@ -144,6 +186,12 @@ def _points(points: PointsSection, place: Place, count: int) -> PointFiles:
         named_format(place, "data.points.format", "frame", points.format),
         registration_options(points.registration, place, LENGTH_UNITS[unit]),
     )
+
+
+def _folder(points: PointsSection, place: Place) -> Path:
+    if place.data_folder is not None:
+        return Path(place.data_folder)
+    return place.path.parent / points.folder
 
 
 def _file_names(points: PointsSection, place: Place) -> list[str]:
@@ -168,13 +216,28 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
     return names
 
 
-def _check_there(place: Place, folder: Path, files: Sequence[Path]) -> None:
+def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
+    """The files, patterns in `files` put into the natural order of what they match."""
+    names = _file_names(points, place)
+    folder = _folder(points, place)
     advice = "give the folder of the measured data with --data DIR"
-    if not folder.is_dir():
+    needed = place.need_data
+    if needed and not folder.is_dir():
         raise place.error("data.points", f"there is no folder {folder}; {advice}")
+    if points.files is None:
+        files = [folder / name for name in names]
+    else:
+        try:
+            files, _ = frame_files(names, "data.points.files", folder)
+        except InputError as error:
+            if error.path is None and not needed:
+                return ()
+            where = f"{error.path} " if error.path is not None else ""
+            raise place.error(error.field, f"{where}{error.problem}; {advice}") from None
     for file in files:
-        if not file.is_file():
+        if needed and not file.is_file():
             raise place.error("data.points", f"there is no file {file}; {advice}")
+    return tuple(files)
 
 
 def in_section(place: Place, error: InputError) -> InputError:

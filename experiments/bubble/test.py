@@ -15,9 +15,13 @@ from ...meshes.disk import disk_mesh
 from ...models.bubble import BubbleModel, default_increments
 from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
 from .section import BubbleSection, Symmetry
-from .sources import KnownSolution, PointFiles, data_source, merge_increments
+from .sources import KnownSolution, PointFiles, data_source, measured_files, merge_increments
 
 PART = "bubble"
+NO_PRESSURES = (
+    "this key is missing; add it, or say in [bubble.data.points.pressure] where each frame's own"
+    " stands"
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,7 +143,12 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     InputError : naming the file and the dotted key.
     """
     scales = place.scales
-    pressures = _pressures(section, place)
+    asked = _pressures(section, place)
+    measured = measured_files(section, place, asked)
+    recorded = None if measured is None else measured.recorded
+    pressures = asked if recorded is None else tuple(recorded.pressure.tolist())
+    if pressures is None:
+        raise place.error("pressures", NO_PRESSURES)
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
@@ -160,7 +169,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         generator=section.generator,
         pressures=pressures,
         increments=increments,
-        data=data_source(section, place, pressures, increments),
+        data=data_source(section, place, pressures, increments, measured),
         match_by=section.match.by,
         match_degree=section.match.degree,
         objective=section.objective,
@@ -170,8 +179,10 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     )
 
 
-def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...]:
+def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None:
     given = section.pressures
+    if given is None:
+        return None
     for i in range(1, len(given)):
         if given[i] <= given[i - 1]:
             problem = f"pressures must increase, got {given[i]:g} after {given[i - 1]:g}"

@@ -20,12 +20,14 @@ from ...projects import small
 TURN = Rotation.from_euler("zx", [12.0, 3.0], degrees=True).as_matrix()
 SHIFT = np.array([3.0, -4.0, 600.0])
 COLUMNS = 'columns = { x = "x", y = "y", z = "z", dx = "dx", dy = "dy", dz = "dz" }'
+#: kPa.
+SHOWN = [22, 59, 97, 132, 186, 251, 300]
 REGISTRATION = "[bubble.data.points.registration]\n"
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """The text of a project of computed data as a camera saw them: frame_0.csv ..."""
+    """The text of a project of computed data as a camera saw them: frame_0_22kPa.csv ..."""
     folder = tmp_path_factory.mktemp("registered")
     path = small(folder, ("elements = 48", "elements = 108"))
     text = path.read_text()
@@ -36,11 +38,11 @@ def seen(tmp_path_factory):
     for k, field in enumerate(computed.fields):
         flat = np.column_stack([field.points, np.zeros(len(field.points))])
         table = np.hstack([flat @ TURN.T + SHIFT, field.displacement @ TURN.T])
-        name = folder / f"frame_{k}.csv"
+        name = folder / f"frame_{k}_{1e3 * field.pressure:.6g}kPa.csv"
         np.savetxt(name, table, delimiter=",", header="x,y,z,dx,dy,dz", comments="", fmt="%.9g")
     data = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
-    files = [f"frame_{k}.csv" for k in range(len(computed.fields))]
-    points = f"[bubble.data.points]\nfiles = {files}\n{COLUMNS}\n"
+    points = f'[bubble.data.points]\nfiles = ["frame_*.csv"]\n{COLUMNS}\n'
+    points += "[bubble.data.points.pressure]\nfrom_name = true\n"
     return folder, data.sub(points + REGISTRATION + "\n", text), computed.known
 
 
@@ -55,7 +57,9 @@ def test_moduli_are_those_of_the_right_frame(seen):
     """Within 1 % over the strain reached."""
     folder, _, known = seen
     path = project_of(seen, "found")
-    in_process("bubble", path, "--starts", 1, "--jobs", 1, "--out", folder / "out", cwd=folder)
+    done = in_process(
+        "bubble", path, "--starts", 1, "--jobs", 1, "--out", folder / "out", cwd=folder
+    )
     result = result_in(folder / "out")
     law = bf.read_card(folder / "out" / "material.toml").law
     errors = moduli_error(law, known, np.array(list(result["strain_reached"].values())))
@@ -66,6 +70,11 @@ def test_moduli_are_those_of_the_right_frame(seen):
     np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
     page = (folder / "out" / "report.html").read_text()
     assert "registration.png" in page and "found by symmetry" in page
+    assert "Frames taken" in page and "pressures from the files&#39; names" in page
+    taken = result["data"]["pressures"]["taken"]
+    assert [one["pressure_kPa"] for one in taken] == pytest.approx(SHOWN)
+    assert [one["frame"].split("_")[1] for one in taken] == [str(k) for k in range(len(SHOWN))]
+    assert "pressures from the files' names: " in done.output
     assert (folder / "out" / "registration.png").stat().st_size > 20_000
 
 
