@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from .fitting import fit_options
-from .options import data_folders, read_with_solver
+from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 
 
@@ -59,6 +59,7 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
             resume=options["resume"],
             overwrite=options["overwrite"],
             progress=progress.saw,
+            command_line=command_line(),
         )
     comparison.report(folder)
     result = comparison.result

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from .options import data_folders, read_with_solver, solver_choice, with_checks
+from .options import command_line, data_folders, read_with_solver, solver_choice, with_checks
 from .progress import StudyProgress
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
                 resume=options["resume"],
                 overwrite=options["overwrite"],
                 progress=progress.saw,
+                command_line=command_line(),
             )
     except KeyboardInterrupt:
         click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import logging
+from typing import Any
 
 import click
 
 from .. import __version__
+from .options import COMMAND_LINE
 
 COMMANDS = {
     "fit": ("fit", "Fit a material to all tests of a fabric together."),
@@ -27,6 +29,18 @@ COMMANDS = {
 
 class LazyGroup(click.Group):
     """Imports a subcommand only when it runs: `bubblefit --help` stays quick."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        given = ["bubblefit", *args]  # parsing eats them
+        context = super().make_context(info_name, args, parent, **extra)
+        context.meta[COMMAND_LINE] = given
+        return context
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ..materials.card import MaterialCard
 
 INTERRUPTED = 130
+#: Where click keeps what was typed, while a command runs.
+COMMAND_LINE = "bubblefit.command_line"
 
 
 def exits(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -54,6 +56,11 @@ def with_checks(
     for decorate in reversed(decorators):
         wrapped = decorate(wrapped)
     return wrapped
+
+
+def command_line() -> list[str]:
+    """What was typed: the program and its arguments, for the record of a run."""
+    return list(click.get_current_context().meta[COMMAND_LINE])
 
 
 def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:

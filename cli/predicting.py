@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError, SolverFailure
-from .options import solver_choice, with_checks, with_solver
+from .options import command_line, solver_choice, with_checks, with_solver
 from .progress import RunsProgress
 
 if TYPE_CHECKING:
@@ -73,6 +73,7 @@ def run_predictions(
                 resume=options["resume"],
                 overwrite=options["overwrite"],
                 progress=progress.saw,
+                command_line=command_line(),
             )
     except KeyboardInterrupt:
         click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)

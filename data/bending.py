@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .channels import AS_FOUND, Channel, channel_values
 from .column_names import LENGTH_UNITS, LOAD_UNITS
-from .machine_tables import TableOptions, column_of, read_machine_table
+from .frames import FrameSource
+from .machine_tables import TableOptions, column_of, read_machine_table, source_of
 
 Array = NDArray[np.float64]
 Zero = Literal["none", "first", "line"]
@@ -24,6 +25,8 @@ FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
 #: Readings that the straight line of zero = "line" goes through.
 FIRST_READINGS = 4
+#: Why readings are left out.
+UNLOADING = "after the largest deflection"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +36,15 @@ class BendingCurve:
     Parameters
     ----------
     repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
+    dropped : how many readings of it are left out, by why. source : what of the file was read.
     """
 
     repetition: str
     deflection: Array
     load: Array
     path: Path | None = None
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    source: FrameSource | None = None
 
 
 def read_bending_curves(
@@ -77,11 +83,12 @@ def read_bending_curves(
     if repetition is not None:
         named["repetition"] = repetition
     found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
-    column = column_of(found, "deflection", named, NEEDED)
-    way = channel_values(found, column, deflection, LENGTH_UNITS)
-    column = column_of(found, "load", named, NEEDED)
-    force = channel_values(found, column, load, FORCE_UNITS) + preload
-    which = column_of(found, "repetition", named, NEEDED)
+    columns = {name: column_of(found, name, named, NEEDED) for name in (*NEEDED, "repetition")}
+    way = channel_values(found, columns["deflection"], deflection, LENGTH_UNITS)
+    force = channel_values(found, columns["load"], load, FORCE_UNITS) + preload
+    which = columns["repetition"]
+    asked = {"deflection": deflection.unit, "load": load.unit}
+    source = source_of(found, columns, asked, format)
     names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
     curves = []
     for name in dict.fromkeys(names):
@@ -90,7 +97,8 @@ def read_bending_curves(
         if len(rows) < 2:
             raise InputError(path, at, f"repetition {name!r} has one reading; expected two or more")
         full = f"{path.stem} {name}" if which else name
-        curves.append(_zeroed(BendingCurve(full, way[rows], force[rows], path), zero, at))
+        own = BendingCurve(full, way[rows], force[rows], path, source=source)
+        curves.append(_zeroed(own, zero, at))
     return tuple(_loading(curve) for curve in curves)
 
 
@@ -112,4 +120,10 @@ def _loading(curve: BendingCurve) -> BendingCurve:
     """The readings up to the largest deflection, sorted: a sensor's noise is no unloading."""
     part = slice(int(np.argmax(curve.deflection)) + 1)
     order = np.argsort(curve.deflection[part], kind="stable")
-    return replace(curve, deflection=curve.deflection[part][order], load=curve.load[part][order])
+    after = len(curve.load) - len(order)
+    return replace(
+        curve,
+        deflection=curve.deflection[part][order],
+        load=curve.load[part][order],
+        dropped={UNLOADING: after} if after else {},
+    )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .column_names import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
+from .frames import FrameSource
 from .machine_tables import (
     MachineTable,
     TableOptions,
@@ -20,6 +21,7 @@ from .machine_tables import (
     column_of,
     measured,
     read_machine_table,
+    source_of,
 )
 
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
@@ -57,6 +59,7 @@ class LoadCurve:
     time : (n,) in the file's unit, None unless asked for by name.
     frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
     notes : one sentence each: what was chosen where the file leaves a choice.
+    source : what of the file was read; None where nothing was.
     """
 
     direction: str
@@ -67,6 +70,7 @@ class LoadCurve:
     time: NDArray[np.float64] | None = None
     frame: NDArray[np.intp] | None = None
     notes: tuple[str, ...] = ()
+    source: FrameSource | None = None
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
@@ -131,6 +135,8 @@ def read_load_curves(
     elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
     load = _load(found, column["load"], load_unit, width)
     notes = found.notes + choice_of(found, "elongation", named)
+    asked = {"elongation": length_unit, "load": load_unit}
+    source = source_of(found, column, asked, format, notes)
     time = found.table.numbers(column["time"]) if column["time"] else None
     labels = _labels(found, column, wanted)
     places: dict[tuple[str, str], list[int]] = {}
@@ -140,7 +146,8 @@ def read_load_curves(
     for key, rows in places.items():
         if wanted in (None, key[0]):
             taken = None if time is None else time[rows]
-            curves.append(LoadCurve(*key, elongation[rows], load[rows], path, taken, notes=notes))
+            values = elongation[rows], load[rows]
+            curves.append(LoadCurve(*key, *values, path, taken, notes=notes, source=source))
     if not curves:
         there = ", ".join(dict.fromkeys(key[0] for key in places))
         raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
@@ -155,7 +162,7 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     """
     u, starts, reached = curve.elongation, [0], 0.0
     for i, value in enumerate(u):
-        if value < 0.5 * reached:
+        if 0 < reached and value < 0.5 * reached:
             starts.append(i)
             reached = 0.0
         # Noise about zero, before the load comes on, is no restart.
@@ -170,6 +177,7 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
             curve.path,
             None if curve.time is None else curve.time[part],
             notes=curve.notes,
+            source=curve.source,
         )
         for number, part in enumerate(parts, start=1)
     )

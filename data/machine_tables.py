@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .column_names import columns_of, nearest_to_strip, scale_of
-from .registry import read_file
+from .frames import FrameSource
+from .registry import format_of, read_file
 from .tables import TextTable
 
 NEEDED = ("elongation", "load")
@@ -111,6 +112,26 @@ def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> t
         f"{found.table.path.name}: the {quantity} is column {chosen!r}, not {others};"
         f" columns = {{ {quantity} = ... }} names another",
     )
+
+
+def source_of(
+    found: MachineTable,
+    columns: Mapping[str, str],
+    asked: Mapping[str, str | None],
+    format: str | None,
+    notes: Sequence[str] = (),
+) -> FrameSource:
+    """What of a table was taken, for the record.
+
+    Parameters
+    ----------
+    columns : the file's name of each quantity, "" for those that it lacks. asked : units that the
+        caller said, by quantity, for columns that name none. format : as it was asked for.
+    """
+    taken = {quantity: column for quantity, column in columns.items() if column}
+    units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
+    name = format or format_of("machine table", found.table.path).name
+    return FrameSource(name, taken, {q: unit for q, unit in units.items() if unit}, tuple(notes))
 
 
 def measured(

@@ -165,7 +165,11 @@ class FittableTest(Test, Protocol):
 
 
 class PreparedTest(Protocol):
-    """A test with its data, in memory: what worker processes are given."""
+    """A test with its data, in memory: what worker processes are given.
+
+    One whose data are measured files also offers them for the record of a run
+    (`data_files.OfFiles`), as a test that is predicted does.
+    """
 
     @property
     def test(self) -> FittableTest:
@@ -397,7 +401,9 @@ class Kind(Protocol):
     name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
     section : what such a table may say; `name` is among it, and `weight` where it is fitted.
     fitted : whether its tests are `FittableTest`s. predicted : what tests offer that cards predict,
-    None for others. studied : None where no study runs it.
+    None for others. studied : None where no study runs it. A kind whose section names the folder of
+    measured files has `folder_key`, the dotted key of it, by which a project can be written down
+    with the folder that it was run with.
     """
 
     name: str

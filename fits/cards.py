@@ -91,6 +91,19 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     return chosen
 
 
+def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
+    """The project's names, and the files, of the cards that `chosen_cards` gives.
+
+    None where they were handed over as they are, by Python: they have neither.
+    """
+    if isinstance(cards, Mapping):
+        return None
+    if not cards:
+        return list(project.cards) or [usual_folder(project.path) / FITTED]
+    named = [name for name in project.cards if name in map(str, cards)]
+    return [*named, *(card for card in cards if str(card) not in project.cards)]
+
+
 def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:
     """The cards by name, in the order of the file.
 

@@ -11,18 +11,21 @@ from ..errors import NoFeasibleStart, SolverFailure
 from ..experiments.base import FittableTest
 from ..identification.problem import FitProblem
 from .best import BestFit, best_fit
+from .facts import facts_of, solver_facts
 from .failure_page import failure_page
 from .processes import run_starts
 from .project import Project, cores
+from .record import Record, data_rows, this_run
 from .result import Fit
 from .running_files import HISTORY, STARTS, RunningFiles
 from .setup import FitSetup, fingerprints, prepare_fit
 from .start import EvaluationRecord, StartRecord
 from .store import Store
+from .written import settings_of
 
-Record = EvaluationRecord | StartRecord
+Event = EvaluationRecord | StartRecord
 #: Is told of every analysis and every start as it ends, and of time passing (None).
-Progress = Callable[[Record | None], None]
+Progress = Callable[[Event | None], None]
 
 
 def fit(
@@ -37,6 +40,7 @@ def fit(
     resume: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
 ) -> Fit:
     """Fit the law of a project to its tests, from random feasible starts.
 
@@ -50,6 +54,7 @@ def fit(
     overwrite : replace what the folder holds.
     progress : is told of every record; None now and then while nothing ends. An interrupt
         (Ctrl-C) leaves the folder ready for `resume`.
+    command_line : of the command that asks, for the record; None where Python does.
 
     Returns
     -------
@@ -67,11 +72,16 @@ def fit(
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     setup = prepare_fit(project, chosen)
     problem = setup.problem()
+    record = _record(setup, problem, command_line)
     files = None
     done: dict[int, StartRecord] = {}
     if out is not None:
         store = Store(Path(out))
-        store.begin(fingerprints(setup, problem), resume, overwrite, (STARTS, HISTORY))
+        facts = facts_of(setup, problem.solver, record.data)
+        parts = fingerprints(setup, problem)
+        if store.begin(parts, resume, overwrite, (STARTS, HISTORY), facts):
+            record = record.after(store.path)
+        record.write(store.path)
         unknowns, scales = problem.unknowns, project.scales
         columns = [f"{label}_{scales.modulus_unit}" for label in unknowns.labels]
         scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
@@ -80,7 +90,19 @@ def fit(
     with failure_page(None if out is None else Path(out), project.title):
         records = _records(setup, files, done, progress or _nobody)
         best = _best(problem, records, project)
-    return Fit(setup, problem, best, time.perf_counter() - begun)
+    return Fit(setup, problem, best, time.perf_counter() - begun, record)
+
+
+def _record(setup: FitSetup, problem: FitProblem, command_line: Sequence[str] | None) -> Record:
+    project, tests = setup.project, [(test.test.name, test) for test in setup.tests]
+    return Record(
+        project.path,
+        None if project.written is None else project.written.text,
+        None if project.written is None else settings_of(project, [name for name, _ in tests]),
+        data_rows(tests),
+        solver_facts(project.fit.solver, problem.solver.identity),
+        [this_run(command_line)],
+    )
 
 
 def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:

@@ -15,6 +15,7 @@ from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
 from ..identification.assessment import notes_of_misfits, pinned_by
 from ..notes import Note, NoteKind, as_note, rows
+from .store import PROVENANCE
 
 if TYPE_CHECKING:
     from .result import Fit
@@ -85,6 +86,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
         }
+    if fit.record is not None:
+        result["provenance"] = PROVENANCE
     result["tests"] = {name: f.numbers for name, f in fit.findings.items()}
     if len(fit.findings) == 1:
         result |= next(iter(fit.findings.values())).numbers

@@ -52,6 +52,8 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     """Write everything; raises OutputError."""
     store = Store(folder)
     (folder / RESULT).unlink(missing_ok=True)
+    if fit.record is not None:
+        fit.record.write(folder)
     write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
     for name, table in ((MODULI, fit.moduli()), (RESIDUALS, fit.residuals())):
         with replacing(folder / name) as path:
@@ -79,7 +81,12 @@ def _page(fit: Fit, folder: Path) -> Report:
         for name, exhibit in exhibits.items()
         for label, value in exhibit.facts
     ]
-    files = [*FILES, *(f for exhibit in shown for f in exhibit.files)]
+    record = [] if fit.record is None else fit.record.tables()
+    files = [
+        *FILES,
+        *([] if fit.record is None else fit.record.files),
+        *(f for exhibit in shown for f in exhibit.files),
+    ]
     return Report(
         title=project.title,
         summary=_summary(fit),
@@ -113,6 +120,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             _left(fit),
             *_pinned_table(pins),
             *(t for exhibit in shown for t in exhibit.tables),
+            *record,
         ],
         starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in best.records],
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],

@@ -21,6 +21,8 @@ RUNS_TABLE = "runs.csv"
 def write_predictions(predictions: Predictions, folder: Path) -> Path:
     """Write everything; raises OutputError."""
     (folder / RESULT).unlink(missing_ok=True)
+    if predictions.record is not None:
+        predictions.record.write(folder)
     several = len(predictions.outcomes) > 1
     exhibits = {
         kind: outcome.show(Output(folder, f"{kind}/" if several else ""))
@@ -68,12 +70,14 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         tables=[
             *(table for exhibit in exhibits.values() for table in exhibit.tables),
             *_notes(predictions),
+            *([] if predictions.record is None else predictions.record.tables()),
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
             *(file for exhibit in exhibits.values() for file in exhibit.files),
+            *([] if predictions.record is None else predictions.record.files),
         ],
         versions=result["versions"],
     )

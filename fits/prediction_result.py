@@ -14,6 +14,8 @@ from ..notes import Note, as_note, marks
 from ..notes import lines as note_lines
 from ..notes import rows as note_rows
 from .numbers import versions
+from .record import Record
+from .store import PROVENANCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,12 +35,13 @@ class Predictions:
     """Every chosen test with every chosen card.
 
     each : the runs, test by test, card by card; they keep this order in every table.
-    wall_s : seconds that all of it took.
+    wall_s : seconds that all of it took. record : what it came from, None where nobody asks.
     """
 
     project: Project
     each: tuple[PredictedRun, ...]
     wall_s: float
+    record: Record | None = None
 
     @cached_property
     def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
@@ -71,6 +74,7 @@ class Predictions:
             "worst_relative_error": self.worst,
             "wall_s": self.wall_s,
             "versions": versions(),
+            **({} if self.record is None else {"provenance": PROVENANCE}),
         }
 
     @property

@@ -18,13 +18,16 @@ from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Solver
 from ..solvers.registry import solver_named, usable_solver
-from .cards import Cards, chosen_cards
+from .cards import Cards, card_sources, chosen_cards
 from .content import digest_of
+from .facts import solver_facts
 from .failure_page import failure_page
 from .prediction_result import Predictions, predicted_kind
 from .processes import Task, run_tasks
 from .project import Project, cores
+from .record import Record, data_rows, this_run
 from .run_records import RunRecords
+from .written import settings_of_predictions
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ def predict(
     resume: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
@@ -68,6 +72,7 @@ def predict(
     overwrite : replace what the folder holds.
     progress : is told of every run that ended; None now and then while none does. An interrupt
         (Ctrl-C) leaves the folder ready for `resume`.
+    command_line : of the command that asks, for the record; None where Python does.
 
     Returns
     -------
@@ -80,19 +85,44 @@ def predict(
     SolverFailure : the solver is not there, or no run ended well.
     """
     begun = time.perf_counter()
-    pairs = _pairs(project, predicted_tests(project, tests), chosen_cards(project, cards))
+    chosen = predicted_tests(project, tests)
+    pairs = _pairs(project, chosen, chosen_cards(project, cards))
     solver = _usable(project)
+    record = _record(project, chosen, card_sources(project, cards), solver, command_line)
     records = None
     if out is not None:
         records = RunRecords(Path(out))
         records.begin(resume, overwrite)
+        if resume:
+            record = record.after(Path(out))
+        record.write(Path(out))
     with failure_page(None if out is None else Path(out), project.title) as said:
         runs = _run(project, pairs, solver, records, jobs, progress or _nobody)
         if all(run.record.failure for run in runs):
             said += [f"{r.test.name} with {r.card}: failed: {r.record.failure}" for r in runs]
             failure = f"no run ended well: {runs[0].record.failure}"
             raise SolverFailure(failure, project.fit.solver)
-    return Predictions(project, tuple(runs), time.perf_counter() - begun)
+    return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
+
+
+def _record(
+    project: Project,
+    tests: Sequence[Test],
+    cards: Sequence[str | Path] | None,
+    solver: Solver,
+    command_line: Sequence[str] | None,
+) -> Record:
+    written, settings = project.written, None
+    if written is not None and cards is not None:
+        settings = settings_of_predictions(project, [test.name for test in tests], cards)
+    return Record(
+        project.path,
+        None if written is None else written.text,
+        settings,
+        data_rows((test.name, test) for test in tests),
+        solver_facts(project.fit.solver, solver.identity),
+        [this_run(command_line)],
+    )
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:

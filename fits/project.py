@@ -19,6 +19,7 @@ from ..solvers.registry import solver_settings
 from .cards import NamedCard, read_cards
 from .file import ProjectFile, parse
 from .schema import FitSection, LawSection
+from .written import Written, section_as_run
 
 #: Data folders: of all tests, or by the name of a test.
 Folders = Path | Mapping[str, Path]
@@ -35,7 +36,7 @@ class Project:
     ----------
     path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
     law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
-        of a solver, what it is made with.
+        of a solver, what it is made with. written : what the file says; None without one.
 
     Raises
     ------
@@ -50,6 +51,7 @@ class Project:
     fit: FitSection
     cards: Mapping[str, NamedCard]
     solver_options: Mapping[str, Mapping[str, Any]]
+    written: Written | None = None
 
     def __post_init__(self) -> None:
         if self.fit.method == "lm" and self.fit.constraints == "boolean":
@@ -162,15 +164,17 @@ def read_project(path: Path | str, data: Folders | None = None, need_data: bool 
         units.length,
     )
     place = Place(path, "", fabric, scales, None, need_data)
+    tests = _tests(file, place, data)
     return Project(
         path=path,
         fabric=fabric,
         scales=scales,
-        tests=_tests(file, place, data),
+        tests=tests,
         law=file.law,
         fit=file.fit,
         cards=read_cards(place, file.card),
         solver_options=solver_settings(path, file.solver),
+        written=_written(file, path, tests, data),
     )
 
 
@@ -190,12 +194,34 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
             if own in tests:
                 raise here.error("name", f"{own!r} is there twice; give one of them another name")
             tests[own] = kind.read(section, here, own)
-            if isinstance(data, Mapping) and folder is not None and not tests[own].reads_files:
+            if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
                 raise here.error("data", NO_FILES)
-    if isinstance(data, Path) and not any(t.reads_files for t in tests.values()):
+    if isinstance(data, Path) and not any(map(_reads, tests.values())):
         at = next((f"{k}[0].data" for k in kinds() if file.tests(k)), "data")
         raise InputError(place.path, at, NO_FILES)
     return tests
+
+
+def _written(
+    file: ProjectFile, path: Path, tests: Mapping[str, Test], data: Folders | None
+) -> Written:
+    sections = {}
+    for name, kind in kinds().items():
+        own = file.tests(name)
+        for section, test in zip(own, _names(name, own), strict=True):
+            folder = data.get(test) if isinstance(data, Mapping) else data
+            key = getattr(kind, "folder_key", None)
+            said = section.model_dump()
+            sections[test] = section_as_run(said, test, key, path.parent, folder)
+    common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
+    cards = [card.model_dump(exclude_none=True) for card in file.card]
+    by_kind = {name: test.kind for name, test in tests.items()}
+    return Written(path.read_bytes().decode("utf-8"), common, sections, by_kind, cards)
+
+
+def _reads(test: Test) -> bool:
+    # A kind of another distribution may have nothing to say of files.
+    return getattr(test, "reads_files", False)
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:

@@ -19,6 +19,7 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .best import BestFit
 from .project import Project
+from .record import Record
 from .setup import FitSetup
 
 if TYPE_CHECKING:
@@ -38,12 +39,14 @@ class Fit:
     ----------
     setup : project, law without coefficients, tests with their data.
     best : the best of the starts, run once more from the unloaded state. wall_s : seconds.
+    record : what it came from, None where nobody asks.
     """
 
     setup: FitSetup
     problem: FitProblem
     best: BestFit
     wall_s: float
+    record: Record | None = None
 
     @property
     def project(self) -> Project:

@@ -24,6 +24,9 @@ SURROGATE = "membrane"
 MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
 #: Where a project names its solver.
 SOLVER_KEY = "fit.solver"
+#: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
+#: solver is told by what it says of itself.
+UNCOUNTED = ("starts", "solver", "jobs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +119,8 @@ def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     """Digests of everything that a start's result depends on, by what they are of."""
     fit = setup.project.fit
     return {
-        "law": digest_of(setup.law, setup.bounds),
-        "fit settings": digest_of(fit.model_dump(exclude={"starts", "solver", "jobs"})),
+        "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
+        "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
         "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
         "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
         "solver": digest_of(fit.solver, problem.solver.identity),

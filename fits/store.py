@@ -9,13 +9,18 @@ from typing import Any
 
 from ..errors import InputError, OutputError
 from ..writing import telling, write_text
+from .differences import Facts, differences
 
 RUN, RESULT = "run.json", "result.json"
+#: What results came from, and the project as it was run.
+PROVENANCE, AS_RUN = "provenance.json", "as-run.toml"
 #: What only a complete result has, beside it: a page and a card of an earlier one must not stand
 #: beside a later one that failed.
 OUTDATED = (RESULT, "report.html", "material.toml")
 #: What run.json must hold of a folder that an older version wrote: it can be replaced only.
 PARTS = "parts"
+#: What of them can be told in words.
+FACTS = "facts"
 
 
 def usual_folder(project: Path) -> Path:
@@ -46,6 +51,7 @@ class Store:
         resume: bool,
         overwrite: bool,
         records: Sequence[str] = (),
+        facts: Facts | None = None,
     ) -> bool:
         """Make the folder ready; whether there is something to go on with.
 
@@ -54,6 +60,7 @@ class Store:
         parts : what has to be the same for going on, each part (project, data, solver, version) as
             a digest by its name; empty where every record carries a digest of its own.
         records : files below the folder that go when the folder is not gone on with.
+        facts : behind the digests, in plain values: a difference is told by them.
 
         Raises
         ------
@@ -71,13 +78,14 @@ class Store:
             problem = "holds nothing to go on with; leave --resume out, or name another with --out"
             raise InputError(self.path, "", problem)
         if resume:
-            self._check(parts)
+            self._check(parts, facts or {})
         with telling(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
             for name in (*OUTDATED, *(() if resume else records)):
                 (self.path / name).unlink(missing_ok=True)
         if not resume:
-            self.write(RUN, json.dumps({PARTS: dict(parts)}, indent=1) + "\n")
+            content = {PARTS: dict(parts), FACTS: dict(facts or {})}
+            self.write(RUN, json.dumps(content, indent=1) + "\n")
         return resume
 
     def write(self, name: str, text: str) -> None:
@@ -98,16 +106,21 @@ class Store:
         """
         self.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
 
-    def _check(self, parts: Mapping[str, str]) -> None:
+    def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
         path = self.path / RUN
         try:
-            before = json.loads(path.read_text(encoding="utf-8"))[PARTS]
+            content = json.loads(path.read_text(encoding="utf-8"))
+            before, known = content[PARTS], content.get(FACTS, {})
             other = [name for name in {**before, **parts} if before.get(name) != parts.get(name)]
+            words = differences(known, facts) if other and known else []
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             raise InputError(path, "", "is missing or damaged; use --overwrite") from None
         if other:
+            # Without words: of an older version, or what differs is in nothing that can be told.
+            what = "; ".join(words) or f"another {' and '.join(sorted(other))}"
             problem = (
-                f"this folder's results are of another {' and '.join(sorted(other))}; go on with "
-                "the same, or use --overwrite"
+                f"these results are of something else: {what}"
+                if words
+                else (f"this folder's results are of {what}")
             )
-            raise InputError(path, PARTS, problem)
+            raise InputError(path, PARTS, f"{problem}; go on with the same, or use --overwrite")

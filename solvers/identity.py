@@ -9,6 +9,7 @@ import jinja2
 import jinja2.meta
 
 from ..errors import InputError
+from ..writing import checksum
 
 
 def in_words(name: str, version: str, **settings: object) -> str:
@@ -24,7 +25,7 @@ def file_mark(path: Path) -> str:
     ------
     InputError : it cannot be read.
     """
-    return hashlib.sha256(_content(path)).hexdigest()
+    return checksum(path)
 
 
 def templates_mark(folder: Path | None) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..experiments.base import FittableTest
-from ..fits.fit import Record, fit
+from ..fits.fit import Event, fit
 from ..fits.project import Project, cores
 from ..fits.result import Fit
 from ..fits.setup import FitSetup, fingerprints, prepare_fit
@@ -36,7 +36,7 @@ LOST = "no fit without its points ended well, or no analysis at them: the form i
 
 #: Told the name of each form as its turn comes, then the records of its starts and folds; None
 #: now and then.
-Progress = Callable[[str | Record | FoldError | None], None]
+Progress = Callable[[str | Event | FoldError | None], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +180,7 @@ def compare_laws(
     resume: bool = False,
     overwrite: bool = False,
     progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
 ) -> LawComparison:
     """Fit every form to the tests, then without some specimens, and judge it at those.
 
@@ -192,6 +193,7 @@ def compare_laws(
     folds : at most; fold_starts : random starts of the fit of each.
     starts : random starts of the fit of each form.
     out : folder with a folder for each form, in which everything is written as it ends.
+    command_line : as for `fit`.
 
     Raises
     ------
@@ -225,6 +227,7 @@ def compare_laws(
             resume=resume and place is not None and Store(place).used,
             overwrite=overwrite,
             progress=tell,
+            command_line=command_line,
         )
         if place is not None:
             found.report(place)

@@ -18,6 +18,7 @@ class BubbleKind:
 
     name = "bubble"
     title = "a bubble inflation test"
+    folder_key = "data.points.folder"
     section = BubbleSection
     fitted = True
     predicted = None

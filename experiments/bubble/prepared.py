@@ -18,6 +18,7 @@ from ...materials.forms.registry import form_named
 from ...materials.law import HypoelasticLaw
 from ...solvers.base import Solver
 from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from ..data_files import DataFile, joined
 from .findings import findings_of
 from .objective import OFFSETS, FieldObjective
 from .places import at_nodes, at_points, folded, mirrored
@@ -98,6 +99,14 @@ class PreparedBubble:
             raise in_section(test.place, error) from None
         nuisance = nuisance_of(test)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
+
+    def data_files(self) -> Sequence[DataFile]:
+        """The files of the measured fields; none where they were computed."""
+        return joined(
+            DataFile(f.path, f.source, len(f.points), f.dropped)
+            for f in self.fields
+            if f.path is not None
+        )
 
     @property
     def outside(self) -> int:

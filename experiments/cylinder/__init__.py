@@ -18,6 +18,7 @@ class CylinderKind:
 
     name = "cylinder"
     title = "an inflated cylinder in three-point bending"
+    folder_key = "measured.folder"
     section = CylinderSection
     fitted = False
 

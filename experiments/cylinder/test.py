@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ...data.bending import BendingCurve
+from ...data.frames import FrameSource
 from ...errors import InputError
 from ...models.bending import DEFLECTION, FRAMES, LENGTH, SEAM_WIDTH, inflated_cylinder
 from ...models.bodies import Collar, RigidSupports, usual_collar
@@ -17,6 +18,7 @@ from ...models.cylinder import CylinderModel
 from ...models.gas import Gas
 from ...models.reading import CurveReading, curve_reading
 from ..base import Place, Reach, Refined
+from ..data_files import DataFile, joined
 from .measured import read_measured
 from .section import CylinderSection
 
@@ -33,6 +35,7 @@ class CylinderTest:
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
     deflections : frames of the bending. measured : repetitions, empty where there are none.
+    listed : whether the section lists files of them.
     """
 
     name: str
@@ -50,9 +53,23 @@ class CylinderTest:
     gas: Gas
     reading: CurveReading
     measured: tuple[BendingCurve, ...] = ()
+    listed: bool = False
     kind: str = "cylinder"
     #: Nothing of it is fitted.
     weight: float = 1.0
+
+    @property
+    def reads_files(self) -> bool:
+        """Whether its section lists measured files."""
+        return self.listed
+
+    def data_files(self) -> Sequence[DataFile]:
+        """The files of the measured repetitions."""
+        return joined(
+            DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
+            for c in self.measured
+            if c.path is not None
+        )
 
     @property
     def reach(self) -> Reach:
@@ -151,7 +168,8 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
         test.model()
     except InputError as error:
         raise place.error(KEYS.get(error.field, error.field), error.problem) from None
-    return replace(test, measured=read_measured(section.measured, place))
+    listed = bool(section.measured.files)
+    return replace(test, measured=read_measured(section.measured, place), listed=listed)
 
 
 def _collar(section: CylinderSection, diameter: float, scale: float) -> Collar:

@@ -30,6 +30,7 @@ class Strips:
     name: str = "strips"
     title: str = "cut strips pulled along warp, fill and 45 degrees"
     section: type[BaseModel] = StripsSection
+    folder_key: str = "data.folder"
     fitted: bool = True
     predicted: Predicted | None = None
     studied: Studied | None = Studied(

@@ -13,6 +13,7 @@ from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
 from ...solvers.base import History
 from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from ..data_files import DataFile, joined
 from .objective import Array, LoadObjective
 from .strip import Strip
 from .test import StripsTest, reach_of
@@ -135,6 +136,13 @@ class PreparedStrips:
             strip = self.test.strips[direction]
             strips.append(FittedStrip(strip, comparison.model, objective, history))
         return tuple(strips)
+
+    def data_files(self) -> Sequence[DataFile]:
+        """The files of the curves that are matched."""
+        points = self.test.match_by == "points"
+        return joined(
+            file for d in self.test.matched for file in self.test.strips[d].data_files(points)
+        )
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""

@@ -86,7 +86,13 @@ def _published(
         end = curve.final_length if own.final_length is None else own.final_length * length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
         strips[direction] = _strip(
-            place, direction, start, end, polynomial=curve.polynomial, scatter=scatter
+            place,
+            direction,
+            start,
+            end,
+            polynomial=curve.polynomial,
+            scatter=scatter,
+            published=file.path,
         )
     return strips
 

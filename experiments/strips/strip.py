@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...data.curves import LoadCurve
+from ...data.frames import FrameSource
 from ...data.load_polynomials import LoadPolynomial, fit_load_polynomial
 from ...data.regions import strain_regions
+from ...data.registry import format_of
 from ...identification.comparison import NoiseIs
+from ..data_files import DataFile
 
 Array = NDArray[np.float64]
 
 #: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
 #: load cell is of accuracy class 0.5 %.
 LOAD_CELL = 0.005
+#: Why points are not matched.
+BELOW, BEYOND = "elongation below zero", "beyond the final length"
 PLACES = 200  # at which a polynomial is asked for its regions
 
 
@@ -35,6 +41,7 @@ class Strip:
     scatter : standard deviation of the points about the polynomial; None where not known.
     through_origin : whether a polynomial through the points starts in the origin.
     open_end : nobody said the final length: it is where the points end.
+    published : the file of a polynomial that was given, None of one fitted to points.
     """
 
     direction: str
@@ -45,6 +52,7 @@ class Strip:
     scatter: float | None = None
     through_origin: bool = True
     open_end: bool = False
+    published: Path | None = None
 
     @property
     def elongation(self) -> float:
@@ -87,6 +95,22 @@ class Strip:
         if self.scatter is not None:
             return self.scatter, "specimens' scatter"
         return LOAD_CELL * largest, "assumed"
+
+    def data_files(self, points: bool) -> list[DataFile]:
+        """The files of the load curve; points : whether those up to the end alone count."""
+        if self.published is not None:
+            name = format_of("load polynomials", self.published).name
+            return [DataFile(self.published, FrameSource(name), 1)]
+        end = self.elongation * (1 + 1e-9)
+        files = []
+        for curve in self.curves:
+            if curve.path is None:
+                continue
+            below, beyond = int((curve.elongation < 0).sum()), int((curve.elongation > end).sum())
+            dropped = {BELOW: below, BEYOND: beyond} if points else {}
+            used = len(curve.load) - sum(dropped.values())
+            files.append(DataFile(curve.path, curve.source or FrameSource(), used, dropped))
+        return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
         """Two shares of the gauge's strain between which three lines follow the load curve best.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -132,6 +133,26 @@ def test_errors_against_the_readings(study) -> None:
     result = result_in(out)
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
     assert "error" in text.splitlines()[0]
+
+
+def test_the_folder_says_what_it_came_from(study) -> None:
+    out, _ = study
+    assert result_in(out)["provenance"] == "provenance.json"
+    record = json.loads((out / "provenance.json").read_text())
+    (run,), (file,) = record["runs"], record["data"]
+    project = out.parent / "project.toml"
+    assert run["command_line"] == ["bubblefit", "bend", str(project), "--out", "out"]
+    assert file["sha256"] == hashlib.sha256((out.parent / "made-up.csv").read_bytes()).hexdigest()
+    assert file["rows_used"] == 14
+    assert file["rows_dropped"] == {"after the largest deflection": 2}
+    assert file["units"]["load"] == "kg" and file["columns"]["load"] == "mass_kg"
+    again, own = read_project(out / "as-run.toml"), read_project(project)
+    for name, test in own.tests.items():
+        assert again.tests[name].settings() == test.settings()
+    for name, card in own.cards.items():
+        np.testing.assert_array_equal(again.cards[name].card.law.beta, card.card.law.beta)
+    page = (out / "report.html").read_text()
+    assert "The record: data files" in page and file["sha256"][:12] in page
 
 
 def test_the_page_and_the_pictures(study) -> None:

@@ -1,5 +1,6 @@
 """`bubblefit uniaxial` and `simulate uniaxial` as a user runs them."""
 
+import hashlib
 import json
 import os
 import re
@@ -10,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
@@ -170,6 +172,18 @@ OTHER_STUDIES = {
     "objective": ('objective = "N"', 'objective = "relative"'),
     "bounds": ("E1 = [0.02, 2.0]", "E1 = [0.03, 2.0]"),
 }
+#: What --resume says of each.
+DIFFERENCES = {
+    "weights": "strips.weights.fill = 1.0, now 2.0",
+    "increments": "strips.increments = 10, now 11",
+    "gauge": "strips.fill.gauge_length = 22.78, now 22.7",
+    "width": "strips.width = 25.0, now 24.0",
+    "objective": 'strips.objective = "N", now "relative"',
+    "bounds": "law.bounds.E1[0] = 0.02, now 0.03",
+    "data": "data file points.csv of 'strips' (sha256 ",
+    "gauge length": "strips.warp.gauge_length = 20.022, now 21.0",
+    "final length": "strips.bias.final_length = 30.734, now 31.0",
+}
 
 
 @pytest.fixture(scope="module")
@@ -232,7 +246,37 @@ def test_another_study_is_not_resumed(of_points, tmp_path, what):
     else:
         changes.append(OTHER_STUDIES[what])
     arguments = ("uniaxial", small(tmp_path, *changes), "--out", "out", "--starts", 1, "--resume")
-    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite", "run.json")
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    done = quick(*arguments, cwd=tmp_path, code=2)
+    one_line(
+        done,
+        "--overwrite",
+        f"run.json: parts: these results are of something else: {DIFFERENCES[what]}",
+    )
+    assert done.stderr.count(", now ") == 1
+    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
+
+
+def test_the_folder_says_what_it_came_from(of_points, tmp_path):
+    out = of_points / "out"
+    assert result_in(out)["provenance"] == "provenance.json"
+    record = json.loads((out / "provenance.json").read_text())
+    (run,) = record["runs"]
+    command = ["bubblefit", "uniaxial", str(of_points / "project.toml"), "--out", "out"]
+    assert run["command_line"] == [*command, "--starts", "1"]
+    (file,) = record["data"]
+    assert file["sha256"] == hashlib.sha256((of_points / "points.csv").read_bytes()).hexdigest()
+    assert file["rows_used"] == 30 and file["rows_dropped"] == {}
+    page = (out / "report.html").read_text()
+    for words in ("The record", "The record: data files", file["sha256"][:12], run["date"]):
+        assert words in page, words
+    # The project as run goes on with this very fit, from another place and without an option.
+    shutil.copytree(out, tmp_path / "out")
+    again = bf.read_project(tmp_path / "out" / "as-run.toml")
+    fit = bf.fit(again, out=tmp_path / "out", resume=True)
+    runs = json.loads((tmp_path / "out/provenance.json").read_text())["runs"]
+    assert [run["command_line"] for run in runs] == [record["runs"][0]["command_line"], None]
+    assert fit.result["beta"] == result_in(out)["beta"]
 
 
 def test_a_study_of_points_finds_what_made_them(of_points):

@@ -228,9 +228,16 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
     (curve,) = read(scratch, text)
     np.testing.assert_allclose(curve.load, [0, 100, 180, 0, 100, 190])
     assert [len(part.load) for part in split_at_restarts(curve)] == [3, 3]
+
     assert curve.notes == ()
     message = complaint(read, scratch, text.replace("1,1,100", "1,x,100"))
     assert "line 5, column 'Extension': expected a number, found 'x'" in message
+
+
+def test_a_specimen_that_begins_below_zero_is_one(scratch):
+    text = "Weg [mm];Kraft [N]\n-0,2;0\n0,1;1\n0,3;2\n0,1;0\n0,3;2\n"
+    (curve,) = read(scratch, text, direction="warp")
+    assert [len(part.load) for part in split_at_restarts(curve)] == [3, 2]
 
 
 @pytest.mark.parametrize(

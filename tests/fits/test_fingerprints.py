@@ -76,6 +76,8 @@ def test_bounds_settings_tests_and_solver_count(cubic: FitSetup) -> None:
     wider = replace(limits, upper=1.01 * limits.upper)
     assert changed(cubic) == []
     assert changed(cubic, bounds=wider) == ["law"]
+    thicker = replace(project, fabric=replace(project.fabric, thickness=0.9))
+    assert changed(cubic, project=thicker) == ["law"]
     assert changed(cubic, project=project.with_fit(seed=77)) == ["fit settings"]
     assert changed(cubic, project=project.with_fit(solver="calculix")) == ["solver"]
     # More starts, or other processes, leave those that ended as they are.
