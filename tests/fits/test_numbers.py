@@ -16,6 +16,7 @@ LEFT = "points beyond the final length (or before zero) were left out"
 def test_everything_of_two_tests(together: bf.Fit) -> None:
     fit, law = together, together.law
     result = dict(fit.result)
+    assert result.pop("provenance") == "provenance.json"
     sure = fit.best.certainty
     assert sure is not None
     pinned = result.pop("pinned")
