@@ -147,7 +147,7 @@ def test_interrupted_and_gone_on_with(fitted: bf.Fit, tmp_path: Path):
     )
     assert gone_on.objective == fitted.objective
     assert [r.number for r in heard if isinstance(r, StartRecord)] == [0, 1]
-    with pytest.raises(InputError, match="fit.seed = 1, now 9; go on"):
+    with pytest.raises(InputError, match=r"fit\.seed = 1, now 9; go on"):
         bf.fit(fitted.project, seed=9, out=tmp_path / "out", resume=True)
     with pytest.raises(InputError, match="nothing to go on with"):
         bf.fit(fitted.project, out=tmp_path / "nowhere", resume=True)
