@@ -7,7 +7,7 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.fits.numbers import TOGETHER, versions, warnings_of
+from bubblefit.fits.numbers import TOGETHER, notes_of_fit, versions
 
 OPEN = "rests on the other directions"
 LEFT = "points beyond the final length (or before zero) were left out"
@@ -27,7 +27,16 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
         assert pinned[TOGETHER][name] == own
     assert set(result.pop("tests")) == {"one", "two"}
     assert list(result.pop("mean_relative_error")) == ["one", "two"]
-    assert result.pop("warnings") == warnings_of(fit, pinned)
+    assert result.pop("warnings") == [note.line for note in fit.notes]
+    assert result.pop("notes") == [
+        {"of": note.of, "kind": note.kind.value, "note": str(note)} for note in fit.notes
+    ]
+    for name, misfit in result.pop("misfit").items():
+        own = fit.misfits[name]
+        assert misfit == {
+            "rms": own.rms, "noise": own.noise, "noise_is": "specimens' scatter", "unit": "N",
+            "times_noise": pytest.approx(own.rms / own.noise),
+        }  # fmt: skip
     ends = dict(zip(("warp", "fill", "shear"), fit.best.reached.tolist(), strict=True))
     assert result == {
         "command": "strips",
@@ -70,34 +79,47 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
     }
 
 
-def test_every_warning_of_two_tests(together: bf.Fit) -> None:
+def told(fit: bf.Fit) -> list[tuple[str, str, str]]:
+    return [(note.kind.value, note.of, str(note)) for note in fit.notes]
+
+
+def test_every_note_of_two_tests(together: bf.Fit) -> None:
     words = "(1 sigma above 100 % everywhere)"
-    assert together.result["warnings"] == [
-        "G12 is uncertain by up to 1000 % (1 sigma with the tests' noise), worst at strain 0.000",
-        "warp strain reached 0.135 in one: warp, beyond law.strain_range 0.12: the modulus was "
-        "held at its end value there; a wider range would let it vary",
-        f"one: no bias strip of one is matched: G12 {OPEN}",
-        f"one: warp: 2 {LEFT}",
-        f"one: fill: 2 {LEFT}",
-        f"two: no fill strip of two is matched: E2 {OPEN}",
-        f"two: no bias strip of two is matched: G12 {OPEN}",
-        f"two: warp: 4 {LEFT}",
-        f"one alone does not determine G12 {words}",
-        f"two alone does not determine E2 {words}",
-        f"two alone does not determine G12 {words}",
+    assert told(together) == [
+        (
+            "uncertain",
+            "",
+            "G12 is uncertain by up to 1000 % (1 sigma with the tests' noise), worst at strain "
+            "0.000",
+        ),
+        (
+            "beyond law.strain_range",
+            "one: warp",
+            "warp strain reached 0.135, beyond law.strain_range 0.12: the modulus was held at its "
+            "end value there; a wider range would let it vary",
+        ),
+        ("unmatched direction", "one", f"no bias strip of one is matched: G12 {OPEN}"),
+        ("points left out", "one, warp", f"2 {LEFT}"),
+        ("points left out", "one, fill", f"2 {LEFT}"),
+        ("unmatched direction", "two", f"no fill strip of two is matched: E2 {OPEN}"),
+        ("unmatched direction", "two", f"no bias strip of two is matched: G12 {OPEN}"),
+        ("points left out", "two, warp", f"4 {LEFT}"),
+        ("undetermined alone", "", f"one alone does not determine G12 {words}"),
+        ("undetermined alone", "", f"two alone does not determine E2 {words}"),
+        ("undetermined alone", "", f"two alone does not determine G12 {words}"),
     ]
 
 
-def test_every_warning_of_one_test(alone: bf.Fit) -> None:
+def test_every_note_of_one_test(alone: bf.Fit) -> None:
     """Its name stands before none of them; nothing else could be meant."""
     noise = alone.result["uncertainty"]["noise"]["two: warp"]
     words = f"is uncertain by up to 1000 % (1 sigma at {noise:.2g} N noise), worst at strain 0.000"
-    assert alone.result["warnings"] == [
-        f"E2 {words}",
-        f"G12 {words}",
-        f"no fill strip of two is matched: E2 {OPEN}",
-        f"no bias strip of two is matched: G12 {OPEN}",
-        f"warp: 4 {LEFT}",
+    assert told(alone) == [
+        ("uncertain", "", f"E2 {words}"),
+        ("uncertain", "", f"G12 {words}"),
+        ("unmatched direction", "", f"no fill strip of two is matched: E2 {OPEN}"),
+        ("unmatched direction", "", f"no bias strip of two is matched: G12 {OPEN}"),
+        ("points left out", "warp", f"4 {LEFT}"),
     ]
     assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
     assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
@@ -112,8 +134,8 @@ def test_remarks_and_unstable_equilibria_with_the_name_of_the_part(together: bf.
     ]
     point = replace(best.point, histories=tuple(marked))
     fit = replace(together, best=replace(best, point=point))
-    said = [w for w in warnings_of(fit, {}) if "unstable" in w or "snaps" in w]
-    assert said == [
+    said = [note.line for note in notes_of_fit(fit, {})]
+    assert [line for line in said if "unstable" in line or "snaps" in line] == [
         "one: fill: unstable equilibrium at 1 mm: the model would not stay there",
         "two: warp: snaps",
     ]

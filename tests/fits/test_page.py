@@ -139,10 +139,12 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
         ("material.toml", "the material card"),
         ("moduli.csv", "tangent moduli along their strains"),
         ("residuals.csv", "every matched value beside the model's"),
+        ("notes.csv", "what a reader of the numbers should know, note by note"),
         ("one-loads.csv", "load curves of the best fit"),
         ("two-loads.csv", "load curves of the best fit"),
     ]
     assert found.versions == versions()
+    assert found.warnings == [note.line for note in fit.notes]
     strips = [
         ("loads", "Load over gauge elongation: measured and modelled"),
         ("failure", "Tangent moduli up to the strains at the end of each strip"),
@@ -165,12 +167,29 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
     The noise is the misfit or the specimens' scatter about their polynomial, if that is larger.
     """
     fit, (found, told) = together, written
-    determined, pins = found.tables[:2]
+    determined, left, pins = found.tables[:3]
     noise = {}
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
             noise[prepared.part(strip.direction)] = max(strip.rms, strip.strip.scatter)
     said = ", ".join(f"{value:.2g} N ({name})" for name, value in noise.items())
+    shown = {row[0]: row[1:] for row in left.rows}
+    for prepared in fit.setup.tests:
+        for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
+            scatter = strip.strip.scatter
+            assert shown.pop(prepared.part(strip.direction)) == [
+                pytest.approx(strip.rms), scatter, "N", "specimens' scatter",
+                pytest.approx(strip.rms / scatter),
+            ]  # fmt: skip
+    assert not shown and left == Table(
+        "Residual beside the noise",
+        ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"],
+        left.rows,
+        "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "
+        "else what such an instrument is good for. The uncertainty reckons with the larger of "
+        "noise and residual.",
+        text=(3, 4),
+    )
     assert determined.note == f"white noise of {said}{NOISE_NOTE}"
     alone = {}
     for part, value in noise.items():
@@ -225,8 +244,8 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
 
 def test_misfit_by_strip(together: bf.Fit, written: tuple[Report, Told]) -> None:
     fit, (found, _) = together, written
-    one = found.tables[2]
-    assert [table.title for table in found.tables[2:]] == ["Misfit by strip"] * 2
+    one = found.tables[3]
+    assert [table.title for table in found.tables[3:]] == ["Misfit by strip"] * 2
     assert one.header == [
         "strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial", "its RMSE, N",
         "points matched", "load at the end, N",
@@ -269,7 +288,7 @@ def test_starts_that_failed_other_programs_and_no_certainty(
     (values,), _ = told.calls["plot_optima"]
     assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
-    assert found.tables == []
+    assert [table.title for table in found.tables] == ["Residual beside the noise"]
     assert told.calls["plot_moduli"][1] == {"sigma": None}
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
     assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
@@ -290,7 +309,9 @@ def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) 
     names = ["optima.png", "moduli.png", "loads.png", "failure.png", "orders.png"]
     assert [name for name, _ in found.figures] == names
     assert found.files[-1] == ("loads.csv", "load curves of the best fit")
-    assert [t.title for t in found.tables] == ["What the data determine", "Misfit by strip"]
+    assert [t.title for t in found.tables] == [
+        "What the data determine", "Residual beside the noise", "Misfit by strip"
+    ]  # fmt: skip
     said = f"objective {alone.objective:.4g}, RMS errors in N: warp {alone.objective:.4g}"
     assert alone.card.source == f"bubblefit {bf.__version__} strips, project.toml, {said}"
 

@@ -12,6 +12,7 @@ from bubblefit.fits.numbers import versions
 from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import predict
 from bubblefit.fits.project import read_project
+from bubblefit.notes import Note, NoteKind, rows
 from bubblefit.reports import Report, Table, percent
 from bubblefit.solvers import registry
 
@@ -45,7 +46,7 @@ def predictions(folder: Path, soft: float, measured: bool) -> Predictions:
     each = [
         replace(run, record=replace(run.record, seconds=2.0 + i)) for i, run in enumerate(done.each)
     ]
-    each[1] = replace(each[1], notes=("made up", "also"))
+    each[1] = replace(each[1], notes=("made up", Note(NoteKind.SNAP, "also")))
     return Predictions(done.project, tuple(each), 30.0)
 
 
@@ -57,8 +58,8 @@ def test_failures_errors_and_notes(tmp_path: Path, seen: list[Report]) -> None:
     assert done.worst == worst and done.failed() == [0, 2] and done.silent() == [0]
     assert found.title == "Tubes"
     assert found.summary == (
-        "2 of 4 runs finished. 2 have notes. Largest error against measured values: "
-        f"{percent(worst)}."
+        "2 of 4 runs finished. 2 have notes. Marked 'snap': 1. Largest error against measured "
+        f"values: {percent(worst)}."
     )
     assert found.facts == [
         ("tests", 2), ("cards", 2), ("solver", "formula"), ("wall time, s", 30.0),
@@ -73,17 +74,18 @@ def test_failures_errors_and_notes(tmp_path: Path, seen: list[Report]) -> None:
     assert [table.title for table in found.tables] == ["Runs", "Against measured loads", "Notes"]
     assert found.tables[-1] == Table(
         "Notes",
-        ["test", "card", "note"],
+        ["test", "card", "kind", "note"],
         [
-            ["150 mm, 90 kPa", "stiff", "made up"],
-            ["150 mm, 90 kPa", "stiff", "also"],
-            ["high", "stiff", "made up"],
+            ["150 mm, 90 kPa", "stiff", "of the solver", "made up"],
+            ["150 mm, 90 kPa", "stiff", "snap", "also"],
+            ["high", "stiff", "of the solver", "made up"],
         ],
         "What a reader of the numbers above should know of each run.",
-        text=(1, 2),
+        text=(1, 2, 3),
     )
     assert found.files == [
         ("runs.csv", "the table of runs with all its columns"),
+        ("notes.csv", "what a reader of the numbers should know, note by note"),
         ("result.json", "all numbers of this page, for programs"),
         ("load_deflection.csv", "every curve: deflection, load, pressure, volume, wrinkled share"),
         ("measured.csv", "mean and scatter of the repetitions on a grid"),
@@ -109,6 +111,7 @@ def test_result_json(tmp_path: Path) -> None:
     done = predictions(tmp_path, FAILS, measured=True)
     result = dict(done.result)
     runs, tests = result.pop("runs"), result.pop("tests")
+    assert result.pop("notes") == rows(done.notes)
     assert result == {
         "command": "predict",
         "title": "Tubes",
@@ -119,8 +122,13 @@ def test_result_json(tmp_path: Path) -> None:
         "versions": versions(),
     }
     assert runs[0] == {
-        "test": "150 mm, 90 kPa", "card": "soft", "ended": "failed: made to fail", "seconds": 2.0
-    }  # fmt: skip
+        "test": "150 mm, 90 kPa",
+        "card": "soft",
+        "ended": "failed: made to fail",
+        "marks": [],
+        "seconds": 2.0,
+    }
+    assert [run["marks"] for run in runs[1:]] == [["snap"], [], []]
     told = ("card", "ended", "seconds", "iterations", "warnings")
     assert {key: runs[1][key] for key in told} == {
         "card": "stiff", "ended": "finished", "seconds": 3.0, "iterations": 0,

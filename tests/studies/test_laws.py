@@ -10,6 +10,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.notes import rows
 from bubblefit.reports import LawRow, Report, Table
 from bubblefit.studies import law_page
 from bubblefit.studies.folds import FoldError
@@ -87,6 +88,7 @@ def test_every_number(compared: LawComparison) -> None:
         "least_cross_validated": result["least_cross_validated"],
         "simplest_as_good": "constant",
         "as_good_within": 0.05,
+        "notes": rows(compared.notes),
     }
     left = {name: difference(direction) for name, direction in PARTS.items()}
     total = sum(left.values())
@@ -111,10 +113,10 @@ def test_table_and_page(compared: LawComparison, run: Run) -> None:
     compared.report(run.out)
     result = json.loads((run.out / "result.json").read_text())
     assert result == compared.result
-    found, ((path, rows, noise, label),) = run.pages[-1], run.drawn
+    found, ((path, drawn, noise, label),) = run.pages[-1], run.drawn
     assert path == run.out / "laws.png" and label == "sum of the strips' RMS errors, N"
     assert noise == pytest.approx(result["noise"])
-    for row, form in zip(rows, result["forms"], strict=True):
+    for row, form in zip(drawn, result["forms"], strict=True):
         assert isinstance(row, LawRow) and row.folds == form["folds"]
         assert (row.name, row.coefficients) == (form["form"], form["coefficients"])
         assert (row.fitted, row.validated) == (form["fitted"], form["cross_validated"])
@@ -128,8 +130,13 @@ def test_table_and_page(compared: LawComparison, run: Run) -> None:
         ("laws.png", "Error of the fit, and at specimens left out of it"), ("loads.png", "loads")
     ]  # fmt: skip
     assert found.files == [
-        ("comparison.csv", "the table"), ("result.json", "all numbers, for programs")
-    ]  # fmt: skip
+        ("comparison.csv", "the table"),
+        ("notes.csv", "what a reader of the numbers should know, note by note"),
+        ("result.json", "all numbers, for programs"),
+    ]
+    assert found.warnings == [note.line for note in compared.notes]
+    of = {note.of.split(",")[0] for note in compared.notes}
+    assert of == {"constant", "linear"} and len(found.warnings) >= 4
     columns = [
         "moduli", "coefficients", "fitted", "cross_validated", "rms one: warp, N",
         "rms one: fill, N", "left out one: warp, N", "left out one: fill, N",
