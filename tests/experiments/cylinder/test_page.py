@@ -15,6 +15,7 @@ from bubblefit.experiments.base import Output
 from bubblefit.experiments.cylinder import figures, page
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.cylinder.record import BendingRun
+from bubblefit.notes import Note, NoteKind
 from bubblefit.reports import Table
 
 from .test_tables import MEASURES
@@ -39,7 +40,9 @@ def case(name: str, diameter: float = 150.0, **other: Any) -> SimpleNamespace:
 
 def run(test: SimpleNamespace, card: str, seconds: float = 12.34, **record: Any) -> SimpleNamespace:
     said = SimpleNamespace(**({"failure": "", "early": "", "seconds": seconds} | record))
-    return SimpleNamespace(test=test, card=card, notes=("a", "b"), record=said)
+    kinds = (NoteKind.EARLY, NoteKind.SNAP) if said.early else (NoteKind.GAS, NoteKind.SOLVER)
+    notes = tuple(Note(kind, "words") for kind in kinds)
+    return SimpleNamespace(test=test, card=card, notes=notes, record=said)
 
 
 @pytest.fixture
@@ -81,23 +84,26 @@ def test_every_cell(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> No
     stopped = "stopped at 80 of 160 mm: no equilibrium within the smallest step"
     rows = [
         ["150/90", "soft card", "4.26", "503 N, 120 mm", "33 mm", "86", None, "0.022", "+1.60",
-         "finished", 2, 12.3],
-        ["150/90", "stiff", None, None, None, None, None, None, None, "failed: killed", 2, 12.3],
+         "finished", None, 2, 12.3],
+        ["150/90", "stiff", None, None, None, None, None, None, None, "failed: killed", None, 2,
+         12.3],
         ["the wide one", "soft card", None, "251 N, 61 mm (knee)", None, "86", None, "0.022",
-         "-0.13", stopped, 2, 12.3],
+         "-0.13", stopped, "snap, stopped early", 2, 12.3],
     ]  # fmt: skip
     assert [unbroken(row) for row in runs.rows] == rows
     assert "\u00a0" in str(runs.rows[0][3]) and runs.rows[2][9] == stopped  # which is broken
     assert runs == Table(
         "Runs",
         ["test", "card", "stiffness, N/mm", "buckles", "wrinkles from", "load at 20 mm, N",
-         "load at a long way, N", "inflation strain", "pressure, kPa", "ended", "notes", "s"],
+         "load at a long way, N", "inflation strain", "pressure, kPa", "ended", "marked",
+         "notes", "s"],
         runs.rows,
         "Stiffness: to 20 mm of deflection. Buckles: the limit point where the load falls "
         "afterwards, else the knee, where the slope over 20 mm has fallen to half. Wrinkles: more "
         "of the surface than when inflated. Inflation strain: the largest along warp or fill in "
-        "the body, without the quads beside seam and caps. Pressure: its rise to the last frame.",
-        text=(1, 9),
+        "the body, without the quads beside seam and caps. Pressure: its rise to the last frame. "
+        "Marked: the kinds of notes that speak against a run's numbers; the notes stand below.",
+        text=(1, 9, 10),
     )  # fmt: skip
     assert errors == Table(
         "Against measured loads",
