@@ -55,6 +55,7 @@ class NoteKind(StrEnum):
     INVERSE_CRIME = "inverse crime"
     ABOVE_NOISE = "above the noise"
     SURFACES = "unfaithful surfaces"
+    FLAT_SHEET = "sheet taken for flat"
     UNMATCHED = "unmatched direction"
     LEFT_OUT = "points left out"
     READING = "how a file was read"

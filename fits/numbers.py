@@ -133,10 +133,11 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
 
 def _together(fit: Fit) -> dict[str, Any]:
     """What a fit of several tests says beside what each test says."""
-    norms = fit.problem.blocks.norms(fit.best.point.residual)
+    every = fit.problem.blocks.norms(fit.best.point.residual)
     block = np.concatenate(
         [np.full(len(c.objective.sizes), k) for k, c in enumerate(fit.problem.comparisons)]
     )
+    norms = every[: len(block)]  # after them come the priors
     names = [c.name for c in fit.problem.comparisons]
     errors = {}
     for test, fitted in fit.tests.items():

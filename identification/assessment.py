@@ -134,13 +134,16 @@ def pinned_by(
 
     The best estimate that those would allow (weights do not count), beside hardly any knowledge
     before: each modulus at its control strains to 1000 % of its own size, and each nuisance to
-    ten times the width of its bounds.
+    its prior, or to ten times the width of its bounds.
     """
     assert best.jacobian is not None
     _, sigma = _noise(problem, best)
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
     j = best.jacobian[rows] / sigma[rows, None]
     before = PRIOR * _sizes(problem, best)
+    for k, nuisance in enumerate(problem.unknowns.nuisance.all, start=problem.unknowns.size):
+        if nuisance.prior is not None:
+            before[k] = nuisance.prior
     covariance = np.linalg.inv(j.T @ j + np.diag(before**-2.0))
     return _along(problem, law, reached, covariance)[1]
 
@@ -177,6 +180,9 @@ def _noise(problem: FitProblem, best: Evaluation) -> tuple[dict[str, float], Arr
         rows = problem.rows(k)
         noise[name] = max(misfit.noise, misfit.rms)
         sigma[rows] = noise[name] / scale[rows]
+    known = [n for n in problem.unknowns.nuisance.all if n.prior is not None]
+    if known:
+        sigma[len(sigma) - len(known) :] = [n.weight for n in known]
     return noise, sigma
 
 

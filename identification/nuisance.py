@@ -24,6 +24,8 @@ class Nuisance:
         it, and a solver that differentiates does so by it. None where only the objective knows of
         it.
     scale : the model's units in one `unit` (1e-3 from kPa to MPa).
+    prior : one standard deviation around zero of what is known of it before the data, in `unit`;
+        None: nothing. weight : residual of a value as large as that.
     """
 
     name: str
@@ -32,6 +34,8 @@ class Nuisance:
     unit: str
     model_parameter: str | None = None
     scale: float = 1.0
+    prior: float | None = None
+    weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,12 @@ class NuisanceOf:
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of all, in their units."""
         return np.array([n.lower for n in self.all]), np.array([n.upper for n in self.all])
+
+    @property
+    def priors(self) -> tuple[NDArray[np.intp], Array]:
+        """Number of each that has a prior, and residual of one unit of it."""
+        known = [(k, n.weight / n.prior) for k, n in enumerate(self.all) if n.prior is not None]
+        return np.array([k for k, _ in known], dtype=np.intp), np.array([c for _, c in known])
 
     def places(self, comparison: str) -> slice:
         """Where the nuisance of a comparison lies."""

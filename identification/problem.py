@@ -51,6 +51,8 @@ Watch = Callable[[Array, float | None, str, str], None]
 class FitProblem:
     """Comparisons, a law and unknowns of one fit; an analysis runs every comparison once.
 
+    After the blocks of the comparisons comes one of the nuisance unknowns that have a prior.
+
     `law` carries nu12, strain range and thickness option; its beta is replaced. `surrogate`: the
     same problem for a solver that differentiates, where this one's does not.
 
@@ -79,7 +81,9 @@ class FitProblem:
             if comparison.nuisance != self.unknowns.nuisance.comparisons.get(comparison.name, ()):
                 problem = f"the nuisance of {comparison.name} is not among the unknowns"
                 raise InputError(None, "unknowns", problem)
-        self.blocks = Blocks([n for c in self.comparisons for n in c.objective.sizes])
+        sizes = [n for c in self.comparisons for n in c.objective.sizes]
+        priors = len(self.unknowns.nuisance.priors[0])
+        self.blocks = Blocks([*sizes, priors] if priors else sizes)
 
     @property
     def solver(self) -> Solver:
@@ -93,8 +97,9 @@ class FitProblem:
 
     @property
     def scale(self) -> Array:
-        """(m,): units of its data (mm, N) in one unit of each residual."""
-        return np.concatenate([c.objective.scale for c in self.comparisons])
+        """(m,): units of its data (mm, N), or of the unknown, in one unit of each residual."""
+        own = [c.objective.scale for c in self.comparisons]
+        return np.concatenate([*own, 1.0 / self.unknowns.nuisance.priors[1]])
 
     def rows(self, number: int) -> slice:
         """Rows of the residual that belong to comparison `number`."""
@@ -160,9 +165,14 @@ class FitProblem:
                 return None
             histories.append(history)
             residuals.append(residual)
-        whole = np.concatenate(residuals)
+        places, cost = self.unknowns.nuisance.priors
+        places = self.unknowns.size + places
+        whole = np.concatenate([*residuals, cost * y[places]])
         value = self.blocks.value(whole)
-        jacobian = np.concatenate(jacobians) if with_jacobian else None
+        jacobian = None
+        if with_jacobian:
+            of_priors = cost[:, None] * np.eye(self.unknowns.count)[places]
+            jacobian = np.concatenate([*jacobians, of_priors])
         pairs = zip(self.comparisons, histories, strict=True)
         point = Evaluation(
             y.copy(),

@@ -24,6 +24,7 @@ from .profiles import plot_profiles
 from .registration import plot_registration
 from .scatter import plot_heights
 from .strip import plot_strip
+from .surface import plot_disk
 from .vtu import write_vtu
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "plot_bending_cases",
     "plot_clock",
     "plot_convergence",
+    "plot_disk",
     "plot_gas",
     "plot_heights",
     "plot_laws",

@@ -10,6 +10,7 @@ from .findings import objective_of, recorded_of
 from .objective import displacement_offset
 from .recorded_words import clock_pictures, recorded_table
 from .registration import registration_picture, registration_table
+from .sheet_report import fitted_model, sheet_exhibit, sheet_lines
 from .tables import misfit_table, surface_tables, write_surface_table
 
 if TYPE_CHECKING:
@@ -26,9 +27,11 @@ def exhibit(
         *write_surface_table(prepared, out),
         (out.name(SURFACE), "the inflated bubble at the last pressure, for ParaView"),
     ]
-    model = fitted.comparisons[0].model
+    model = fitted_model(fitted)
     write_vtu(model.mesh, fitted.histories[0].displacement[-1], out.path(SURFACE))
-    figures = _figures(prepared, fitted, out)
+    of_sheet = sheet_exhibit(prepared, fitted, out)
+    figures = [*_figures(prepared, fitted, out), *of_sheet[0]]
+    files += of_sheet[1]
     tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.radius, out))
@@ -58,12 +61,13 @@ def _figures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[
         measured=[(f.points, f.displacement) for f in prepared.fields],
         measured_label=label,
     )
-    targets = objective_of(fitted).targets
+    objective = objective_of(fitted)
+    targets, modelled = objective.targets, objective.modelled(displacement, fitted.nuisance)
     plot_heights(
         out.path(HEIGHTS),
-        test.pressures,
+        [t.pressure for t in targets],
         [t.displacement[:, 2] for t in targets],
-        [t.at(u)[:, 2] + offset[2] for t, u in zip(targets, displacement, strict=True)],
+        [own[:, 2] for own in modelled],
         label,
     )
     return [
@@ -83,4 +87,6 @@ def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, obje
         facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
     if pressure is not None:
         facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
+    (sheet,) = sheet_lines(numbers["sheet"])
+    facts.append(("sheet", sheet.removeprefix("sheet: ")))
     return facts

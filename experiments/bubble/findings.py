@@ -15,6 +15,7 @@ from .objective import FieldObjective, displacement_offset
 from .recorded import RecordedFrames
 from .recorded_words import recorded_lines, recorded_numbers
 from .registration import registration_line, registration_numbers
+from .sheet_report import sheet_lines, sheet_numbers, sheet_warnings
 from .sources import PointFiles
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     taken = recorded_of(prepared)
     if taken is not None:
         numbers["data"]["pressures"] = recorded_numbers(taken)
+    numbers["sheet"] = sheet_numbers(prepared, fitted)
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
@@ -75,10 +77,11 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     if prepared.registration is not None:
         numbers["registration"] = registration_numbers(prepared.registration)
         lines.append(registration_line(prepared.registration))
+    lines += sheet_lines(numbers["sheet"])
     lines += _offset_words(prepared, fitted)
     return Findings(
         numbers,
-        tuple(_warnings(prepared)),
+        (*sheet_warnings(prepared), *_warnings(prepared)),
         tuple(lines),
         f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
         f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
@@ -101,7 +104,7 @@ def _as_read(prepared: PreparedBubble) -> dict[str, Any]:
 
 
 def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:
-    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance}
+    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
     if not units:
         return []
     said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())

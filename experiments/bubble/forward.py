@@ -15,6 +15,7 @@ from ...solvers.base import History
 from ...writing import replacing
 from ..base import CardRun, Output, Simulation, Studied
 from ..notes import STRAINS, strains_of
+from .sheet_section import Sheet
 from .test import PART, BubbleTest
 
 
@@ -86,8 +87,16 @@ def simulate(
             f"{p:8.1f} kPa   apex {z:8.3f} mm"
             for p, z in zip(1e3 * history.load, heights, strict=True)
         ]
+    lines += [f"note: {words}" for words in _flat(test)]
     only = numbers[next(iter(cards))] if len(cards) == 1 else {}
     return Simulation({**only, "cards": numbers}, lines)
+
+
+def _flat(test: BubbleTest) -> list[str]:
+    """That a forward analysis knows nothing of how the sheet of the test lay."""
+    if test.sheet == Sheet():
+        return []
+    return ["simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"]
 
 
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:

@@ -39,18 +39,29 @@ class FieldTarget:
     """What the displacement field should be at one pressure.
 
     displacement (n, 3) mm at n places; `sample` (n, nodes) takes model nodes to these places
-    (None: the places are the nodes).
+    (None: the places are the nodes). places : (n,) their numbers, by which the same place is known
+    in other targets; needed for a field that is constant. frame : of the model's history, the
+    target's own number unless given; since : the frame from which the displacement is counted,
+    None for the reference state.
     """
 
     pressure: float
     displacement: Array
     sample: sp.csr_matrix | None = None
+    places: NDArray[np.intp] | None = None
+    frame: int | None = None
+    since: int | None = None
 
     def at(self, nodal: Array) -> Array:
         """Model displacement (nodes, ...) at the places, (n, ...)."""
         if self.sample is None:
             return nodal
         return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
+
+    def of(self, frames: Array, number: int) -> Array:
+        """The same of frames (frames, nodes, ...), as target `number` of its objective."""
+        here = frames[number if self.frame is None else self.frame]
+        return self.at(here if self.since is None else here - frames[self.since])
 
 
 class FieldObjective:
@@ -63,6 +74,8 @@ class FieldObjective:
     weight : of every block in e.
     noise : mm, of one measured displacement, to reckon with at least; that of a good image
         correlation unless given.
+    constant : directions (0 to 2) in which a field that is the same at all pressures is projected
+        out: at every place the weighted mean over the pressures of model less measured is zero.
 
     Raises
     ------
@@ -78,10 +91,11 @@ class FieldObjective:
         normalise: Literal["e", "mm"] = "e",
         weight: float = 1.0,
         noise: float | None = None,
+        constant: Sequence[int] = (),
     ) -> None:
         self.least_noise = CORRELATION if noise is None else noise
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
-        self.targets = tuple(targets)
+        self.targets, self.constant = tuple(targets), tuple(constant)
         self.scales = []
         for target in self.targets:
             largest = np.abs(target.displacement).max(axis=0)
@@ -112,31 +126,77 @@ class FieldObjective:
         other = copy.copy(self)
         by = here.displacement - there.displacement
         other.targets = tuple(
-            replace(target, displacement=target.displacement - target.at(moved))
-            for target, moved in zip(self.targets, by, strict=True)
+            replace(target, displacement=target.displacement - target.of(by, k))
+            for k, target in enumerate(self.targets)
         )
         return other
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         """Blocks laid end to end, (m,); offset_x, offset_y, offset_z (mm) are added to the model's
         displacement."""
+        parts = self.differences(history.displacement, nuisance)
+        return np.concatenate(
+            [(d / s).T.reshape(-1) for d, s in zip(parts, self.scales, strict=True)]
+        )
+
+    def modelled(
+        self, displacement: Array, nuisance: Mapping[str, float] | None = None
+    ) -> list[Array]:
+        """(n, 3) mm of each target, from the model's (frames, nodes, 3): offset included."""
         shift = displacement_offset(nuisance or {})
-        parts = [
-            ((target.at(nodal) + shift - target.displacement) / scale).T.reshape(-1)
-            for target, nodal, scale in zip(
-                self.targets, history.displacement, self.scales, strict=True
-            )
-        ]
-        return np.concatenate(parts)
+        return [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
+
+    def differences(
+        self, displacement: Array, nuisance: Mapping[str, float] | None = None
+    ) -> list[Array]:
+        """Model less measured (n, 3) mm of each target, without a constant field."""
+        modelled = self.modelled(displacement, nuisance)
+        return self._varying(
+            [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
+        )
+
+    def constant_field(
+        self, displacement: Array, nuisance: Mapping[str, float] | None = None
+    ) -> Array:
+        """(places, 3) mm, measured less model as far as it is the same at all pressures."""
+        modelled = self.modelled(displacement, nuisance)
+        return -self._mean(
+            [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
+        )
+
+    def _varying(self, parts: list[Array]) -> list[Array]:
+        """Values (n, 3, ...) of each target less their mean over the pressures, place by place."""
+        if not self.constant:
+            return parts
+        mean = self._mean(parts)
+        return [part - mean[t.places] for part, t in zip(parts, self.targets, strict=True)]
+
+    def _mean(self, parts: list[Array]) -> Array:
+        """(places, 3, ...), weighted as the squares of the residuals are; zero if not constant."""
+        numbers = [t.places for t in self.targets if t.places is not None]
+        count = 1 + max(int(own.max()) for own in numbers)
+        total, weights = np.zeros((count, *parts[0].shape[1:])), np.zeros((count, 3))
+        for own, part, scale in zip(numbers, parts, self.scales, strict=True):
+            # A place is at most once in a target.
+            weight = scale**-2.0
+            total[own] += part * weight.reshape(3, *[1] * (part.ndim - 2))
+            weights[own] += weight
+        weights[weights == 0] = 1.0
+        mean = total / weights.reshape(*weights.shape, *[1] * (total.ndim - 2))
+        for axis in set(range(3)) - set(self.constant):
+            mean[:, axis] = 0.0
+        return np.asarray(mean)
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """(m, parameters) from d displacement (frames, nodes, 3, parameters)."""
         count = slope.shape[-1]
-        parts = [
-            (target.at(nodal) / scale[:, None]).transpose(1, 0, 2).reshape(-1, count)
-            for target, nodal, scale in zip(self.targets, slope, self.scales, strict=True)
-        ]
-        return np.concatenate(parts)
+        parts = self._varying([target.of(slope, k) for k, target in enumerate(self.targets)])
+        return np.concatenate(
+            [
+                (part / scale[:, None]).transpose(1, 0, 2).reshape(-1, count)
+                for part, scale in zip(parts, self.scales, strict=True)
+            ]
+        )
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
         """(m, names): slope of the residual by offset_x, offset_y, offset_z (mm)."""
@@ -153,9 +213,5 @@ class FieldObjective:
         self, displacement: Array, nuisance: Mapping[str, float] | None = None
     ) -> float:
         """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""
-        shift = displacement_offset(nuisance or {})
-        total = [
-            np.abs(target.at(nodal) + shift - target.displacement).sum(axis=1)
-            for target, nodal in zip(self.targets, displacement, strict=True)
-        ]
-        return float(np.concatenate(total).mean())
+        parts = self.differences(displacement, nuisance)
+        return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())

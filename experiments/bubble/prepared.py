@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -16,12 +16,15 @@ from ...errors import InputError, SolverFailure
 from ...identification.comparison import Comparison, Nuisance
 from ...materials.forms.registry import form_named
 from ...materials.law import HypoelasticLaw
+from ...models.bubble import BubbleModel
 from ...solvers.base import Solver
 from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
 from ..data_files import DataFile, joined
 from .findings import findings_of
 from .objective import OFFSETS, FieldObjective
 from .places import at_nodes, at_points, folded, mirrored
+from .relative import counted_from, with_places
+from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
 from .sources import KnownSolution, PointFiles, in_section
 from .test import BubbleTest
 
@@ -43,7 +46,8 @@ class PreparedBubble:
 
     known : the law behind computed data. surfaces : for the match or the report. registration :
     of the fields, None where the files were in the test's coordinates. by_this_model : the data
-    were computed with the mesh, the increments and the solver of the fit.
+    were computed with the mesh, the increments and the solver of the fit. sheet : what the
+    fields say of the sheet's surface and of its rim.
     """
 
     test: BubbleTest
@@ -52,11 +56,14 @@ class PreparedBubble:
     known: HypoelasticLaw | None
     registration: Registration | None = None
     by_this_model: bool = False
+    sheet: MeasuredSheet = FLAT
 
     @property
     def objective_is(self) -> str:
         """What is minimised, in words."""
-        return OBJECTIVES[self.test.objective]
+        own = OBJECTIVES[self.test.objective]
+        unknown = self.test.sheet.modes or self.test.sheet.slack
+        return f"{own}, and what is known of the sheet" if unknown else own
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
@@ -81,23 +88,27 @@ class PreparedBubble:
         ------
         InputError : data that cannot be matched.
         """
-        test, model = self.test, self.test.model()
+        test, model = self.test, self.model
         # Blocks: one a direction and pressure.
         weight = weighting.weight / (3 * len(test.pressures)) if weighting.relative else 1.0
-        fields = [folded(f) for f in self.fields] if test.symmetry == "quarter" else self.fields
+        fields = self.matched
         if test.match_by == "surfaces":
             targets = at_nodes(self.surfaces, model.mesh)
         elif self.known is not None:
             targets = at_nodes(fields, model.mesh)
         else:
             targets, _ = at_points(test, fields, model.mesh)
+        sheet = test.sheet
         try:
-            objective = FieldObjective(
-                targets, "e" if weighting.relative else test.objective, weight, test.noise
-            )
+            if sheet.constant or sheet.since is not None:
+                targets = with_places(targets, model.mesh.points[:, :2])
+            if sheet.since is not None:
+                targets = counted_from(targets, sheet.since)
+            kind = "e" if weighting.relative else test.objective
+            objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
         except InputError as error:
             raise in_section(test.place, error) from None
-        nuisance = nuisance_of(test)
+        nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
 
     def data_files(self) -> Sequence[DataFile]:
@@ -109,13 +120,22 @@ class PreparedBubble:
         )
 
     @property
+    def matched(self) -> Sequence[DisplacementField]:
+        """The fields as they are matched: folded where the model is a quarter."""
+        quarter = self.test.symmetry == "quarter"
+        return [folded(f) for f in self.fields] if quarter else self.fields
+
+    @property
+    def model(self) -> BubbleModel:
+        """Of the sheet as it was, with the unknown shapes at zero."""
+        return with_sheet(self.test.model(), self.test.sheet, self.test.radius, self.sheet)
+
+    @property
     def outside(self) -> int:
         """Measured points beyond the rim of the model, which are not matched."""
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
-        test = self.test
-        fields = [folded(f) for f in self.fields] if test.symmetry == "quarter" else self.fields
-        return at_points(test, fields, test.model().mesh)[1]
+        return at_points(self.test, self.matched, self.test.model().mesh)[1]
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""
@@ -161,7 +181,12 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     else:
         fields, registration = _measured(test, test.data)
     surfaces = _surfaces(test, fields, known is not None)
-    return PreparedBubble(test, fields, surfaces, known, registration, same)
+    prepared = PreparedBubble(test, fields, surfaces, known, registration, same)
+    try:
+        sheet = measured_sheet(test.sheet, test.radius, prepared.matched)
+    except InputError as error:
+        raise in_section(test.place, error) from None
+    return replace(prepared, sheet=sheet)
 
 
 def _solver(test: BubbleTest, data: KnownSolution, make_solver: MakeSolver) -> Solver:

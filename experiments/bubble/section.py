@@ -10,6 +10,7 @@ from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
 from .pressure_section import PressureSection
 from .registration_section import RegistrationSection
+from .sheet_section import SheetSection
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
@@ -93,4 +94,5 @@ class BubbleSection(Section):
     noise: Positive | None = None
     match: MatchSection = MatchSection()
     nuisance: NuisanceSection = NuisanceSection()
+    sheet: SheetSection = SheetSection()
     data: DataSection

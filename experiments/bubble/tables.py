@@ -13,7 +13,6 @@ from ...reports import Table
 from ...writing import replacing
 from ..base import FittedTest, Output, Shown
 from .findings import objective_of
-from .objective import displacement_offset
 
 if TYPE_CHECKING:
     from .prepared import PreparedBubble
@@ -32,7 +31,7 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
         if prepared.test.objective == "e"
         else "RMS error in mm, direction by direction"
     )
-    kilo = [1e3 * p for p in prepared.test.pressures]
+    kilo = [1e3 * t.pressure for t in objective.targets]
     rows: list[list[object]] = [[p, *n.tolist()] for p, n in zip(kilo, norms, strict=True)]
     return Table("Misfit by pressure", ["pressure, kPa", "x", "y", "z"], rows, note)
 
@@ -66,12 +65,13 @@ def residual_table(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame
     Columns part, pressure_kPa, x_mm, y_mm, quantity (dx, dy, dz), measured_mm, modelled_mm,
     difference_mm (modelled less measured, offset included).
     """
-    objective, offset = objective_of(fitted), displacement_offset(fitted.nuisance)
+    objective = objective_of(fitted)
     (comparison,) = fitted.comparisons
     nodes = comparison.model.mesh.points[:, :2]
     frames = []
-    for target, nodal in zip(objective.targets, fitted.histories[0].displacement, strict=True):
-        places, modelled = target.at(nodes), target.at(nodal) + offset
+    every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    for target, modelled in zip(objective.targets, every, strict=True):
+        places = target.at(nodes)
         for axis, name in enumerate(("dx", "dy", "dz")):
             frames.append(
                 pd.DataFrame(

@@ -15,6 +15,7 @@ from ...meshes.disk import disk_mesh
 from ...models.bubble import BubbleModel, default_increments
 from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
 from .section import BubbleSection, Symmetry
+from .sheet_section import Sheet, sheet_of
 from .sources import KnownSolution, PointFiles, data_source, measured_files, merge_increments
 
 PART = "bubble"
@@ -47,6 +48,7 @@ class BubbleTest:
     objective: Literal["e", "mm"]
     displacement_offset: bool
     pressure_offset: bool
+    sheet: Sheet
     noise: float | None = None
     kind: str = "bubble"
 
@@ -116,6 +118,8 @@ class BubbleTest:
             "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
         )  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
+        if self.sheet != Sheet():
+            said["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
             said["registration"] = asdict(self.data.registration)
         if isinstance(self.data, KnownSolution):
@@ -159,6 +163,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
             f"{radius:g} mm"
         )
         raise place.error("radius", problem)
+    source = data_source(section, place, pressures, increments, measured)
     return BubbleTest(
         name=name,
         place=place,
@@ -169,13 +174,21 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         generator=section.generator,
         pressures=pressures,
         increments=increments,
-        data=data_source(section, place, pressures, increments, measured),
+        data=source,
         match_by=section.match.by,
         match_degree=section.match.degree,
         objective=section.objective,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         noise=None if section.noise is None else section.noise * scales.length,
+        sheet=sheet_of(
+            section.sheet,
+            place,
+            pressures,
+            section.symmetry,
+            isinstance(source, PointFiles),
+            section.nuisance.displacement_offset,
+        ),
     )
 
 

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 LOOK_BACK = 4
 # Heights tried for the first increment, as multiples of the estimate.
 FIRST_HEIGHTS = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
+# Multiples of the first pressure from which it is looked for where that finds nothing.
+HIGHER = (3.0, 10.0)
 
 
 def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
@@ -126,6 +128,20 @@ class Inflation(Loading):
 
     def _from_flat(self, level: float, cuts: int) -> Array:
         """A flat membrane has no stiffness, so start from an inflated guess."""
+        found = self._from_domes(level)
+        if found is None and cuts == self.most_cuts:
+            found = self._from_above(level)
+        if found is not None:
+            return found
+        if cuts > 0:
+            lower = self._from_flat(0.25 * level, cuts - 1)
+            found = self.reached(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), cuts)
+            if found is not None:
+                return found
+        raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
+
+    def _from_domes(self, level: float) -> Array | None:
+        """From paraboloids of about the height that Hencky's membrane has."""
         membrane = self.membrane
         moduli = initial_moduli(membrane.law)
         radius = np.hypot(membrane.reference[:, 0], membrane.reference[:, 1])
@@ -142,9 +158,14 @@ class Inflation(Loading):
             found = self.equilibrium(start, level)
             if found is not None:
                 return found
-        if cuts > 0:
-            lower = self._from_flat(0.25 * level, cuts - 1)
-            found = self.reached(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), cuts)
-            if found is not None:
-                return found
-        raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
+        return None
+
+    def _from_above(self, level: float) -> Array | None:
+        """From a higher pressure down: a slack sheet is taut there and finds its way back."""
+        for factor in HIGHER:
+            above = self._from_domes(factor * level)
+            if above is None:
+                continue
+            start = self.onward(above, factor * level, level, None)
+            return self.reached(factor * level, above, level, start, self.most_cuts)
+        return None

@@ -1,0 +1,138 @@
+"""Bubble tests 1 to 3 of VALMEX 7318, of which the surface of the reference picture is unknown.
+
+Usage: bench_real_tests.py [--data DIR] [--elements N] [--modes N] [--starts N]
+[--without-strips] [TEST ...].
+For every test one line of its fit with z0 of few modes, without the strips (G12 from the bubble
+alone) and with them, and z0 at the three points where it was measured. Moduli are quadratic in
+the strain (with the strips: splines, because the strips go to far larger strains); pressures are
+eleven of the twenty, thickness incompressible. A flat sheet: --modes 0.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from bubblefit.experiments.bubble.sheet_report import fitted_model
+from bubblefit.fits.fit import fit
+from bubblefit.fits.project import read_project
+from bubblefit.fits.result import Fit
+from bubblefit.meshes.location import sampling_matrix
+
+HERE = Path(__file__).resolve().parent.parent
+DATA = HERE.parent / "shared" / "data" / "bubble"
+CURVES = HERE / "examples" / "joint-valmex7318" / "curves.csv"
+FRAMES = (0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 19)
+STRAIN = 0.06
+
+PROJECT = """\
+[fabric]
+name = "VALMEX 7318"
+thickness = 0.81
+thickness_change = "incompressible"
+
+[units]
+modulus = "GPa"
+pressure = "bar"
+
+[law]
+{law}
+
+[law.bounds]
+E1 = [0.01, 3.0]
+E2 = [0.01, 2.0]
+G12 = [0.0005, 0.2]
+
+[[bubble]]
+name = "bubble"
+radius = 100.0
+pressures = {pressures}
+elements = {elements}
+objective = "mm"
+
+[bubble.sheet]
+modes = {modes}
+
+[bubble.data.points]
+pattern = "grid/test{test}_{{index:02d}}.csv"
+indices = {frames}
+flag_column = "flag"
+{strips}
+[fit]
+starts = {starts}
+seed = 1
+jobs = 1
+max_analyses = 80
+"""
+ALONE = 'form = "quadratic"\nstrain_range = [0.13, 0.13, 0.13]'
+JOINT = """\
+form = "spline"
+strain_range = [0.18, 0.232, 0.883]
+knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0.232],\
+ shear = [0.0, 0.1, 0.3, 0.6, 0.883] }"""
+STRIPS = f"""
+[[strips]]
+width = 25.0
+grip_distance = 75.0
+
+[strips.data]
+polynomials = "{CURVES}"
+"""
+
+
+def fitted(test: int, data: Path, elements: int, modes: int, starts: int, strips: bool) -> Fit:
+    """The fit of one test."""
+    table = pd.read_csv(data / "grid_pressures.csv")
+    text = PROJECT.format(
+        law=JOINT if strips else ALONE,
+        pressures=[float(table["p_bar"][k]) for k in FRAMES],
+        frames=list(FRAMES),
+        elements=elements,
+        modes=modes,
+        starts=starts,
+        test=test,
+        strips=STRIPS if strips else "",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "project.toml"
+        path.write_text(text)
+        return fit(read_project(path, data={"bubble": data}))
+
+
+def heights(result: Fit, test: int, data: Path) -> str:
+    """z0 at the three points, found and measured."""
+    first = pd.read_csv(data / f"points_test{test}.csv", comment="#").iloc[0]
+    places = np.array([[first[f"x{k}"], first[f"y{k}"]] for k in "ABC"])
+    mesh = fitted_model(result.tests["bubble"]).mesh
+    z = sampling_matrix(mesh, places)[0] @ mesh.points[:, 2]
+    pairs = [f"{own:.2f} ({first[f'z{k}']:.2f})" for own, k in zip(z, "ABC", strict=True)]
+    return "z0 at A, B, C (measured) " + ", ".join(pairs)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("tests", nargs="*", type=int)
+    parser.add_argument("--data", type=Path, default=DATA)
+    parser.add_argument("--elements", type=int, default=112)
+    parser.add_argument("--modes", type=int, default=10)
+    parser.add_argument("--starts", type=int, default=3)
+    parser.add_argument("--without-strips", action="store_true")
+    given = parser.parse_args()
+    for strips in (False, True)[: 1 if given.without_strips else 2]:
+        print("with strips" if strips else "without strips", flush=True)
+        for test in given.tests or (1, 2, 3):
+            result = fitted(test, given.data, given.elements, given.modes, given.starts, strips)
+            e1, e2 = (float(result.law.modulus(n, STRAIN)) / 1e3 for n in ("E1", "E2"))
+            g12 = float(result.law.modulus("G12", STRAIN))
+            left = result.findings["bubble"].numbers["mean_abs_mm"]
+            print(f"test {test}: E1 {e1:.3f} GPa, E2 {e2:.3f} GPa at {STRAIN}, residual "
+                  f"{left:.2f} mm", flush=True)  # fmt: skip
+            print(f"    G12 {g12:.1f} MPa; {heights(result, test, given.data)}; "
+                  f"{result.result['analyses']} analyses", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

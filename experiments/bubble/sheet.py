@@ -1,0 +1,135 @@
+"""The model of a sheet as it was: its measured surface, shapes to be found, a rim that moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...data.disk_polynomials import DiskPolynomial, fit_disk_polynomial
+from ...data.fields import DisplacementField
+from ...errors import InputError
+from ...identification.nuisance import Nuisance
+from ...meshes.disk_modes import disk_modes
+from ...models.bubble import SLACK, BubbleModel
+from .sheet_section import Sheet
+
+Array = NDArray[np.float64]
+
+#: How far out measured heights must go, in radii: beyond them the polynomial is a guess.
+LEAST_REACH = 0.85
+#: Height over the radius beyond which a surface is not that of a clamped sheet.
+MOST_HEIGHT = 0.5
+#: Points whose misfits go together: so many fewer say something.
+TOGETHER = 20
+#: Bounds of a mode and of slack, in standard deviations of their priors.
+MOST_SIGMAS = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredSheet:
+    """What the measured fields say of the sheet.
+
+    surface : polynomial through the heights of the reference picture. rim : through the
+    displacements at each pressure.
+    """
+
+    surface: DiskPolynomial | None = None
+    rim: tuple[DiskPolynomial, ...] = ()
+
+
+#: Of which nothing is measured.
+FLAT = MeasuredSheet()
+
+
+def measured_sheet(
+    sheet: Sheet, radius: float, fields: Sequence[DisplacementField]
+) -> MeasuredSheet:
+    """Polynomials through what was measured on the disk of a radius (mm).
+
+    Raises
+    ------
+    InputError : heights that are not there, do not go out to the rim or are too large.
+    """
+    surface = None
+    if sheet.measured:
+        surface = _surface(sheet, radius, fields)
+    if not sheet.moving_rim:
+        return MeasuredSheet(surface)
+    polynomials = []
+    for field in fields:
+        on = _on_disk(field, radius, "rim")
+        values = field.displacement[on]
+        polynomials.append(fit_disk_polynomial(field.points[on], values, radius, sheet.degree))
+    return MeasuredSheet(surface, tuple(polynomials))
+
+
+def _surface(sheet: Sheet, radius: float, fields: Sequence[DisplacementField]) -> DiskPolynomial:
+    having = [f for f in fields if f.z is not None]
+    if not having:
+        problem = (
+            "the files hold no height z of the reference picture: name its column, or use modes"
+        )
+        raise InputError(None, "sheet.surface", problem)
+    # The reference is the same in all frames; the one with the most points tells most.
+    field = max(having, key=lambda f: len(f.points))
+    assert field.z is not None
+    on = _on_disk(field, radius, "surface")
+    heights = field.z[on] - np.median(field.z[on])
+    if np.ptp(heights) > MOST_HEIGHT * radius:
+        problem = (
+            f"heights z of the reference picture differ by {np.ptp(heights):.3g} mm: expected a "
+            "clamped sheet that is nearly flat; is it the reference, and the unit of z right?"
+        )
+        raise InputError(None, "sheet.surface", problem)
+    return fit_disk_polynomial(field.points[on], heights[:, None], radius, sheet.degree)
+
+
+def _on_disk(field: DisplacementField, radius: float, key: str) -> NDArray[np.bool_]:
+    distance = np.hypot(field.points[:, 0], field.points[:, 1])
+    on = distance <= radius
+    if field.z is not None and key == "surface":
+        on &= np.isfinite(field.z)
+    reach = float(distance[on].max()) / radius if on.any() else 0.0
+    if reach < LEAST_REACH:
+        problem = (
+            f"points go out to {100 * reach:.0f} % of the radius; at least {100 * LEAST_REACH:.0f} "
+            "% are needed to know the rim"
+        )
+        raise InputError(None, f"sheet.{key}", problem)
+    return on
+
+
+def with_sheet(model: BubbleModel, sheet: Sheet, radius: float, of: MeasuredSheet) -> BubbleModel:
+    """The model of a flat disk as that of the sheet as it was."""
+    places = model.mesh.points[:, :2]
+    if of.surface is not None:
+        heights = of.surface.at(places)[:, 0]
+        heights -= heights[model.mesh.node_sets["rim"]].mean()
+        points = np.column_stack([places, heights])
+        model = replace(model, mesh=replace(model.mesh, points=points))
+    if of.rim:
+        rim = places[model.mesh.node_sets["rim"]]
+        measured = np.array([p.at(rim) for p in of.rim])
+        levels = np.array([0.0, *model.pressures])
+        flat = np.concatenate([np.zeros((1, measured[0].size)), measured.reshape(len(of.rim), -1)])
+        motion = [np.interp(model.increments, levels, column) for column in flat.T]
+        shape = (len(model.increments), len(rim), 3)
+        model = replace(model, rim_motion=np.array(motion).T.reshape(shape))
+    return replace(model, modes=disk_modes(places, radius, sheet.modes)) if sheet.modes else model
+
+
+def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
+    """Unknowns of the sheet; scale (m,) : mm in one unit of each residual of the objective."""
+    weight = sheet.misfit * np.sqrt(TOGETHER) / float(np.median(scale))
+    most = MOST_SIGMAS * sheet.prior
+    unknowns = [
+        Nuisance(name, -most, most, "mm", name, 1.0, sheet.prior, weight) for name in model.modes
+    ]
+    if sheet.slack:
+        own = sheet.slack_prior
+        most = MOST_SIGMAS * own
+        unknowns += [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
+    return unknowns

@@ -1,0 +1,300 @@
+"""[bubble.sheet]: what it takes, what it makes of the data, and what a fit says of it."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.data.disk_polynomials import fit_disk_polynomial
+from bubblefit.data.fields import DisplacementField
+from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.relative import counted_from, with_places
+from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
+from bubblefit.experiments.bubble.sheet_report import NOT_BELIEVED
+from bubblefit.experiments.bubble.sheet_section import Sheet
+from bubblefit.fits.fit import fit
+from bubblefit.fits.project import read_project
+from bubblefit.fits.setup import prepare_fit
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.solvers.base import History
+
+from ...places import ROOT
+from ...projects import small
+
+PRESSURES = (0.02, 0.09, 0.19)
+
+
+def uneven_test():
+    """benchmarks/uneven_test.py, which is no package."""
+    path = ROOT / "benchmarks" / "uneven_test.py"
+    spec = importlib.util.spec_from_file_location("uneven_test", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["uneven_test"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+UNEVEN = uneven_test()
+
+
+def project(folder: Path, sheet: str, **what: float) -> Path:
+    """The project of a computed uneven test, and its files."""
+    UNEVEN.write_test(folder, UNEVEN.Uneven(**what), PRESSURES, 112)
+    path = folder / "project.toml"
+    path.write_text(UNEVEN.project_text(PRESSURES, 112, sheet))
+    return path
+
+
+def prepared(path: Path):
+    one = read_project(path)
+    return prepare_fit(one, one.chosen(None, fitted=True))
+
+
+# What a project may say
+
+
+@pytest.mark.parametrize(
+    ("sheet", "field", "problem"),
+    [
+        ("prior = 2.0", "sheet.prior", "belongs to modes, not asked for"),
+        ("slack_prior = 0.2", "sheet.slack_prior", "belongs to slack, not asked for"),
+        ("misfit = 0.2", "sheet.misfit", "belongs to modes or slack"),
+        ("from_pressure = 21.0", "sheet.from_pressure", "expected one of several 'pressures'"),
+        ('surface = "measured"\nfrom_pressure = 90.0', "sheet.from_pressure", "without stress"),
+        ('constant_field = ["dz"]\nfrom_pressure = 90.0', "sheet.constant_field", "use one of"),
+        ("from_pressure = 90.0\n[bubble.nuisance]\ndisplacement_offset = true",
+         "nuisance.displacement_offset", "use one of"),
+        ("modes = 46", "sheet.modes", "46"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together(tmp_path, sheet, field, problem) -> None:
+    path = project(tmp_path, sheet)
+    with pytest.raises(InputError, match=problem) as error:
+        read_project(path)
+    assert field in str(error.value)
+
+
+@pytest.mark.parametrize("sheet", ["modes = 6", 'surface = "measured"'])
+def test_no_symmetry_needs_the_full_disk(tmp_path, sheet) -> None:
+    path = project(tmp_path, sheet)
+    path.write_text(path.read_text().replace("[[bubble]]", '[[bubble]]\nsymmetry = "quarter"'))
+    with pytest.raises(InputError, match="not doubly symmetric needs symmetry = 'full'"):
+        read_project(path)
+    path.write_text(path.read_text().replace(sheet, "modes = 1"))
+    assert read_project(path).tests["uneven"].sheet.modes == 1
+
+
+def test_computed_data_have_no_measured_surface(tmp_path) -> None:
+    path = small(tmp_path)
+    text = path.read_text().replace(
+        "[bubble.match]", '[bubble.sheet]\nrim = "measured"\n[bubble.match]'
+    )
+    path.write_text(text)
+    with pytest.raises(InputError, match="nothing is measured here"):
+        read_project(path)
+
+
+# From fields to a model
+
+
+def field_of(heights, count: int = 900, reach: float = 1.0) -> DisplacementField:
+    random = np.random.default_rng(3)
+    r, turn = 100.0 * reach * np.sqrt(random.random(count)), 2 * np.pi * random.random(count)
+    places = np.column_stack([r * np.cos(turn), r * np.sin(turn)])
+    x, y = places.T / 100
+    moved = np.column_stack([0.5 * x, -0.2 * y * x, 10 * (1 - x**2 - y**2) + 1.0])
+    z = None if heights is None else heights(x, y)
+    return DisplacementField(0.05, places, moved, z=z)
+
+
+def test_the_surface_and_the_rim_follow_the_measurement() -> None:
+    """Heights far from zero, as a camera counts them: of the model they are about the rim's."""
+
+    def bumpy(x, y):
+        return 612.0 + 3.0 * (1 - x**2 - y**2) - 2.0 * x * y + x**3
+
+    field = field_of(bumpy)
+    mesh = disk_mesh(100.0, 64)
+    flat = BubbleModel(mesh, 0.81, (0.05, 0.1), default_increments((0.05, 0.1)))
+    sheet = Sheet(measured=True, degree=6, moving_rim=True, modes=6)
+    fields = [field, replace(field, pressure=0.1, displacement=2 * field.displacement)]
+    model = with_sheet(flat, sheet, 100.0, measured_sheet(sheet, 100.0, fields))
+    x, y = mesh.points[:, :2].T / 100
+    expected = bumpy(x, y)
+    rim = mesh.node_sets["rim"]
+    np.testing.assert_allclose(model.mesh.points[:, 2], expected - expected[rim].mean(), atol=1e-8)
+    at_rim = np.column_stack([0.5 * x[rim], -0.2 * y[rim] * x[rim], np.ones(len(rim))])
+    share = np.array(flat.increments) / 0.05
+    np.testing.assert_allclose(model.rim_motion, share[:, None, None] * at_rim, atol=1e-8)
+    assert list(model.modes) == ["z0_1", "z0_x", "z0_y", "z0_xx", "z0_xy", "z0_yy"]
+
+
+@pytest.mark.parametrize(
+    ("field", "problem"),
+    [
+        (field_of(None), "hold no height z"),
+        (field_of(lambda x, y: x, reach=0.7), "go out to 70 % of the radius"),
+        (field_of(lambda x, y: 40 * x), "differ by 78.6 mm"),
+        (field_of(lambda x, y: x, count=60), "60 points are too few for degree 8"),
+    ],
+    ids=["no z", "reach", "height", "few"],
+)
+def test_surfaces_that_are_not_known(field, problem) -> None:
+    with pytest.raises(InputError, match=problem):
+        measured_sheet(Sheet(measured=True), 100.0, [field])
+
+
+def test_noise_of_the_surface_is_told() -> None:
+    field = field_of(None)
+    noise = 0.05 * np.random.default_rng(1).standard_normal((900, 1))
+    found = fit_disk_polynomial(field.points, noise, 100.0, 4)
+    assert found.rms[0] == pytest.approx(0.05, rel=0.1)
+    with pytest.raises(InputError, match="do not determine"):
+        fit_disk_polynomial(np.repeat(field.points[:3], 300, axis=0), noise, 100.0, 4)
+
+
+# What of the data is compared
+
+
+def targets() -> tuple[list[FieldTarget], np.ndarray, np.ndarray]:
+    """Three pressures at the nodes of a mesh, each with a node left out, and a model's frames."""
+    random = np.random.default_rng(5)
+    nodes = disk_mesh(100.0, 16).points[:, :2]
+    frames = random.standard_normal((3, len(nodes), 3))
+    some = []
+    for k, p in enumerate(PRESSURES):
+        keep = np.delete(np.arange(len(nodes)), k)
+        import scipy.sparse as sp
+
+        sample = sp.csr_matrix(np.eye(len(nodes))[keep])
+        some.append(FieldTarget(p, random.standard_normal((len(keep), 3)), sample))
+    return with_places(some, nodes), nodes, frames
+
+
+def history(frames: np.ndarray) -> History:
+    return History(np.array(PRESSURES), frames, np.zeros(3), np.zeros(3))
+
+
+@pytest.mark.parametrize("normalise", ["mm", "e"])
+def test_a_field_that_is_constant_in_pressure_is_taken_out(normalise) -> None:
+    some, nodes, frames = targets()
+    plain = FieldObjective(some, normalise, constant=(0, 2))
+    field = np.random.default_rng(6).standard_normal((len(nodes), 3)) * [1, 0, 1]
+    moved = [replace(t, displacement=t.displacement + t.at(field)) for t in some]
+    other = FieldObjective(moved, normalise, constant=(0, 2))
+    other.scales = plain.scales
+    residual = plain.residual(history(frames), {})
+    np.testing.assert_allclose(other.residual(history(frames), {}), residual, atol=1e-12)
+    # Along y nothing is taken out.
+    whole = FieldObjective(some, normalise).residual(history(frames), {})
+    middle = np.concatenate([np.repeat([False, True, False], n) for n in plain.sizes[::3]])
+    np.testing.assert_allclose(residual[middle], whole[middle])
+    assert np.abs(residual - whole)[~middle].min() > 1e-6
+    taken = other.constant_field(frames) - plain.constant_field(frames)
+    seen = [t.places for t in some]
+    np.testing.assert_allclose(taken[np.concatenate(seen)],
+                               np.concatenate([t.at(field) for t in some]), atol=1e-12)  # fmt: skip
+    slope = np.random.default_rng(8).standard_normal((*frames.shape, 2))
+    ahead, behind = (plain.residual(history(frames + s * slope[..., 1]), {}) for s in (0.5, -0.5))
+    np.testing.assert_allclose(plain.jacobian(None, slope)[:, 1], ahead - behind, atol=1e-12)
+
+
+def test_displacements_counted_from_a_loaded_frame() -> None:
+    some, nodes, frames = targets()
+    fields = np.random.default_rng(9).standard_normal(frames.shape)
+    some = [replace(t, displacement=t.at(u)) for t, u in zip(some, fields, strict=True)]
+    relative = counted_from(some, 1)
+    assert [t.pressure for t in relative] == [PRESSURES[0], PRESSURES[2]]
+    for number, (target, k) in enumerate(zip(relative, (0, 2), strict=True)):
+        # Each frame misses a node of its own.
+        assert len(target.displacement) == len(nodes) - 2
+        np.testing.assert_allclose(target.displacement, target.at(fields[k] - fields[1]))
+        np.testing.assert_allclose(target.of(frames, number), target.at(frames[k] - frames[1]))
+    objective = FieldObjective(relative, "mm")
+    shift = np.ones_like(frames)
+    once, again = (objective.residual(history(f), {}) for f in (frames, frames + shift))
+    np.testing.assert_allclose(again, once, atol=1e-12)
+    with pytest.raises(InputError, match="share 1 of"):
+        only = replace(some[1], displacement=some[1].displacement[-1:], sample=some[1].sample[-1:],
+                       places=some[1].places[-1:])  # fmt: skip
+        counted_from([some[0], only], 1)
+
+
+# The fit
+
+
+def test_priors_are_a_block_of_their_own(tmp_path) -> None:
+    path = project(tmp_path, "modes = 3\nprior = 2.0\nslack = true\nslack_prior = 0.1")
+    problem = prepared(path).problem()
+    y = problem.unknowns.at(UNEVEN.law().beta[[2, 3, 6, 7, 10, 11]])
+    assert problem.unknowns.nuisance_names == ("z0_1", "z0_x", "z0_y", "slack_warp", "slack_fill")
+    y[-5:] = 1.0, -2.0, 0.5, 0.05, 0.1
+    point = problem.evaluate(y, True, warm=False)
+    # 0.5 mm against sqrt(points / 20) of it.
+    points = len(disk_mesh(100.0, 112).points)
+    weight = 0.5 * np.sqrt(20 / points)
+    expected = weight * np.array([0.5, -1.0, 0.25, 0.5, 1.0])
+    np.testing.assert_allclose(point.residual[-5:], expected)
+    assert problem.blocks.norms(point.residual)[-1] == pytest.approx(np.linalg.norm(expected))
+    assert problem.scale.shape == point.residual.shape
+    for j, step in ((6, 0.01), (7, 0.01), (9, 1e-3)):
+        move = step * np.eye(len(y))[j]
+        ahead, behind = (problem.evaluate(y + m, False, warm=False).residual for m in (move, -move))
+        column = (ahead - behind) / (2 * step)
+        assert np.abs(point.jacobian[:, j] - column).max() < 1e-3 * np.abs(column).max(), j
+
+
+def test_a_sheet_as_it_was_gives_the_moduli_back(tmp_path) -> None:
+    """Height 4 mm, slack 0.05 %, a rim that moves by 2 mm, little noise on few points.
+
+    Flat and taut, with the rim fixed, moduli are off by 30 to 50 %.
+    """
+    sheet = 'surface = "measured"\nrim = "measured"\nslack = true\nmisfit = 0.01'
+    path = project(tmp_path, sheet, noise=0.002, slack=0.0005)
+    result = fit(read_project(path))
+    off = UNEVEN.errors(result.law, result.best.reached)
+    assert max(off.values()) < 0.005, off
+    said = result.result["sheet"]
+    assert said["used"] == ["measured surface", "slack", "measured rim"]
+    assert said["slack_percent"] == pytest.approx([0.05, 0.05], abs=0.01)
+    assert said["rim_motion_mm"] == pytest.approx(2.0, abs=0.3)
+    assert said["surface_mm"]["largest"] - said["surface_mm"]["least"] == pytest.approx(
+        4.4, abs=0.1
+    )
+    (line,) = [one for one in result.findings["uneven"].lines if one.startswith("sheet: ")]
+    for words in ("measured surface", "z0 from", "slack 0.0", "% in fill", "rim as measured"):
+        assert words in line, line
+    assert NOT_BELIEVED not in result.result["warnings"]
+    page = result.report(tmp_path / "out").read_text()
+    assert "reference_surface.png" in page and "rim as measured" in page
+    table = pd.read_csv(tmp_path / "out" / "reference_surface.csv")
+    truth = UNEVEN.model(UNEVEN.Uneven(), PRESSURES, 112).mesh
+    z = truth.points[:, 2] - truth.points[truth.node_sets["rim"], 2].mean()
+    np.testing.assert_allclose(table["z0_mm"], z, atol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "believed", "words"),
+    [
+        ("", False, "sheet: flat and taut, its rim fixed"),
+        ('rim = "measured"', False, "sheet: rim as measured, up to 2"),
+        ("slack = true", False, "sheet: slack 0.000 % in warp"),
+        ("modes = 3", True, "sheet: 3 modes of the surface; z0 from 0.00 to 0.00 mm"),
+        ('constant_field = ["dz"]', True, "sheet: constant field taken out: dz 2.34 mm RMS"),
+        ("from_pressure = 90.0", True, "sheet: displacements counted from 90 kPa"),
+    ],
+)
+def test_a_result_says_what_it_knew_of_the_sheet(tmp_path, sheet, believed, words) -> None:
+    path = project(tmp_path, sheet)
+    path.write_text(path.read_text().replace("max_analyses = 60", "max_analyses = 2"))
+    result = fit(read_project(path))
+    (line,) = [one for one in result.findings["uneven"].lines if one.startswith("sheet: ")]
+    assert line.startswith(words), line
+    assert (NOT_BELIEVED in result.result["warnings"]) is not believed
