@@ -29,12 +29,14 @@ class Uneven:
     slack : share, of the stress-free length in both directions.
     rim : mm, largest motion of the rim, at the last pressure.
     noise : mm, standard deviation of every measured number, z included.
+    repeats : measured points at every node of the mesh.
     """
 
     height: float = 4.0
-    slack: float = 0.0015
+    slack: float = 0.001
     rim: float = 2.0
     noise: float = 0.05
+    repeats: int = 1
 
 
 def law() -> HypoelasticLaw:
@@ -89,9 +91,11 @@ def write_test(
     def seen(values: np.ndarray) -> np.ndarray:
         return values + what.noise * random.standard_normal(values.shape)
 
-    heights = 612.0 + seen(nodes[:, 2:])
+    heights = 612.0 + seen(np.repeat(nodes[:, 2:], what.repeats, axis=0))
+    places = np.repeat(nodes[:, :2], what.repeats, axis=0)
     for k, displacement in enumerate(history.displacement):
-        table = np.hstack([nodes[:, :2], heights, seen(displacement)])
+        moved = seen(np.repeat(displacement, what.repeats, axis=0))
+        table = np.hstack([places, heights, moved])
         path = folder / f"t_{k:02d}.csv"
         np.savetxt(path, table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")
     return truth
