@@ -17,9 +17,10 @@ from ..data.frames import QUANTITIES, FrameOptions, read_frames
 from ..data.gauge import virtual_strain_gauge
 from ..data.gauge_loads import PairedLoads, loads_at_frames
 from ..data.gauge_table import GaugeTable
-from ..errors import InputError, OutputError
+from ..errors import InputError
 from ..notes import lines as note_lines
 from ..sections import LENGTH_UNITS
+from .frame_arguments import check_out, columns_named
 from .options import exits
 
 FILE = click.Path(path_type=Path)
@@ -85,10 +86,10 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
     with _naming_options():
         loads = _loads(options, out.stem)
         files, note = frame_files(frames, "FRAMES")
-        _check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
+        check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
         asked = FrameOptions(
             QUANTITIES,
-            _columns(options["columns"]),
+            columns_named(options["columns"]),
             options["flag_column"],
             length_scale=LENGTH_UNITS[options["length_unit"]],
             planar=True,
@@ -127,35 +128,6 @@ def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
         raise InputError(None, "direction", problem)
     given["format"] = given.pop("load_format", None)
     return PairedLoads(options["loads"], **{"specimen": name, **given})
-
-
-def _check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
-    if out.resolve() in [file.resolve() for file in inputs if file is not None]:
-        raise OutputError(f"{out}: is one of the files to be read; choose another --out")
-    if out.exists() and not overwrite:
-        raise OutputError(f"{out}: is already there; use --overwrite or another --out")
-
-
-def _columns(given: str | None) -> dict[str, str] | None:
-    """Names in the files of some of x, y, z, dx, dy, dz, as in "x=X,dz=W"."""
-    if given is None:
-        return None
-    names: dict[str, str] = {}
-    for part in given.split(","):
-        quantity, equals, name = (piece.strip() for piece in part.partition("="))
-        if not (equals and name):
-            problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
-            raise InputError(None, "columns", problem)
-        if quantity not in QUANTITIES:
-            problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
-            raise InputError(None, "columns", problem)
-        names[quantity] = name
-    for quantity, name in names.items():
-        first = next(other for other in names if names[other] == name)
-        if first != quantity:
-            problem = f"column {name!r} is named for {first} and for {quantity}"
-            raise InputError(None, "columns", problem)
-    return names
 
 
 @contextmanager

@@ -19,6 +19,7 @@ COMMANDS = {
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
+    "dic": ("dic", "Is the camera right? A sphere through the points of its frames."),
     "study": ("study", "What refinement, or nu12, changes in an analysis."),
     "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("init", "Write a commented project: an example, or for your own tests."),

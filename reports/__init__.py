@@ -23,6 +23,7 @@ from .pinned import plot_pinned
 from .profiles import plot_profiles
 from .registration import plot_registration
 from .scatter import plot_heights
+from .sphere import plot_spheres
 from .strip import plot_strip
 from .surface import plot_disk
 from .vtu import write_vtu
@@ -58,6 +59,7 @@ __all__ = [
     "plot_pinned",
     "plot_profiles",
     "plot_registration",
+    "plot_spheres",
     "plot_strip",
     "write_report",
     "write_vtu",

@@ -1,0 +1,49 @@
+"""What commands that read frames share: names of columns as an option, a file to write."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..data.frames import QUANTITIES
+from ..errors import InputError, OutputError
+
+
+def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
+    """Whether a file may be written: not one of those read, nor one that is there.
+
+    Raises
+    ------
+    OutputError : it may not.
+    """
+    if out.resolve() in [file.resolve() for file in inputs if file is not None]:
+        raise OutputError(f"{out}: is one of the files to be read; choose another --out")
+    if out.exists() and not overwrite:
+        raise OutputError(f"{out}: is already there; use --overwrite or another --out")
+
+
+def columns_named(given: str | None) -> dict[str, str] | None:
+    """Names in the files of some of x, y, z, dx, dy, dz, as in "x=X,dz=W".
+
+    Raises
+    ------
+    InputError : what is not written so, no such quantity, a column for two.
+    """
+    if given is None:
+        return None
+    names: dict[str, str] = {}
+    for part in given.split(","):
+        quantity, equals, name = (piece.strip() for piece in part.partition("="))
+        if not (equals and name):
+            problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
+            raise InputError(None, "columns", problem)
+        if quantity not in QUANTITIES:
+            problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
+            raise InputError(None, "columns", problem)
+        names[quantity] = name
+    for quantity, name in names.items():
+        first = next(other for other in names if names[other] == name)
+        if first != quantity:
+            problem = f"column {name!r} is named for {first} and for {quantity}"
+            raise InputError(None, "columns", problem)
+    return names

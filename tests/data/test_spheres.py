@@ -1,0 +1,98 @@
+"""Spheres through points: exact without noise, off with noise by as much as is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.data.frames import Frame
+from bubblefit.data.spheres import fit_sphere, points_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..complaints import complaint
+
+CENTRE = np.array([12.0, -7.0, 610.0])
+
+
+def cap(radius: float = 40.0, half: float = 45.0, count: int = 400, seed: int = 0):
+    """Points of a ball as a camera sees it, up to `half` degrees from the line of sight."""
+    draw = np.random.default_rng(seed)
+    height = draw.uniform(np.cos(np.radians(half)), 1.0, count)
+    turn = draw.uniform(0, 2 * np.pi, count)
+    across = np.sqrt(1 - height**2)
+    ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), -height])
+    return CENTRE + radius * ways, ways, draw
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(st.floats(0.01, 1e4), st.floats(10, 170), st.integers(0, 10**6))
+def test_a_perfect_ball_is_found_exactly(radius, half, seed):
+    points, _, _ = cap(radius, half, 60, seed)
+    found = fit_sphere(points)
+    # Places have 16 digits of 610 mm, and a small cap magnifies them.
+    rounding = 1e-13 * (1e3 + radius) / np.radians(half) ** 4 * 100
+    assert found.radius == pytest.approx(radius, rel=1e-9, abs=rounding)
+    np.testing.assert_allclose(found.centre, CENTRE, atol=rounding + 1e-9 * radius)
+    assert found.left_out == 0 and found.rms < rounding + 1e-9 * radius
+
+
+def test_noise_moves_it_as_far_as_is_said():
+    """Scatter over repetitions against the standard errors; no bias."""
+    sigma, radii, centres, errors = 0.05, [], [], []
+    for seed in range(60):
+        points, ways, draw = cap(seed=seed)
+        found = fit_sphere(points + sigma * draw.normal(size=(len(ways), 1)) * ways)
+        radii.append(found.radius)
+        centres.append(found.centre)
+        errors.append([found.radius_error, *found.centre_error])
+        assert found.rms == pytest.approx(sigma, rel=0.2)
+    mean = np.mean(errors, axis=0)
+    scatter = [np.std(radii), *np.std(centres, axis=0)]
+    # 60 repetitions know a standard deviation to 9 %.
+    np.testing.assert_allclose(scatter, mean, rtol=0.3)
+    assert abs(np.mean(radii) - 40.0) < 4 * mean[0] / np.sqrt(60)
+
+
+def test_the_linear_fit_is_too_small_by_noise():
+    """By 0.61 mm of 40 in the mean of repetitions, four of whose errors are 0.15 mm."""
+    linear, least = [], []
+    for seed in range(60):
+        points, ways, draw = cap(seed=seed)
+        noisy = points + 0.5 * draw.normal(size=(len(ways), 1)) * ways
+        near = noisy - CENTRE
+        matrix = np.column_stack([2 * near, np.ones(len(near))])
+        *centre, rest = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
+        linear.append(np.sqrt(rest + np.dot(centre, centre)))
+        least.append(fit_sphere(noisy).radius)
+    assert np.mean(linear) == pytest.approx(40 * (1 - 0.015), abs=0.15)
+    assert np.mean(least) == pytest.approx(40.0, abs=0.15)
+
+
+def test_outliers_are_left_out():
+    points, ways, draw = cap(count=1000)
+    points += 0.02 * draw.normal(size=(1000, 1)) * ways
+    points[:30] += 3.0 * ways[:30]
+    points[30] = [0.0, 0.0, 0.0]
+    found = fit_sphere(points)
+    assert not found.kept[:31].any() and found.left_out < 36
+    assert found.radius == pytest.approx(40.0, abs=4 * found.radius_error)
+    assert found.deviation[5] == pytest.approx(3.0, abs=0.1)
+
+
+def test_the_surface_of_a_frame_is_where_its_points_have_moved():
+    points, _, _ = cap(count=20)
+    still, moved = np.full_like(points, np.nan), np.tile([1.0, 2.0, 3.0], (20, 1))
+    np.testing.assert_array_equal(points_of(Frame(points, still)), points)
+    moved[4] = np.nan
+    expected = np.delete(points, 4, 0) + np.array([1, 2, 3])
+    np.testing.assert_allclose(points_of(Frame(points, moved)), expected)
+
+
+def test_points_that_tell_no_sphere():
+    points, _, _ = cap(count=9)
+    assert "10 points or more, got 9" in complaint(fit_sphere, points)
+    flat = np.random.default_rng(0).normal(size=(50, 3)) * [1, 1, 0] + 5.0
+    assert "in a plane" in complaint(fit_sphere, flat)
+    for noise in (1e-2, 1e-4, 1e-7):
+        nearly = flat + np.random.default_rng(1).normal(size=(50, 1)) * [0, 0, noise]
+        assert "in a plane" in complaint(fit_sphere, nearly)
