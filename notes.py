@@ -58,6 +58,7 @@ class NoteKind(StrEnum):
     FLAT_SHEET = "sheet taken for flat"
     UNMATCHED = "unmatched direction"
     LEFT_OUT = "points left out"
+    DOUBTFUL = "doubtful data"
     READING = "how a file was read"
     FOLD = "fold without an error"
     #: Of a virtual strain gauge.

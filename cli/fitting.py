@@ -37,6 +37,9 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
         solver_choice,
         click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E."),
+        click.option(
+            "--trust", multiple=True, metavar="NAME", help="Let a doubt of the data pass; several."
+        ),
         click.option("--resume", is_flag=True, help="Go on with an interrupted fit."),
         click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
         click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
@@ -70,6 +73,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
                 seed=options["seed"],
                 method=options["method"],
                 jobs=options["jobs"],
+                trust=options["trust"],
                 out=folder,
                 resume=options["resume"],
                 overwrite=options["overwrite"],

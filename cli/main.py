@@ -15,6 +15,7 @@ COMMANDS = {
     "fit": ("fit", "Fit a material to all tests of a fabric together."),
     "bubble": ("bubble", "Fit a material to bubble inflation tests only."),
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests only."),
+    "check": ("check", "Look at the data before anything is fitted."),
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),

@@ -169,6 +169,10 @@ class PreparedTest(Protocol):
 
     One whose data are measured files also offers them for the record of a run
     (`data_files.OfFiles`), as a test that is predicted does.
+
+    A kind that looks at its data before a fit also has `doubts(expected)`, what makes them doubtful
+    (`doubts.Doubt`), and `examine(out)`, what was seen, as an `Exhibit`; the kind itself then lists
+    the names of its doubts, `Kind.doubts`.
     """
 
     @property

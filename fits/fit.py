@@ -11,6 +11,7 @@ from ..errors import NoFeasibleStart, SolverFailure
 from ..experiments.base import FittableTest
 from ..identification.problem import FitProblem
 from .best import BestFit, best_fit
+from .doubts import judge
 from .facts import facts_of, solver_facts
 from .failure_page import failure_page
 from .processes import run_starts
@@ -36,6 +37,7 @@ def fit(
     seed: int | None = None,
     method: str | None = None,
     jobs: int | None = None,
+    trust: Sequence[str] = (),
     out: Path | str | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -49,6 +51,7 @@ def fit(
     tests : names of tests, or a kind of test; every test that can be fitted unless given.
     starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
         cores unless the project says otherwise.
+    trust : names of doubts about the data that stop nothing, beside those of the project.
     out : folder in which every analysis and start is written as it ends, so that an interrupted
         fit can be gone on with (`resume`); nothing is written without it.
     overwrite : replace what the folder holds.
@@ -68,10 +71,14 @@ def fit(
         objective: then the page in `out` says so, and there is no result.
     """
     begun = time.perf_counter()
-    project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs)
+    trusted = [*project.fit.trust, *trust]
+    project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     setup = prepare_fit(project, chosen)
     problem = setup.problem()
+    judgements = judge(setup)
+    for judgement in judgements:
+        judgement.demand(project.path)
     record = _record(setup, problem, command_line)
     files = None
     done: dict[int, StartRecord] = {}
@@ -90,7 +97,7 @@ def fit(
     with failure_page(None if out is None else Path(out), project.title):
         records = _records(setup, files, done, progress or _nobody)
         best = _best(problem, records, project)
-    return Fit(setup, problem, best, time.perf_counter() - begun, record)
+    return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
 
 
 def _record(setup: FitSetup, problem: FitProblem, command_line: Sequence[str] | None) -> Record:

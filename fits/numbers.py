@@ -164,6 +164,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
             f"failed ({cut[0].failure}): --resume tries them again"
         )
         notes.append(Note(NoteKind.STARTS, said))
+    notes += [note for judgement in fit.judgements for note in judgement.notes]
     ends = np.asarray(fit.law.strain_range)
     # What the solver that counts does not look at, the one that leads may have.
     leading = (best.differentiated or best.point).histories

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import __version__
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
+from ..experiments.doubts import Judgement
 from ..identification.assessment import Misfit, misfits
 from ..identification.problem import FitProblem
 from ..materials.card import MaterialCard
@@ -40,6 +41,7 @@ class Fit:
     setup : project, law without coefficients, tests with their data.
     best : the best of the starts, run once more from the unloaded state. wall_s : seconds.
     record : what it came from, None where nobody asks.
+    judgements : what was doubtful in the data.
     """
 
     setup: FitSetup
@@ -47,6 +49,7 @@ class Fit:
     best: BestFit
     wall_s: float
     record: Record | None = None
+    judgements: tuple[Judgement, ...] = ()
 
     @property
     def project(self) -> Project:

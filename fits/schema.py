@@ -82,6 +82,7 @@ class FitSection(Section):
     max_analyses: Annotated[int, Field(ge=1)] | None = None
     tolerance: Positive = 1e-7
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
+    trust: list[Name] = Field(default=[])
 
 
 class CommonSections(Section):

@@ -11,6 +11,7 @@ from .bending import (
 )
 from .clock import plot_clock
 from .convergence import ConvergencePanel, plot_convergence
+from .curves import plot_curves
 from .html import Report, StartRow, Table, percent, write_report
 from .laws import LawRow, plot_laws
 from .loads import StripCurves, plot_loads
@@ -22,6 +23,7 @@ from .orders import OrderErrors, plot_orders
 from .pinned import plot_pinned
 from .profiles import plot_profiles
 from .registration import plot_registration
+from .rises import plot_rises
 from .scatter import plot_heights
 from .sphere import plot_spheres
 from .strip import plot_strip
@@ -47,6 +49,7 @@ __all__ = [
     "plot_clock",
     "plot_convergence",
     "plot_disk",
+    "plot_curves",
     "plot_gas",
     "plot_heights",
     "plot_laws",
@@ -60,6 +63,7 @@ __all__ = [
     "plot_profiles",
     "plot_registration",
     "plot_spheres",
+    "plot_rises",
     "plot_strip",
     "write_report",
     "write_vtu",

@@ -7,6 +7,7 @@ from typing import Any
 
 from ...materials.card import MaterialCard
 from ..base import CardRun, Output, Place, Simulation, Studied
+from .doubts.names import NAMES
 from .section import BubbleSection
 from .test import BubbleTest, read
 
@@ -22,6 +23,7 @@ class BubbleKind:
     section = BubbleSection
     fitted = True
     predicted = None
+    doubts = NAMES
 
     @property
     def studied(self) -> Studied:

@@ -20,6 +20,8 @@ from ...models.bubble import BubbleModel
 from ...solvers.base import Solver
 from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
 from ..data_files import DataFile, joined
+from ..doubts import Doubt, Expected
+from .doubts import View, doubts_of
 from .findings import findings_of
 from .objective import OFFSETS, FieldObjective
 from .places import at_nodes, at_points, folded, mirrored
@@ -136,6 +138,22 @@ class PreparedBubble:
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
         return at_points(self.test, self.matched, self.test.model().mesh)[1]
+
+    @property
+    def view(self) -> View:
+        """What is looked at before a fit."""
+        test = self.test
+        return View(self.fields, test.radius, test.thickness, self.registration is not None)
+
+    def doubts(self, expected: Expected) -> Sequence[Doubt]:
+        """What makes the measured fields doubtful; nothing where they were computed."""
+        return () if self.known is not None else doubts_of(self.view, expected)
+
+    def examine(self, out: Output) -> Exhibit:
+        """Maps, heights and equilibrium of the measured fields."""
+        from .examined import exhibit
+
+        return exhibit(self, out)
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""

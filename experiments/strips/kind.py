@@ -33,6 +33,9 @@ class Strips:
     folder_key: str = "data.folder"
     fitted: bool = True
     predicted: Predicted | None = None
+    doubts: tuple[str, ...] = (
+        "elongation-unit", "load-unit", "preload", "after-failure", "swapped",
+    )  # fmt: skip
     studied: Studied | None = Studied(
         steps=lambda model: model.elongations,
         quantities=_end_load,

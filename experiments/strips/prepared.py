@@ -14,6 +14,8 @@ from ...models.uniaxial import UniaxialModel
 from ...solvers.base import History
 from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
 from ..data_files import DataFile, joined
+from ..doubts import Doubt, Expected
+from .doubts import doubts_of_strips
 from .objective import Array, LoadObjective
 from .strip import Strip
 from .test import StripsTest, reach_of
@@ -143,6 +145,17 @@ class PreparedStrips:
         return joined(
             file for d in self.test.matched for file in self.test.strips[d].data_files(points)
         )
+
+    def doubts(self, expected: Expected) -> Sequence[Doubt]:
+        """What makes the load curves doubtful."""
+        test = self.test
+        return doubts_of_strips(test.strips, test.width, test.thickness, expected)
+
+    def examine(self, out: Output) -> Exhibit:
+        """The load curves as they were read."""
+        from .examined import exhibit
+
+        return exhibit(self.test, out)
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""

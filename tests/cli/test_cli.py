@@ -240,7 +240,7 @@ def test_bad_data_names_file_and_line(tmp_path):
     for content, words in (
         ("", "header"),
         ("x,y,dx,dy,dz,flag\n", "only a header"),
-        (rows.replace("15,30,", "15,nan,", 1), "line"),
+        (rows.replace("15,30,", "15,thirty,", 1), "line"),
         (rows.replace("dz", "w", 1), "column 'dz'"),
         ("\x00\x01binary", "test1_07.csv"),
     ):

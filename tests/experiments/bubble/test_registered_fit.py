@@ -12,38 +12,27 @@ from bubblefit.identification.assessment import moduli_error
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
+from ...camera import camera_project
 from ...commands import in_process, result_in
 from ...complaints import complaint
-from ...projects import small
 
 #: Warp turned by 12 degrees, the sheet tilted by 3, 600 mm away and 5 mm off the middle.
 TURN = Rotation.from_euler("zx", [12.0, 3.0], degrees=True).as_matrix()
 SHIFT = np.array([3.0, -4.0, 600.0])
-COLUMNS = 'columns = { x = "x", y = "y", z = "z", dx = "dx", dy = "dy", dz = "dz" }'
 #: kPa.
 SHOWN = [22, 59, 97, 132, 186, 251, 300]
+LAST = 'length_unit = "mm"\n'
+FROM_NAME = "[bubble.data.points.pressure]\nfrom_name = true\n"
 REGISTRATION = "[bubble.data.points.registration]\n"
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """The text of a project of computed data as a camera saw them: frame_0_22kPa.csv ..."""
+    """A folder with the frames, the text of a project of them, and the law behind them."""
     folder = tmp_path_factory.mktemp("registered")
-    path = small(folder, ("elements = 48", "elements = 108"))
-    text = path.read_text()
-    path.write_text(text.replace('symmetry = "quarter"', 'symmetry = "full"'))
-    project = bf.read_project(path)
-    test = project.tests["bubble"]
-    computed = test.prepare(law_of(project, [test.reach]), MembraneSolver)
-    for k, field in enumerate(computed.fields):
-        flat = np.column_stack([field.points, np.zeros(len(field.points))])
-        table = np.hstack([flat @ TURN.T + SHIFT, field.displacement @ TURN.T])
-        name = folder / f"frame_{k}_{1e3 * field.pressure:.6g}kPa.csv"
-        np.savetxt(name, table, delimiter=",", header="x,y,z,dx,dy,dz", comments="", fmt="%.9g")
-    data = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
-    points = f'[bubble.data.points]\nfiles = ["frame_*.csv"]\n{COLUMNS}\n'
-    points += "[bubble.data.points.pressure]\nfrom_name = true\n"
-    return folder, data.sub(points + REGISTRATION + "\n", text), computed.known
+    text, known = camera_project(folder, lambda x, u: (x @ TURN.T + SHIFT, u @ TURN.T))
+    text = re.sub("files = .*", 'files = ["frame_*.csv"]', text)
+    return folder, text.replace(LAST, LAST + FROM_NAME + REGISTRATION), known
 
 
 def project_of(seen, name: str, more: str = ""):

@@ -83,7 +83,11 @@ def small(tmp_path: Path) -> Callable[..., StripsTest]:
             "[data]\norder = 10\nthrough_origin = 1",
             ["strips[0].data.through_origin", "boolean"],
         ),
-        ("[data]", '[data]\nload_unit = "lbf"', ["strips[0].data.load_unit", "'N' or 'kN'"]),
+        (
+            "[data]",
+            '[data]\nload_unit = "lbf"',
+            ["strips[0].data.load_unit", "'N', 'kN', 'kN/m' or 'N/mm'"],
+        ),
         ("[data]", '[data]\nlength_unit = "in"', ["strips[0].data.length_unit", "'cm' or 'm'"]),
         ("[data]", '[data]\ndecimal = ";"', ["strips[0].data.decimal", "'.' or ','"]),
         (

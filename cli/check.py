@@ -1,0 +1,57 @@
+"""`bubblefit check PROJECT.toml`: look at the data before anything is fitted."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from .options import data_folders, exits
+
+DOUBTFUL = 2  # as for any bad input
+
+
+@click.command("check")
+@click.argument("project", type=click.Path(path_type=Path))
+@click.option("--test", "tests", multiple=True, help="A test by its name; several [all].")
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder [out/NAME-check].")
+@click.option(
+    "--data",
+    multiple=True,
+    metavar="[TEST=]DIR",
+    help="Folder of the measured data, of all tests or of one; several.",
+)
+@click.option("--trust", multiple=True, metavar="NAME", help="Let a doubt pass; several.")
+@click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
+@exits
+def command(
+    project: Path,
+    tests: tuple[str, ...],
+    out: Path | None,
+    data: tuple[str, ...],
+    trust: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Look at the data of PROJECT.toml, as every fit does before it begins.
+
+    Names the traps that data can fall into: wrong units, flipped or swapped axes, coordinates of
+    the deformed sheet, rejected points at zero, frames repeated or out of order, a frame that is
+    turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
+    the output folder. Exit code 2 where a fit would not begin.
+    """
+    from ..fits.check import check
+    from ..fits.project import read_project
+    from ..fits.store import usual_folder
+
+    found = check(read_project(project, data_folders(data)), tests or None, trust)
+    usual = usual_folder(project)
+    folder = out or usual.with_name(f"{usual.name}-check")
+    found.report(folder)
+    if as_json:
+        click.echo(json.dumps(found.result, indent=1))
+    else:
+        click.echo("\n".join([*found.lines(), f"written to {folder} (open report.html)"]))
+    if not found.sound:
+        sys.exit(DOUBTFUL)

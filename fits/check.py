@@ -1,0 +1,137 @@
+"""A look at the data of a project's tests before anything is fitted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from .. import __version__
+from ..experiments.base import Exhibit, FittableTest, Output
+from ..experiments.doubts import Judgement
+from ..reports import Report, Table, write_report
+from ..writing import write_text
+from .doubts import judge
+from .project import Project
+from .setup import FitSetup, prepare_fit
+
+NOTHING = "nothing doubtful"
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What was seen of the tests, and what makes them doubtful."""
+
+    setup: FitSetup
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether a fit would begin."""
+        return not any(judgement.errors for judgement in self.judgements)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values: what check.json holds."""
+        tests = {
+            j.test: [
+                {
+                    "name": d.name,
+                    "severity": "error" if d.sure else "warning",
+                    "trusted": d.name in j.trusted,
+                    "text": d.text,
+                }
+                for d in j.doubts
+            ]
+            for j in self.judgements
+        }
+        return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
+
+    def _summary(self) -> str:
+        if not self.sound:
+            return "A fit would not begin."
+        doubts = sum(len(judgement.doubts) for judgement in self.judgements)
+        if doubts:
+            return f"A fit would begin, and carry {doubts} of the doubts below with it."
+        return "The data are fit to be fitted."
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Test, what it is, name of the doubt, text: a line a doubt, one for a test without."""
+        rows = []
+        for judgement in self.judgements:
+            for doubt in judgement.doubts:
+                severity = "error" if doubt.sure else "warning"
+                if doubt.name in judgement.trusted:
+                    severity = f"trusted {severity}"
+                rows.append((judgement.test, severity, doubt.name, doubt.text))
+            if not judgement.doubts:
+                rows.append((judgement.test, "fine", "", NOTHING))
+        return rows
+
+    def lines(self) -> list[str]:
+        """For a terminal."""
+        return [
+            f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
+            for test, severity, name, text in self.rows()
+        ]
+
+    def report(self, folder: Path | str) -> Path:
+        """Write check.json, the tests' own figures and report.html; the page.
+
+        Raises
+        ------
+        OutputError : they cannot be written.
+        """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "check.json", json.dumps(self.result, indent=1) + "\n")
+        several = len(self.setup.tests) > 1
+        exhibits: list[tuple[str, Exhibit]] = []
+        for one in self.setup.tests:
+            if (examine := getattr(one, "examine", None)) is not None:
+                out = Output.of(folder, one.test.name, several)
+                exhibits.append((one.test.name, examine(out)))
+        header = ["test", "", "doubt", "what was seen"]
+        doubts = Table("Doubts", header, [list(row) for row in self.rows()], text=(1, 2, 3))
+        facts = [
+            (f"{name}: {label}" if several else label, value)
+            for name, exhibit in exhibits
+            for label, value in exhibit.facts
+        ]
+        report = Report(
+            title=f"{self.setup.project.title}: a look at the data",
+            summary=self._summary(),
+            facts=facts,
+            warnings=[
+                words
+                for j in self.judgements
+                for words in (
+                    *(f"{j.test}: {d.text}" for d in j.errors),
+                    *(n.line for n in j.notes),
+                )
+            ],
+            figures=[figure for _, exhibit in exhibits for figure in exhibit.figures],
+            tables=[doubts, *(table for _, exhibit in exhibits for table in exhibit.tables)],
+            files=[("check.json", "the doubts in plain values")],
+            versions={"bubblefit": __version__},
+        )
+        return write_report(folder, report)
+
+
+def check(
+    project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = ()
+) -> Check:
+    """Look at the data of tests; of all that can be fitted unless some are named.
+
+    trust : names of doubts that stop nothing, beside those of the project.
+
+    Raises
+    ------
+    InputError : data that cannot be read, a doubt that there is not. SolverFailure : a known
+        solution cannot be run.
+    """
+    project = project.with_fit(trust=[*project.fit.trust, *trust])
+    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
+    return Check(setup, judge(setup))
