@@ -76,6 +76,8 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     if options:
         settings["solver"] = {solver: options}
     for name in tests:
+        if name not in written.tests:  # made from Python, beside the file
+            continue
         settings.setdefault(written.kinds[name], []).append(written.tests[name])
     return settings
 

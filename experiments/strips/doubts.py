@@ -71,8 +71,10 @@ def _end(what: str, strain: float) -> list[Doubt]:
 
 def _preload(what: str, elongation: Array, load: Array) -> list[Doubt]:
     """A load where nothing is elongated yet."""
-    largest = float(load.max())
-    first = load[elongation <= elongation.min() + BEGINNING * np.ptp(elongation)]
+    largest, end = float(load.max()), float(elongation.max())
+    first = load[np.abs(elongation) <= BEGINNING * end]
+    if not first.size:  # the curve begins where the strip is elongated already
+        return []
     level = float(np.median(first)) / largest if largest > 0 else 0.0
     if abs(level) < PRELOAD:
         return []
