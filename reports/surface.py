@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
@@ -28,7 +29,7 @@ def plot_disk(path: Path, maps: Sequence[tuple[str, Array, Array]], radius: floa
         drawn = axes.tricontourf(
             Triangulation(*places.T), values, np.linspace(-most, most, LEVELS), cmap="RdBu_r"
         )
-        figure.colorbar(drawn, ax=axes, shrink=0.8)
+        figure.colorbar(drawn, ax=axes, shrink=0.8, ticks=MaxNLocator(9))
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=BLACK, linewidth=1)
         axes.set_aspect("equal")
         quiet(axes, "x (warp), mm", "y (fill), mm", title)

@@ -177,10 +177,10 @@ class FieldObjective:
         count = 1 + max(int(own.max()) for own in numbers)
         total, weights = np.zeros((count, *parts[0].shape[1:])), np.zeros((count, 3))
         for own, part, scale in zip(numbers, parts, self.scales, strict=True):
-            # A place is at most once in a target.
             weight = scale**-2.0
-            total[own] += part * weight.reshape(3, *[1] * (part.ndim - 2))
-            weights[own] += weight
+            # Unbuffered: a file may have a place twice.
+            np.add.at(total, own, part * weight.reshape(3, *[1] * (part.ndim - 2)))
+            np.add.at(weights, own, weight)
         weights[weights == 0] = 1.0
         mean = total / weights.reshape(*weights.shape, *[1] * (total.ndim - 2))
         for axis in set(range(3)) - set(self.constant):

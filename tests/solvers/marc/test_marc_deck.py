@@ -6,14 +6,14 @@ import re
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder import cylinder_mesh
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.graded import Refinement
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import bias_strip, straight_strip
-from bubblefit.solvers.marc.bubble import bubble_deck
+from bubblefit.solvers.marc.bubble import analyse, bubble_deck
 from bubblefit.solvers.marc.fabric import fabric_context, fabric_frames, named_set, set_lines
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
 from bubblefit.solvers.marc.strip import strip_deck
@@ -409,3 +409,13 @@ def test_whole_decks_of_the_site(tmp_path):
     model = straight_strip("warp", 50, 60, 0.81)
     with pytest.raises(InputError, match=r"holds no uniaxial\.dat\.j2"):
         strip_deck(model, LAW, MarcSettings(templates=str(tmp_path)), np.array([1.0]))
+
+
+@pytest.mark.parametrize("key", ["slack", "rim_motion"])
+def test_a_slack_sheet_and_a_rim_that_moves_are_refused(key) -> None:
+    mesh = disk_mesh(100.0, 16)
+    rim = len(mesh.node_sets["rim"])
+    what = {"slack": (0.001, 0.0), "rim_motion": np.zeros((1, rim, 3))}[key]
+    model = BubbleModel(mesh, 0.81, (0.1,), **{key: what})
+    with pytest.raises(SolverFailure, match="no slack sheet and no rim that moves"):
+        analyse(model, HypoelasticLaw.linear(500.0, 250.0, 12.0), MarcSettings(), None)
