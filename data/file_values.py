@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,8 @@ from .column_names import split_unit
 from .tables import HOLES, read_lines
 from .text_layouts import SEPARATORS, TOP, Lines, cells_of
 
+#: Units of readings that a scale makes something of.
+VOLTS = ("V", "mV")
 _NUMBER = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?"
 
 
@@ -30,7 +32,7 @@ def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> f
     name = channel.column or ""
     # Comments are kept: a value may stand in one.
     lines = read_lines(path, "", any_encoding=True)
-    found = _in_column(path, lines, name) or _above(path, lines, name)
+    found = _in_column(path, lines, name) or _above(path, lines, name, (*units, *VOLTS))
     if found is None:
         problem = (
             f"neither a column {name!r} nor a line above the numbers that says {name!r} and a value"
@@ -91,19 +93,23 @@ def _constant(
     return first[0], unit, f"line {lines[0][0]}, column {name!r}"
 
 
-def _above(path: Path, lines: Lines, name: str) -> tuple[float, str, str] | None:
-    """A line such as "name [unit] = number", or "name: number unit"."""
+def _above(
+    path: Path, lines: Lines, name: str, units: Sequence[str]
+) -> tuple[float, str, str] | None:
+    """A line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
+    known = "|".join(sorted(units, key=len, reverse=True))
     says = re.compile(
-        rf"(?<!\w){re.escape(name)}(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?[\s:=;,]*({_NUMBER})"
-        r"[\s;]*([A-Za-z]+)?"
+        rf"(?<!\w){re.escape(name)}(?:_({known}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
+        rf"[\s:=;,]*({_NUMBER})(?:[\s;,]*({known})(?!\w))?"
     )
     every = [(found, line) for line, text in lines[:TOP] if (found := says.search(text))]
     if not every:
         return None
-    values = {float(found[2].replace(",", ".")) for found, _ in every}
+    values = {float(found[3].replace(",", ".")) for found, _ in every}
     if len(values) > 1:
         first, second = every[0][1], every[1][1]
         problem = f"says another {name!r} than line {first}"
         raise InputError(path, f"line {second}", problem)
     found, line = every[0]
-    return values.pop(), (found[1] or found[3] or "").strip(), f"line {line}"
+    own = found[1] or found[2] or found[4] or split_unit(name)[1]
+    return values.pop(), own.strip(), f"line {line}"

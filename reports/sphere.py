@@ -40,7 +40,9 @@ def plot_spheres(path: Path, frames: Sequence[Drawn]) -> Path:
             vmax=most, linewidths=0,
         )  # fmt: skip
         # However far off they are, the picture stays that of the ball.
-        axes.set_autoscale_on(False)
+        for place, limits in ((points[used, 0], axes.set_xlim), (points[used, 1], axes.set_ylim)):
+            edge = 0.05 * float(np.ptp(place))
+            limits(float(place.min()) - edge, float(place.max()) + edge)
         axes.scatter(*points[~used, :2].T, s=12.0, c=GREY, marker="x", linewidths=0.7)
         axes.set_aspect("equal")
         quiet(axes, "x, mm", "y, mm", title)

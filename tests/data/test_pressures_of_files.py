@@ -68,7 +68,7 @@ def test_names_without_one_number(name, pattern, words):
         f"{POINTS};p\nmm;mm;mm;mm;mm;bar\n0;0;0;0;1;0.355\n1;0;0;0;1;0.355\n",
         f"# p [kPa] = 35.5\n{POINTS}\n0;0;0;0;1\n",
         f"Title\np;35,5;kPa\n{POINTS}\n0;0;0;0;1\n",
-        f"# p_bar=0.355000 frame 3\n# p = 0.355 bar\n{POINTS}\n0;0;0;0;1\n",
+        f"# test 1 p_bar=0.355000; x,y in mm\n# p = 0.355 bar\n{POINTS}\n0;0;0;0;1\n",
         f"{POINTS};p [kPa]\n0;0;0;0;1;35.5\n1;0;nan;nan;nan;\n",
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -90,6 +91,20 @@ def test_real_examples(name: str, shared_data: Path):
     assert p.data.options.flag_column == "flag"
     for file, bar in zip(p.data.files, recorded[indices, 1], strict=True):
         assert f"p_bar={bar:.6f}" in file.open().readline()
+
+
+def test_pressures_in_the_headers_of_real_frames(shared_data: Path, tmp_path: Path):
+    """Those that the example writes out, read from "p_bar=" in each of the 20 files."""
+    text = (VALMEX / "test1-cubic.toml").read_text()
+    pattern, indices = (re.search(rf"(?m)^{key} = .*$", text)[0] for key in ("pattern", "indices"))
+    text = text.replace(pattern, 'files = ["grid/test1_*.csv"]').replace(indices, "")
+    listed = re.search(r"(?ms)^pressures = \[.*?\].*?$", text)[0]
+    said = '[bubble.data.points.pressure]\ncolumn = "p_bar"\n'
+    (tmp_path / "project.toml").write_text(text.replace(listed, "") + said)
+    found = bubble(read_project(tmp_path / "project.toml", shared_data / "bubble"))
+    asked = bubble(read_project(VALMEX / "test1-cubic.toml", shared_data / "bubble"))
+    assert [f.name for f in found.data.files] == [f.name for f in asked.data.files]
+    assert found.pressures == pytest.approx(asked.pressures, rel=1e-5)
 
 
 def test_missing_data_says_what_to_do(tmp_path: Path):
