@@ -17,12 +17,13 @@ class DataFile:
     Parameters
     ----------
     source : its format, columns and units, and what was chosen where it leaves a choice.
-    used : how many of its rows count. dropped : how many do not, by why.
+    used : how many of its rows count, None where that means nothing. dropped : how many do not, by
+        why.
     """
 
     path: Path
     source: FrameSource
-    used: int
+    used: int | None
     dropped: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -45,9 +46,14 @@ def joined(parts: Iterable[DataFile]) -> list[DataFile]:
     for part in parts:
         by_path.setdefault(part.path, []).append(part)
     return [
-        DataFile(path, same[0].source, sum(p.used for p in same), _added(p.dropped for p in same))
+        DataFile(path, same[0].source, _used(same), _added(p.dropped for p in same))
         for path, same in by_path.items()
     ]
+
+
+def _used(parts: Sequence[DataFile]) -> int | None:
+    counts = [part.used for part in parts if part.used is not None]
+    return sum(counts) if counts else None
 
 
 def _added(each: Iterable[Mapping[str, int]]) -> dict[str, int]:

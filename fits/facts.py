@@ -9,7 +9,7 @@ from .. import __version__
 from ..solvers.base import Solver
 from .project import Project
 from .setup import UNCOUNTED, FitSetup
-from .written import settings_of
+from .written import plain, settings_of
 
 #: What a test is called and where its files lie changes nothing.
 NAMES = ("name", "folder")
@@ -51,13 +51,13 @@ def _said(project: Project, names: list[str]) -> dict[str, Any]:
     units = {f"units.{key}": value for key, value in whole["units"].items()}
     return {
         "settings": {**fabric, **units, **law, **fit},
-        "tests": {name: _without(written.tests[name]) for name in names},
+        "tests": {name: _without(written.whole[name]) for name in names},
     }
 
 
 def _without(section: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        key: _without(value) if isinstance(value, Mapping) else value
+        key: _without(value) if isinstance(value, Mapping) else plain(value)
         for key, value in section.items()
         if key not in NAMES
     }

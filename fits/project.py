@@ -205,18 +205,19 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
 def _written(
     file: ProjectFile, path: Path, tests: Mapping[str, Test], data: Folders | None
 ) -> Written:
-    sections = {}
+    sections, whole = {}, {}
     for name, kind in kinds().items():
         own = file.tests(name)
         for section, test in zip(own, _names(name, own), strict=True):
             folder = data.get(test) if isinstance(data, Mapping) else data
             key = getattr(kind, "folder_key", None)
-            said = section.model_dump()
+            said = section.model_dump(exclude_unset=True)
             sections[test] = section_as_run(said, test, key, path.parent, folder)
+            whole[test] = section.model_dump(exclude_none=True)
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
     by_kind = {name: test.kind for name, test in tests.items()}
-    return Written(path.read_bytes().decode("utf-8"), common, sections, by_kind, cards)
+    return Written(path.read_bytes().decode("utf-8"), common, sections, whole, by_kind, cards)
 
 
 def _reads(test: Test) -> bool:

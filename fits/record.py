@@ -93,12 +93,12 @@ class Record:
                 ["machine", ", ".join(f"{value}" for value in machine.values())],
                 ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
             ]
-        rows.append(["solver", "; ".join(f"{k} {v}" for k, v in self.solver.items() if v)])
+        rows.append(["solver", _solver(self.solver)])
         if not self.data:
             rows.append(["data files", NO_FILES])
         note = f"All of it, with the text of the project: {PROVENANCE}."
         if self.settings is not None:
-            note += f" The project with all its settings and options, to be run again: {AS_RUN}."
+            note += f" The project with the options of the command, to be run again: {AS_RUN}."
         tables = [Table(TITLE, ["", ""], rows, note, text=(1,))]
         if self.data:
             tables.append(_data_table(self.data))
@@ -149,6 +149,11 @@ def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
         },
         "versions": versions(),
     }
+
+
+def _solver(facts: Mapping[str, str]) -> str:
+    settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
+    return "; ".join([facts.get("version") or facts.get("name", ""), *settings])
 
 
 def _data_table(data: Sequence[Mapping[str, Any]]) -> Table:

@@ -16,21 +16,23 @@ if TYPE_CHECKING:
     from .project import Project
 
 Settings = dict[str, Any]
-HEAD = "# As it was run: every setting, those that the file leaves to their defaults among them.\n"
+HEAD = "# As it was run: what the project says, with the options of the command.\n"
 
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a project file says, in its own units, with every default.
+    """What a project file says, in its own units.
 
     text : the file's own. common : [fabric] and [units]. tests : the section of each test by its
-    name, with the folder that its data were taken from. kinds : of the tests, by name. cards : each
-    [[card]], in the order of the file.
+    name, with the folder that its data were taken from; without what it leaves to defaults, which
+    need not go with each other when they are said. whole : each with its defaults. kinds : of the
+    tests, by name. cards : each [[card]], in the order of the file.
     """
 
     text: str
     common: Mapping[str, Any]
     tests: Mapping[str, Settings]
+    whole: Mapping[str, Settings]
     kinds: Mapping[str, str]
     cards: Sequence[Settings] = ()
 
@@ -45,7 +47,7 @@ def section_as_run(
     folder_key : dotted key of the folder; None where the kind has none. base : the project's
         folder. folder : what the command says instead of the section.
     """
-    whole = {**_plain(said), "name": name}
+    whole = {**plain(said), "name": name}
     if folder_key is None:
         return whole
     *above, key = folder_key.split(".")
@@ -56,7 +58,19 @@ def section_as_run(
             return whole  # its data are of another sort
     given = base / os.path.expanduser(table.get(key, "")) if folder is None else folder
     table[key] = os.path.abspath(given)
-    return whole
+    beside: Settings = _beside_project(whole, base, Path(table[key]))
+    return beside
+
+
+def _beside_project(value: Any, base: Path, folder: Path) -> Any:
+    """With the full path of files that are not in the data's folder and lie beside the project."""
+    if isinstance(value, dict):
+        return {key: _beside_project(own, base, folder) for key, own in value.items()}
+    if isinstance(value, list):
+        return [_beside_project(own, base, folder) for own in value]
+    if isinstance(value, str) and Path(value).suffix and not (folder / value).exists():
+        return os.path.abspath(base / value) if (base / value).is_file() else value
+    return value
 
 
 def settings_of(project: Project, tests: Sequence[str]) -> Settings:
@@ -69,8 +83,8 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     solver = project.fit.solver
     settings: Settings = {
         **written.common,
-        "law": _plain(project.law.model_dump()),
-        "fit": _plain(project.fit.model_dump()),
+        "law": plain(project.law.model_dump()),
+        "fit": plain(project.fit.model_dump()),
     }
     options = _solver_options(project)
     if options:
@@ -114,7 +128,7 @@ def _solver_options(project: Project) -> Settings:
     section = solver_sections().get(name)
     return {
         key: _in_full(value)
-        for key, value in _plain(project.solver_options.get(name, {})).items()
+        for key, value in plain(project.solver_options.get(name, {})).items()
         if section is None or key in section.model_fields
     }
 
@@ -127,10 +141,10 @@ def _in_full(value: Any) -> Any:
     return value
 
 
-def _plain(value: Any) -> Any:
-    """What TOML can say: without what is not said, tuples as lists, paths as text."""
+def plain(value: Any) -> Any:
+    """What TOML and JSON can say: without what is not said, tuples as lists, paths as text."""
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items() if v is not None}
+        return {str(k): plain(v) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
+        return [plain(v) for v in value]
     return str(value) if isinstance(value, Path) else value

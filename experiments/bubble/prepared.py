@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from ...data.fields import DisplacementField, read_fields
+from ...data.frames import FrameSource
 from ...data.registration.fields import register_fields
 from ...data.registration.register import Registration
 from ...data.surfaces import DisplacementSurface, fit_surface
@@ -115,11 +117,16 @@ class PreparedBubble:
 
     def data_files(self) -> Sequence[DataFile]:
         """The files of the measured fields; none where they were computed."""
-        return joined(
+        data = self.test.data
+        logs: Sequence[Path] = ()
+        if isinstance(data, PointFiles) and data.recorded is not None:
+            logs = data.recorded.logs
+        frames = [
             DataFile(f.path, f.source, len(f.points), f.dropped)
             for f in self.fields
             if f.path is not None
-        )
+        ]
+        return [*joined(frames), *(DataFile(log, FrameSource("log"), None) for log in logs)]
 
     @property
     def matched(self) -> Sequence[DisplacementField]:

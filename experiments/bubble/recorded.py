@@ -40,6 +40,7 @@ class RecordedFrames:
         pressures were asked for.
     source : where the pressures stand, in words. count : of all frames. left_out : how many were
         not looked at, by why.
+    logs : files beside those of the frames that were read: a log, a table of times.
     doubt : (n,) MPa, by what the clocks' offset leaves open; None without a log. clock : of a log.
     """
 
@@ -53,6 +54,7 @@ class RecordedFrames:
     left_out: Mapping[str, int]
     doubt: Array | None = None
     clock: ClockOffset | None = None
+    logs: tuple[Path, ...] = ()
 
 
 def recorded_frames(
@@ -111,6 +113,16 @@ def recorded_frames(
         left_out=chosen.left_out,
         doubt=None if clock is None else clock.doubt[taken],
         clock=clock,
+        logs=_logs(section.log, place, folder),
+    )
+
+
+def _logs(section: LogSection | None, place: Place, folder: Path) -> tuple[Path, ...]:
+    if section is None:
+        return ()
+    named = {"file": section.file, "times": section.times}
+    return tuple(
+        _beside(name, place, folder, f"{AT}.log.{key}") for key, name in named.items() if name
     )
 
 

@@ -361,6 +361,8 @@ def test_the_record_on_the_page(tmp_path: Path) -> None:
     low = list(files.rows[0])
     assert low[:4] == ["first", "low.csv", digest[:12], "csv"] and low[4].startswith(columns)
     assert low[6] == "1 flagged as doubtful"
-    (none,) = Record(tmp_path / "p.toml", None, None, [], {}, [this_run(None)]).tables()
+    solver = solver_facts("calculix", "calculix 2.20; element=S8R; templates=")
+    (none,) = Record(tmp_path / "p.toml", None, None, [], solver, [this_run(None)]).tables()
     said = dict(map(tuple, none.rows))
+    assert said["solver"] == "calculix 2.20; element = S8R"
     assert said["command"] == "none: called from Python" and "computed" in said["data files"]

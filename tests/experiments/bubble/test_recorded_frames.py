@@ -14,7 +14,9 @@ from bubblefit.experiments.bubble.recorded_words import (
     recorded_numbers,
     recorded_table,
 )
+from bubblefit.experiments.data_files import files_of
 from bubblefit.fits.project import read_project
+from bubblefit.fits.written import project_text, settings_of
 
 from ...complaints import complaint
 
@@ -119,6 +121,20 @@ def test_all_frames_and_some(folder):
         "at no pressure": 3,
         "at a pressure that another frame has": 9,
     }
+
+
+def test_the_log_is_in_the_record_of_a_run(folder, tmp_path):
+    """Also where it lies beside the project, not beside the frames."""
+    (folder / "beside.csv").write_bytes((folder / "data" / "valve.csv").read_bytes())
+    text = LOG.format(more="").replace("valve.csv", "beside.csv")
+    found = read_project(project(folder, text, "[10, 60]"))
+    (test,) = found.tests.values()
+    *frames, log = files_of(prepare(test, None, None))
+    assert [file.path.name for file in frames] == names(test)
+    assert log.path == folder / "beside.csv" and log.source.format == "log" and log.used is None
+    again = tmp_path / "again.toml"
+    again.write_text(project_text(settings_of(found, [test.name])))
+    assert bubble(again).pressures == test.pressures
 
 
 def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
