@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
+from collections.abc import Container
 from pathlib import Path
 
 import jsonschema
 import pytest
 from bubblefit.cli.init import KINDS
+from bubblefit.data.registration.register import RegistrationOptions
+from bubblefit.fits.file import parse
 from bubblefit.fits.json_schema import SHIPPED, project_schema, schema_text
 from bubblefit.fits.project import read_project
 from click.testing import CliRunner
@@ -120,6 +124,47 @@ def test_own_tests(options: list, tests: list[str], tmp_path: Path, schema) -> N
     assert ("E1 = [" in text) == any("cylinder" not in name for name in tests)
     longest = max(map(len, text.splitlines()))
     assert longest <= 120, longest
+
+
+#: A key or a section that may be wanted: the rest of its line is TOML, too.
+COMMENTED = re.compile(r"# (\[[\w.]+\]|\[\[\w+\]\]|\w+ = .*)")
+
+
+def uncommented(lines: list[str], wanted: Container[int]) -> str:
+    return "\n".join(
+        line[2:] if COMMENTED.match(line) and number in wanted else line
+        for number, line in enumerate(lines)
+    )
+
+
+def test_what_is_commented_may_be_wanted(tmp_path: Path, schema) -> None:
+    """Every commented key with its section, one at a time and all together."""
+    own("--bubble", 1, "--strips", 1, "--cylinder", 1, cwd=tmp_path)
+    path = tmp_path / "mine" / "project.toml"
+    lines = path.read_text().splitlines()
+    numbers = [n for n, line in enumerate(lines) if COMMENTED.match(line)]
+    keys = {lines[n][2:].split(" =")[0] for n in numbers}
+    assert {"[bubble.data.points.registration]", "warp", "warp_points", "format"} <= keys
+    assert {"[bubble.sheet]", "surface", "modes", "[bubble.data.points.pressure]"} <= keys
+    headers = [n for n in numbers if lines[n][2] == "["]
+    one_by_one = [{n, max((h for h in headers if h <= n), default=n)} for n in numbers]
+    for wanted in [*one_by_one, set(numbers)]:
+        path.write_text(uncommented(lines, wanted))
+        parse(path)
+        schema.validate(tomllib.loads(path.read_text()))
+
+
+def test_registration_and_pressures_of_own_tests(tmp_path: Path) -> None:
+    """The blocks as they stand, without what is said in their place."""
+    own("--bubble", 1, cwd=tmp_path)
+    path = tmp_path / "mine" / "project.toml"
+    lines = path.read_text().splitlines()
+    first = lines.index("# [bubble.data.points.registration]")
+    last = lines.index("", first)
+    marks = next(n for n in range(first, last) if "warp_points" in lines[n])
+    path.write_text(uncommented(lines, {*range(first, last)} - {marks}))
+    found = read_project(path, need_data=False).tests["bubble"].data.registration
+    assert found == RegistrationOptions(centre=(0.0, 0.0, 0.0), warp=0.0)
 
 
 def test_numbers_of_own_tests(tmp_path: Path) -> None:
