@@ -35,7 +35,7 @@ class RecordedFrames:
     Parameters
     ----------
     files : of the frames taken; all files where one holds several frames. frames : their numbers
-        among all frames of the files.
+        among all frames of the files, None where each file holds one.
     names : what each is called. pressure : (n,) MPa, as recorded. asked : (n,) MPa, None where no
         pressures were asked for.
     source : where the pressures stand, in words. count : of all frames. left_out : how many were
@@ -45,7 +45,7 @@ class RecordedFrames:
     """
 
     files: tuple[Path, ...]
-    frames: tuple[int, ...]
+    frames: tuple[int, ...] | None
     names: tuple[str, ...]
     pressure: Array
     asked: Array | None
@@ -104,7 +104,7 @@ def recorded_frames(
     single = len(names) == len(files)
     return RecordedFrames(
         files=tuple(files[i] for i in taken) if single else tuple(files),
-        frames=tuple(range(len(taken))) if single else chosen.frames,
+        frames=None if single else chosen.frames,
         names=tuple(names[i] for i in taken),
         pressure=pressures[taken],
         asked=None if asked is None else np.array(asked),

@@ -73,6 +73,16 @@ def test_steps_are_sharper_than_a_frame_between_two_pictures():
     assert np.median(found.doubt) < 2e-4 < 5e-4 < found.doubt.max()
 
 
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_the_doubt_is_what_the_offsets_leave_open(noise):
+    """On a steady rise of 1.67 kPa/s: half of the range of the offsets times that."""
+    found = find_offset(*recorded(ramp, "flat", 37.3, noise))
+    assert found.lower <= 37.3 <= found.upper
+    assert found.offset == pytest.approx((found.lower + found.upper) / 2)
+    middle = found.doubt[60:100]
+    assert np.mean(middle) == pytest.approx(0.3 / 180 * (found.upper - found.lower) / 2, rel=0.15)
+
+
 def test_frames_in_no_order_and_frames_without_a_height():
     times, heights, *log = recorded(steps, "flat", 37.3, 5e-4)
     order = np.random.default_rng(1).permutation(len(times))

@@ -107,6 +107,8 @@ def test_a_volt_may_be_a_unit(tmp_path):
     path = written(tmp_path, "t (s),p (V)\n0,1\n1,2\n")
     options = LogOptions(Channel("p", "bar", 1.0, -0.5), Channel("t"))
     assert read_pressure_log(path, options).pressure == pytest.approx([0.05, 0.15])
+    options = LogOptions(Channel("p", "bar", 4.0, -0.5), Channel("t"))
+    assert read_pressure_log(path, options).pressure == pytest.approx([0.35, 0.75])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from bubblefit.fits.project import read_project
 from bubblefit.fits.written import project_text, settings_of
 
 from ...complaints import complaint
+from ...dic_exports import pyaldic
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])
@@ -71,6 +73,11 @@ def folder(tmp_path_factory):
         home / "data" / "valve.csv", table, "%.6g", ",", header="time (s),p (V)", comments=""
     )
     return home
+
+
+def pictures(folder: Path) -> list[Path]:
+    home = folder / "data" / "frames"
+    return [home / f"p{k}_{level:g}kPa.csv" for k, level in enumerate(LEVELS, start=1)]
 
 
 def project(folder: Path, pressure: str, asked: str = "", files: str = POINTS) -> Path:
@@ -149,9 +156,15 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     assert numbers["clock"]["how"] == "found by the apex heights"
     assert numbers["clock"]["between_s"] == [taken.clock.lower, taken.clock.upper]
     assert numbers["taken"][1]["asked_kPa"] == pytest.approx(22.0)
+    # What the clocks leave open of each frame's own pressure, not of another's.
+    each = {file.name: 1e3 * d for file, d in zip(pictures(folder), taken.clock.doubt, strict=True)}
+    for row in numbers["taken"]:
+        assert row["uncertain_kPa"] == pytest.approx(each[row["frame"]])
+    mean = f"uncertain by {np.mean([*each.values()]):.2g} kPa on average"
     first, second = recorded_lines(taken)
     assert first.startswith("pressures from the log valve.csv: 4 of 17 frames taken")
     assert f"{taken.clock.offset:.4g} s, found by the apex heights" in second
+    assert second.endswith(mean)
     table = recorded_table(taken)
     assert table.header[-1] == "uncertain by the clocks, +- kPa" and second in table.note
     ((name, caption),) = clock_pictures(taken, Output(tmp_path))
@@ -167,14 +180,41 @@ def test_times_of_frames_from_a_table_or_the_names(folder):
     (folder / "data" / "camera.csv").write_text(
         "picture,time (ms)\n" + "".join(f"{k},{2000 * k}\n" for k in range(len(LEVELS)))
     )
-    pictures = LOG.format(more="") + "time_in_name = 'p(\\d+)_'\n"
+    numbered = LOG.format(more="") + "time_in_name = 'p(\\d+)_'\n"
     table = LOG.format(more="").replace("rate = 0.5", "times = 'camera.csv'")
     by_rate = bubble(project(folder, LOG.format(more=""))).data.recorded.clock
     by_table = bubble(project(folder, table)).data.recorded.clock
-    by_number = bubble(project(folder, pictures)).data.recorded.clock
+    by_number = bubble(project(folder, numbered)).data.recorded.clock
     assert by_table.offset == pytest.approx(by_rate.offset)
     # The first picture is number 1: its clock is a picture behind.
     assert by_number.offset == pytest.approx(by_rate.offset - 2.0)
+
+
+def test_one_file_with_all_frames(folder, tmp_path):
+    """A log tells its frames apart; a name or a column is of one frame a file."""
+    (tmp_path / "data").mkdir()
+    shutil.copy(folder / "data" / "valve.csv", tmp_path / "data")
+    files = sorted(
+        (folder / "data" / "frames").iterdir(), key=lambda f: int(f.name[1:].split("_")[0])
+    )
+    tables = [np.loadtxt(file, delimiter=",", skiprows=1) for file in files]
+    frames = [(np.column_stack([t[:, :2], 0 * t[:, 0]]), t[:, 2:5]) for t in tables[1:]]
+    (path,) = pyaldic(tmp_path / "data", frames)
+    named = f'files = ["{path.name}"]\nfolder = "data"'
+    test = bubble(project(tmp_path, LOG.format(more=""), "[10, 60]", named))
+    taken = test.data.recorded
+    # Of the frame at rest that the format adds, and of the 16 of the film.
+    assert taken.count == 17 and taken.clock.offset == pytest.approx(AHEAD, abs=1.0)
+    assert taken.names[0].startswith(f"{path.name}, frame ")
+    low, high = prepare(test, None, None).fields
+    assert [low.pressure, high.pressure] == list(test.pressures)
+    number = [int(name.split()[-1]) - 1 for name in taken.names]
+    assert LEVELS[number] == pytest.approx([10, 60])
+    np.testing.assert_allclose(high.displacement, tables[number[1]][:, 2:5], atol=1e-9)
+    path.rename(tmp_path / "data" / "all_60kPa.npz")
+    section = "[bubble.data.points.pressure]\nfrom_name = true\n"
+    test = bubble(project(tmp_path, section, "", named.replace(path.name, "all_60kPa.npz")))
+    assert "one frame for each of 1 pressures, found 17" in complaint(prepare, test, None, None)
 
 
 def test_a_simulation_needs_no_frames(folder, tmp_path):
