@@ -10,6 +10,7 @@ from bubblefit.data.bending_scatter import BendingError
 from bubblefit.experiments.cylinder.measures import BendingMeasures
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.cylinder.tables import columns_of, terminal_table
+from bubblefit.notes import Note, NoteKind
 
 MEASURES = BendingMeasures(
     stiffness=4.256,
@@ -26,11 +27,12 @@ MEASURES = BendingMeasures(
 )
 
 
-def run(name: str, card: str, early: str = ""):
+def run(name: str, card: str, early: str = "", *kinds: NoteKind):
     test = SimpleNamespace(
         name=name, reading=SimpleNamespace(places={"20 mm": 20.0, "a long way": 200.0})
     )
-    return SimpleNamespace(test=test, card=card, record=SimpleNamespace(early=early))
+    notes = tuple(Note(kind, "words") for kind in kinds)
+    return SimpleNamespace(test=test, card=card, notes=notes, record=SimpleNamespace(early=early))
 
 
 def test_numbers_for_result_json() -> None:
@@ -78,7 +80,7 @@ def test_a_row_of_the_table_of_runs() -> None:
 
 def test_the_terminals_table() -> None:
     runs = [
-        run("150/140", "soft"),
+        run("150/140", "soft", "", NoteKind.SNAP, NoteKind.GAS),
         run("200", "a stiff card"),
         run("250", "soft", "no equilibrium"),
     ]
@@ -87,7 +89,7 @@ def test_the_terminals_table() -> None:
     lines = terminal_table(runs, {0: MEASURES, 2: dull}, ended)
     assert lines == [
         "test     card           N/mm   buckles at    20 mm  a long way   error",
-        "150/140  soft           4.26  503 N 120 mm     86 N           -   5.2 %",
+        "150/140  soft           4.26  503 N 120 mm     86 N           -   5.2 %  [snap]",
         "200      a stiff card  failed: killed",
         "250      soft              -             -     86 N           -       -"
         "  stopped at 90 of 150 mm: no equilibrium",
