@@ -12,6 +12,7 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.base import CardRun, Output
 from bubblefit.experiments.bubble import KIND, forward
+from bubblefit.experiments.bubble.sheet_section import Sheet
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
@@ -37,8 +38,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     return calls
 
 
-def simulated(folder: Path, **outcomes: Any) -> Any:
-    test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures)
+def simulated(folder: Path, sheet: object = Sheet(), **outcomes: Any) -> Any:
+    test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures, sheet=sheet)
     cards: Any = dict.fromkeys(outcomes)
     runs = {(name, PART): CardRun(MODEL, outcome) for name, outcome in outcomes.items()}
     return KIND.simulate(test, cards, runs, Output(folder))
@@ -75,7 +76,10 @@ def test_one_card(tmp_path: Path, drawn: list[Any]) -> None:
 
 
 def test_several_cards_one_of_which_fails(tmp_path: Path, drawn: list[Any]) -> None:
-    said = simulated(tmp_path, broken=SolverFailure("no equilibrium", "membrane"), soft=history())
+    sheet = "any but a flat one"
+    said = simulated(
+        tmp_path, sheet, broken=SolverFailure("no equilibrium", "membrane"), soft=history()
+    )
     assert list(said.numbers) == ["cards"]
     assert said.numbers["cards"]["broken"] == {"failed": "no equilibrium"}
     assert said.lines == [
@@ -83,6 +87,7 @@ def test_several_cards_one_of_which_fails(tmp_path: Path, drawn: list[Any]) -> N
         "soft:",
         "    22.0 kPa   apex   10.000 mm",
         "   300.0 kPa   apex   30.000 mm",
+        "note: simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says",
     ]
     assert {path.name for path in tmp_path.iterdir()} == {"displacement-2.csv", "bubble-2.vtu"}
     assert drawn[0][0] == tmp_path / "profiles-2.png"
