@@ -77,9 +77,9 @@ def given_offset(
     there = _at(offset, times, log_times, pressures)
     if not np.isfinite(there).any():
         problem = (
-            f"no frame lies within the log: frames from {times.min() + offset:g} to"
-            f" {times.max() + offset:g} s by its clock, the log from {log_times[0]:g} to"
-            f" {log_times[-1]:g} s"
+            f"no frame lies within the log: frames from {times.min() + offset:.2f} to"
+            f" {times.max() + offset:.2f} s by its clock, the log from {log_times[0]:.2f} to"
+            f" {log_times[-1]:.2f} s"
         )
         raise InputError(None, "offset", problem)
     none = np.zeros(len(times))
@@ -124,7 +124,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     best = int(np.argmin(misfits))
     if misfits[best] > WORST_MISFIT:
         problem = (
-            f"at no offset does the sheet rise with the pressure: at best, {offsets[best]:.4g} s,"
+            f"at no offset does the sheet rise with the pressure: at best, {offsets[best]:.2f} s,"
             f" {misfits[best]:.0%} of the variance is left; are these the log and the frames of one"
             " test, and their times right? else give the offset in s"
         )
@@ -144,7 +144,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     span = float(np.ptp(there[np.isfinite(there)]))
     if float(np.nanmean(doubt)) > MOST_DOUBT * span:
         problem = (
-            f"cannot be found: offsets from {may_be[0]:.4g} to {may_be[-1]:.4g} s do as well, and"
+            f"cannot be found: offsets from {may_be[0]:.2f} to {may_be[-1]:.2f} s do as well, and"
             f" leave the frames' pressures uncertain by {1e3 * np.nanmean(doubt):.3g} kPa on"
             " average; give it in s. Where the pressure was held, released or began to rise while"
             " frames were taken, it can be found"

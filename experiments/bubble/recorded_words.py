@@ -92,12 +92,12 @@ def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
 
 
 def _clock_words(clock: ClockOffset) -> str:
-    ahead = f"clock of the log less that of the frames: {clock.offset:.4g} s"
+    ahead = f"clock of the log less that of the frames: {clock.offset:.2f} s"
     if clock.misfit is None:
         return f"{ahead}, given"
     return (
         f"{ahead}, found by the apex heights, which rise with the pressure: between"
-        f" {clock.lower:.4g} and {clock.upper:.4g} s the misfit ({clock.misfit:.2g} of the variance"
+        f" {clock.lower:.2f} and {clock.upper:.2f} s the misfit ({clock.misfit:.2g} of the variance"
         f" at best) is at most doubled; pressures uncertain by {1e3 * np.nanmean(clock.doubt):.2g}"
         " kPa on average"
     )

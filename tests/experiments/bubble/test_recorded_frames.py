@@ -163,7 +163,7 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     mean = f"uncertain by {np.mean([*each.values()]):.2g} kPa on average"
     first, second = recorded_lines(taken)
     assert first.startswith("pressures from the log valve.csv: 4 of 17 frames taken")
-    assert f"{taken.clock.offset:.4g} s, found by the apex heights" in second
+    assert f"{taken.clock.offset:.2f} s, found by the apex heights" in second
     assert second.endswith(mean)
     table = recorded_table(taken)
     assert table.header[-1] == "uncertain by the clocks, +- kPa" and second in table.note
@@ -172,7 +172,7 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     # Given, nothing is looked for.
     given = bubble(project(folder, LOG.format(more="") + f"offset = {AHEAD}\n"))
     assert given.data.recorded.clock.misfit is None
-    assert recorded_lines(given.data.recorded)[1].endswith("41 s, given")
+    assert recorded_lines(given.data.recorded)[1].endswith(" 41.00 s, given")
     assert "between_s" in recorded_numbers(given.data.recorded)["clock"]
 
 

@@ -22,17 +22,19 @@ SHIFT = np.array([3.0, -4.0, 600.0])
 #: kPa.
 SHOWN = [22, 59, 97, 132, 186, 251, 300]
 LAST = 'length_unit = "mm"\n'
-FROM_NAME = "[bubble.data.points.pressure]\nfrom_name = true\n"
+LOG = "[bubble.data.points.pressure.log]\nfile = 'valve.csv'\nrate = 0.5\noffset = 5\n"
 REGISTRATION = "[bubble.data.points.registration]\n"
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """A folder with the frames, the text of a project of them, and the law behind them."""
+    """A folder with frames and a log of their pressures, the text of a project, the law behind."""
     folder = tmp_path_factory.mktemp("registered")
     text, known = camera_project(folder, lambda x, u: (x @ TURN.T + SHIFT, u @ TURN.T))
+    log = np.column_stack([5.0 + 2.0 * np.arange(len(SHOWN)), SHOWN])
+    np.savetxt(folder / "valve.csv", log, "%g", ",", header="time (s),p (kPa)", comments="")
     text = re.sub("files = .*", 'files = ["frame_*.csv"]', text)
-    return folder, text.replace(LAST, LAST + FROM_NAME + REGISTRATION), known
+    return folder, text.replace(LAST, LAST + LOG + REGISTRATION), known
 
 
 def project_of(seen, name: str, more: str = ""):
@@ -59,11 +61,12 @@ def test_moduli_are_those_of_the_right_frame(seen):
     np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
     page = (folder / "out" / "report.html").read_text()
     assert "registration.png" in page and "found by symmetry" in page
-    assert "Frames taken" in page and "pressures from the files&#39; names" in page
+    assert "Frames taken" in page and "clock.png" in page and "5.00 s, given" in page
     taken = result["data"]["pressures"]["taken"]
     assert [one["pressure_kPa"] for one in taken] == pytest.approx(SHOWN)
-    assert [one["frame"].split("_")[1] for one in taken] == [str(k) for k in range(len(SHOWN))]
-    assert "pressures from the files' names: " in done.output
+    assert [one["frame"].split("_")[1][0] for one in taken] == [*"0123456"]
+    assert "pressures from the log valve.csv: 7 of 7 frames taken" in done.output
+    assert "clock of the log less that of the frames: 5.00 s, given" in done.output
     assert (folder / "out" / "registration.png").stat().st_size > 20_000
 
 
