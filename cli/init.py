@@ -85,9 +85,8 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
     fitted = tests["bubble"] or tests["strips"]
-    click.echo(
-        f"next: bubblefit fit {path}" if fitted else f"next: bubblefit bend {path} --card CARD"
-    )
+    then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
+    click.echo(f"next: bubblefit {then}")
 
 
 def on_a_terminal() -> bool:

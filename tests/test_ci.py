@@ -51,6 +51,11 @@ def test_it_ends_with_the_first_failure(house: Path, target: str) -> None:
     assert code != 0 and made[-1] == f"CI=1 {target}"
 
 
+def test_mutants_fail_nothing(house: Path) -> None:
+    code, made = run(house, "mutants")
+    assert code == 0 and made[-1] == "mutants: not tried to the end"
+
+
 def gfortran(folder: Path) -> subprocess.CompletedProcess[str]:
     script = ROOT / ".ci" / "gfortran"
     return subprocess.run(

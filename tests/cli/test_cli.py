@@ -73,7 +73,7 @@ def test_resume_refuses_another_study(study):
     folder, _ = study
     arguments = ("bubble", "project.toml", "--out", "out", "--resume", "--seed", 7)
     done = bubblefit(*arguments, cwd=folder, code=2)
-    assert "fit settings" in done.stderr
+    assert "fit.seed = 1, now 7" in done.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
