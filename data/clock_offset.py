@@ -10,26 +10,21 @@ in equal steps, a step later would else do as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .rising import LEAST_FRAMES, WITHIN, misfit_of, straightest
 
 Array = NDArray[np.float64]
 
-#: So many frames tell something, and so large a share of them lies within the log.
-LEAST_FRAMES, WITHIN = 6, 0.8
 #: Offsets looked at: half a frame apart, no more than so many; then finer about the best.
 MOST, FINE = 20_000, 20
 #: Frames are at rest within so many standard deviations of the lowest, and below this share of the
 #: most; share of the log that is below its least pressure, by noise.
 SIGMAS, AT_REST, BELOW = 6.0, 0.02, 0.01
-#: Heights to one of these powers go nearly straight with the pressures, those of a sheet that was
-#: taut or flat, so that noise counts alike all along; any rising function of them would do.
-POWERS = (1, 2, 3)
 #: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
 FLOOR = 1e-6
 #: Offsets of a misfit up to so many times the smallest may be the right one.
@@ -109,10 +104,10 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     rest = float(np.quantile(pressures, BELOW))
 
     def misfit(offset: float) -> float:
-        return _misfit(_at(offset, t, log_times, pressures), h, rest)
+        return misfit_of(_at(offset, t, log_times, pressures), h, rest)
 
     coarse = _offsets(t, log_times)
-    h = h ** _straightest(h, [_at(s, t, log_times, pressures) for s in coarse])
+    h = h ** straightest(h, [_at(s, t, log_times, pressures) for s in coarse])
     misfits = np.array([misfit(s) for s in coarse])
     step = coarse[1] - coarse[0] if len(coarse) > 1 else 0.0
     fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
@@ -180,50 +175,6 @@ def _rest_height(h: Array) -> float:
     """Up to where a frame is at rest, by the noise from one frame to the next."""
     noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
     return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
-
-
-def _straightest(h: Array, pressures: Sequence[Array]) -> int:
-    """The power of the heights that correlates best with the pressures at any offset."""
-    best = {}
-    for power in POWERS:
-        raised, best[power] = h**power, 0.0
-        for p in pressures:
-            inside = np.isfinite(p)
-            x, y = raised[inside] - raised[inside].mean(), p[inside] - p[inside].mean()
-            size = float(np.sqrt((x @ x) * (y @ y)))
-            if inside.sum() >= max(LEAST_FRAMES, WITHIN * len(h) - 1) and size > 0:
-                best[power] = max(best[power], float(x @ y) / size)
-    return max(best, key=lambda power: best[power])
-
-
-def _misfit(p: Array, h: Array, rest: float) -> float:
-    """What rising functions leave of the variances: mean of both, 1 where there is none.
-
-    p : (frames,) MPa, NaN beyond the log. h : (frames,) mm, 0 at rest. rest : MPa, at rest.
-    """
-    inside = np.isfinite(p)
-    if inside.sum() < max(LEAST_FRAMES, WITHIN * len(h) - 1):
-        return 1.0
-    p, h = p[inside], h[inside]
-    # The state of rest weighs as much as all frames together, in the functions only.
-    anchored = (p, h, rest, 0.0), (h, p, 0.0, rest)
-    return sum(_left_over(*one) for one in anchored) / 2
-
-
-def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
-    """Share of the variance of y that no rising function of x through the rest explains."""
-    from scipy.optimize import isotonic_regression
-
-    total = float(np.sum((y - y.mean()) ** 2))
-    if not total > 0:
-        return 1.0
-    weight = np.append(np.ones(len(x)), float(len(x)))
-    all_x, all_y = np.append(x, x_rest), np.append(y, y_rest)
-    # A function has one value where x has one: readings of one pressure are put together.
-    which = np.unique(all_x, return_inverse=True)[1]
-    sums = np.bincount(which, weight)
-    rising = isotonic_regression(np.bincount(which, weight * all_y) / sums, weights=sums).x
-    return float(np.sum((y - rising[which[:-1]]) ** 2)) / total
 
 
 def _half_range(each: Array) -> Array:

@@ -10,22 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.channels import Channel
-from ...data.clock_offset import ClockOffset, find_offset, given_offset
-from ...data.column_names import PRESSURE_UNITS, TIME_UNITS
+from ...data.clock_offset import ClockOffset
+from ...data.column_names import PRESSURE_UNITS
 from ...data.file_values import value_in_file
 from ...data.frame_choice import choose_frames
-from ...data.frames import FrameOptions, read_frames
-from ...data.machine_loads import read_times
+from ...data.frames import FrameOptions
 from ...data.name_numbers import check_pattern, number_in_name
-from ...data.pressure_log import LogOptions, apex_heights, read_pressure_log
 from ...errors import InputError
 from ..base import Place
-from ..channels import channel_of
-from ..formats import named_format
-from .pressure_section import LogSection, PressureSection
+from .frame_clock import AT, log_files, pressures_by_log
+from .pressure_section import PressureSection
 
 Array = NDArray[np.float64]
-AT = "data.points.pressure"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +77,7 @@ def recorded_frames(
     _check(section, asked, place)
     clock, names = None, [file.name for file in files]
     if section.log is not None:
-        clock, names = _by_log(section.log, files, options, format, place, folder)
+        clock, names = pressures_by_log(section.log, files, options, format, place, folder)
         pressures, source = clock.pressure, f"the log {section.log.file}"
     elif section.column is not None:
         channel = Channel(section.column, section.unit, section.scale, section.offset)
@@ -113,16 +109,7 @@ def recorded_frames(
         left_out=chosen.left_out,
         doubt=None if clock is None else clock.doubt[taken],
         clock=clock,
-        logs=_logs(section.log, place, folder),
-    )
-
-
-def _logs(section: LogSection | None, place: Place, folder: Path) -> tuple[Path, ...]:
-    if section is None:
-        return ()
-    named = {"file": section.file, "times": section.times}
-    return tuple(
-        _beside(name, place, folder, f"{AT}.log.{key}") for key, name in named.items() if name
+        logs=log_files(section.log, place, folder),
     )
 
 
@@ -145,88 +132,3 @@ def _check(section: PressureSection, asked: Sequence[float] | None, place: Place
         problem = check_pattern(pattern) if isinstance(pattern, str) else None
         if problem is not None:
             raise place.error(key, problem)
-
-
-def _by_log(
-    section: LogSection,
-    files: Sequence[Path],
-    options: FrameOptions,
-    format: str | None,
-    place: Place,
-    folder: Path,
-) -> tuple[ClockOffset, list[str]]:
-    """The pressures of all frames by a log, and what the frames are called."""
-    at = f"{AT}.log"
-    file = _beside(section.file, place, folder, f"{at}.file")
-    log = read_pressure_log(
-        file,
-        LogOptions(
-            channel_of(section.pressure),
-            channel_of(section.time),
-            named_format(place, f"{at}.format", "machine table", section.format),
-            section.comment,
-            section.decimal,
-        ),
-    )
-    heights, names = [], []
-    for one in files:
-        # One file at a time: all frames of a test need not be in memory at once.
-        risen = apex_heights(read_frames([one], options, format))
-        heights += risen.tolist()
-        several = len(risen) > 1
-        names += [f"{one.name}, frame {i + 1}" if several else one.name for i in range(len(risen))]
-    height = np.array(heights)
-    try:
-        times = _frame_times(section, files, len(height), place, folder)
-        if section.offset is not None:
-            given = section.offset
-            return given_offset(given, times, height, log.time, log.pressure), names
-        return find_offset(times, height, log.time, log.pressure), names
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise place.error(f"{at}.{error.field}".rstrip("."), error.problem) from None
-
-
-def _frame_times(
-    section: LogSection, files: Sequence[Path], count: int, place: Place, folder: Path
-) -> Array:
-    """Times (frames,) in s by the camera's clock."""
-    by_name = bool(section.time_in_name)
-    if by_name == (section.times is not None) and (by_name or section.rate is None):
-        problem = "expected one of 'rate', 'times' and 'time_in_name' for the times of the frames"
-        raise InputError(None, "", problem)
-    if section.times_column is not None and section.times is None:
-        raise InputError(None, "times_column", "means nothing without 'times'")
-    if section.times is not None:
-        if section.rate is not None:
-            raise InputError(None, "rate", "means nothing beside 'times'")
-        path = _beside(section.times, place, folder, f"{AT}.log.times")
-        times = read_times(path, section.times_column, section.comment, section.decimal)
-        if len(times) != count:
-            problem = f"expected one time for each of the {count} frames, got {len(times)}"
-            raise InputError(path, "", problem)
-        return times
-    if not by_name:
-        assert section.rate is not None
-        return np.arange(count) / section.rate
-    if len(files) != count:
-        raise InputError(
-            None, "time_in_name", "a file holds several frames; give 'rate' or 'times'"
-        )
-    pattern = section.time_in_name if isinstance(section.time_in_name, str) else None
-    if section.rate is not None and pattern is None:
-        problem = "with 'rate', expected a pattern whose group is the number of the picture"
-        raise InputError(None, "time_in_name", problem)
-    numbers = np.array(
-        [number_in_name(f, TIME_UNITS, pattern, None, "time_in_name") for f in files]
-    )
-    return numbers / (section.rate or 1.0)
-
-
-def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
-    """A file beside the frames, in the folder of the data, or beside the project."""
-    for home in (folder, place.path.parent):
-        if (home / name).is_file():
-            return home / name
-    raise place.error(field, f"there is no file {folder / name}; --data DIR names another folder")
