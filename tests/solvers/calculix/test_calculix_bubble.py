@@ -247,7 +247,7 @@ def context(**changes):
         "title": "", "version": "", "mesh_file": "m", "material": "@M", "constants": [],
         "state_variables": 6, "element": "S4", "thickness": 0.81, "supports": [],
         "force_tolerance": 1e-7, "correction_tolerance": 1e-6, "time_incrementation": "",
-        "most_increments": 9, "steps": [step],
+        "most_increments": 9, "steps": [step], "rim": [],
     }  # fmt: skip
     return {**plain, **changes}
 
