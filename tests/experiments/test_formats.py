@@ -17,5 +17,5 @@ def test_a_format_is_checked_where_it_is_named():
     assert named_format(PLACE, "data.points.format", "frame", "csv") == "csv"
     with pytest.raises(InputError) as caught:
         named_format(PLACE, "data.points.format", "frame", "davis-9")
-    words = "fabric.toml: bubble[0].data.points.format: 'davis-9' is not one of: csv"
+    words = "fabric.toml: bubble[0].data.points.format: 'davis-9' is not one of: aramis, csv"
     assert str(caught.value).startswith(words)

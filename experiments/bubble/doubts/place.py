@@ -27,7 +27,7 @@ def camera_height(view: View, expected: Expected) -> list[Doubt]:
     if abs(height) < HIGH * view.radius:
         return []
     text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
-    return [Doubt("camera-frame", True, text)]
+    return [Doubt("camera-frame", False, text)]
 
 
 def off_centre(view: View, expected: Expected) -> list[Doubt]:

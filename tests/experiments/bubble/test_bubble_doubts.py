@@ -150,7 +150,7 @@ TRAPS = {
         in_camera(Rotation.identity(), (3.0, 4.0, 0.0)), "off-centre", False, "x = 3, y = 3.99 mm",
     ),
     "in the camera's heights": (
-        in_camera(Rotation.identity(), (0.0, 0.0, 600.0)), "camera-frame", True, "z = 600",
+        in_camera(Rotation.identity(), (0.0, 0.0, 600.0)), "camera-frame", False, "z = 600",
     ),
 }  # fmt: skip
 
