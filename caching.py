@@ -24,6 +24,7 @@ KERNELS = (
     "meshes/volume.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/sensitivity.py",
+    "solvers/membrane/sheet_sensitivity.py",
 )
 
 

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 MEMORY = Path("/dev/shm")
 #: Free space (bytes) below which runs go to the disk instead; a bubble takes about 2 MB.
 ROOM = 256 * 1024**2
-_INTERRUPTIONS = {signal.SIGINT, signal.SIGTERM}
+_INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM)
 #: Folders of runs under way. An interruption can fall between any two lines, also within the
 #: removal of a folder: what it leaves is removed at the end of the process.
 _under_way: set[Path] = set()
@@ -120,12 +120,20 @@ def remove_interrupted() -> None:
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Holds interruptions off: in the main thread, which alone is interrupted."""
+    """Holds interruptions off by handlers that wait; only the main thread is interrupted.
+
+    A mask of signals would not do: another thread of the process then takes them.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTIONS)
+    came: list[int] = []
+    before = {n: signal.signal(n, lambda number, _: came.append(number)) for n in _INTERRUPTIONS}
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in before.items():
+            # None: whoever set it was no Python, and cannot be set again.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
