@@ -135,5 +135,5 @@ def _undisturbed() -> Iterator[None]:
         for number, handler in before.items():
             # None: whoever set it was no Python, and cannot be set again.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
+        if came:
+            signal.raise_signal(came[0])
