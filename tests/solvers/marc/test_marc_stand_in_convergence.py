@@ -25,6 +25,9 @@ from .test_marc_stand_in_results import bubble
 __all__ = ["marc"]
 
 LAW = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
+#: Errors at a tolerance of 0.3 are half as large again: 9e-2 and 1.5e-5. At 0.9 what is found, if
+#: anything, is left to rounding.
+LOOSE = {"bubble": 5e-2, "cylinder": 1e-5}
 MODELS = {
     "bubble": bubble(),
     "cylinder": inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(2.0,)),
@@ -45,11 +48,11 @@ def exact():
 @pytest.mark.parametrize("name", MODELS)
 def test_a_loose_tolerance_is_worse_and_a_tight_one_better(name, exact):
     errors = []
-    for tolerance in (0.9, TOLERANCE, 1e-7):
+    for tolerance in (0.3, TOLERANCE, 1e-7):
         with converging(Control(tolerance, tolerance, 30)):
             errors.append(error(MembraneSolver().run(MODELS[name], LAW), exact[name]))
     loose, ours, tight = errors
-    assert loose > 3e-4
+    assert loose > LOOSE[name]
     assert ours < 5e-6  # six digits: Newton's method doubles them in the last iteration
     assert tight < 0.01 * ours
 
