@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.feasibility import allowed, draw
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import straight_strip
 from bubblefit.solvers.base import instability
 from bubblefit.solvers.membrane import bubble, factorisation
@@ -28,32 +29,55 @@ FREE = Unknowns.of(
 )
 
 
-@cache
-def drawn() -> HypoelasticLaw:
-    """The first random law that is stable at the last pressure and not at all of them."""
+#: Sewn 4 % too long both ways: pressed together at low pressures, taut from 97 kPa on. Which of
+#: its equilibria Newton finds does not hang on rounding, unlike that of a law that folds.
+LOOSE = replace(MODEL, slack=(0.04, 0.04))
+EVEN = HypoelasticLaw.linear(500.0, 500.0, 150.0)
+
+
+def drawn(number: int) -> list[HypoelasticLaw]:
+    """Random laws of the bubble's bounds, feasible; some are unstable somewhere."""
     draws = draw(FREE, np.random.default_rng([1, 0]), 2000)
-    for coefficients in draws[allowed(FREE, draws)][:120]:
-        law = LAW.with_beta(FREE.beta(FREE.at(coefficients)))
-        try:
-            found = MembraneSolver().run(MODEL, law).unstable
-        except SolverFailure:
-            continue
-        if found and "300 kPa" not in found:
-            return law
-    raise AssertionError("no such law in 120 draws")
+    some = draws[allowed(FREE, draws)][:number]
+    return [LAW.with_beta(FREE.beta(FREE.at(coefficients))) for coefficients in some]
 
 
-def test_a_law_that_is_stable_at_the_last_pressure_only() -> None:
-    """A weak shear modulus at small strains that grows later: a fold comes and goes."""
-    law = drawn()
-    history = MembraneSolver().run(MODEL, law)
-    differentiated, _ = MembraneSolver().run_with_sensitivity(MODEL, law)
-    assert history.unstable == differentiated.unstable == ("59 kPa",)
+def judged(
+    monkeypatch: pytest.MonkeyPatch, model: BubbleModel, law: HypoelasticLaw
+) -> list[tuple[bool, bool]]:
+    """At every increment: whether the least eigenvalue is positive, and what the solver says."""
+    every = replace(model, pressures=model.increments)
+    solver, pairs = MembraneSolver(), []
+    membrane = solver._membrane(every, law)
+    tangent, count = membrane.tangent, len(membrane.free)
+    accept = bubble.Record.accept
+
+    def look(self: bubble.Record, i: int, u: np.ndarray) -> None:
+        tangent.factor()
+        whole = np.linalg.inv(tangent.solve(np.eye(count)))
+        least = float(np.linalg.eigvalsh(0.5 * (whole + whole.T))[0])
+        pairs.append((least > 0, tangent.definite()))
+        accept(self, i, u)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bubble.Record, "accept", look)
+        solver._prepared = (every, membrane)
+        found = solver.run(every, law)
+    pressures = 1e3 * np.array(every.pressures)
+    unstable = np.array([not stable for stable, _ in pairs])
+    assert found.unstable == named(pressures[unstable], "kPa")
+    return pairs
+
+
+def test_a_bubble_that_is_stable_at_the_last_pressure_and_not_before() -> None:
+    history = MembraneSolver().run(LOOSE, EVEN)
+    differentiated, _ = MembraneSolver().run_with_sensitivity(LOOSE, EVEN)
+    assert history.unstable == differentiated.unstable == ("22 kPa", "59 kPa")
     assert history.stable is False
-    assert instability(history.unstable) == "unstable equilibrium at 59 kPa"
+    assert instability(history.unstable) == "unstable equilibrium at 22 kPa, 59 kPa"
     # At a pressure that nobody asks for it is no matter.
-    last = replace(MODEL, pressures=(0.251, 0.3))
-    assert MembraneSolver().run(last, law).unstable == ()
+    last = replace(LOOSE, pressures=(0.251, 0.3))
+    assert MembraneSolver().run(last, EVEN).unstable == ()
 
 
 @pytest.mark.parametrize("largest", [factorisation.LARGEST_BAND, 0], ids=["band", "sparse"])
@@ -62,25 +86,20 @@ def test_the_judgement_is_that_of_the_least_eigenvalue(
 ) -> None:
     """Of the symmetric part of the tangent as it is assembled, at every increment."""
     monkeypatch.setattr(factorisation, "LARGEST_BAND", largest)
-    solver, law, judged = MembraneSolver(), drawn(), []
-    membrane = solver._membrane(MODEL, law)
-    tangent, count = membrane.tangent, len(membrane.free)
-    accept = bubble.Record.accept
+    pairs = judged(monkeypatch, LOOSE, EVEN)
+    assert pairs == 4 * [(False, False)] + 5 * [(True, True)]
 
-    def look(self: bubble.Record, i: int, u: np.ndarray) -> None:
-        tangent.factor()
-        inverse = tangent.solve(np.eye(count))
-        whole = np.linalg.inv(inverse)
-        least = float(np.linalg.eigvalsh(0.5 * (whole + whole.T))[0])
-        judged.append((least > 0, tangent.definite()))
-        accept(self, i, u)
 
-    monkeypatch.setattr(bubble.Record, "accept", look)
-    every = replace(MODEL, pressures=MODEL.increments)
-    solver._prepared = (every, membrane)
-    solver.run(every, law)
-    assert len(judged) == len(MODEL.increments) and len({both for both, _ in judged}) == 2
-    assert all(expected == found for expected, found in judged)
+def test_laws_drawn_at_random_are_judged_by_the_least_eigenvalue(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whichever of its equilibria such a law comes to, what is said of it is true."""
+    agreements = []
+    for law in drawn(12):
+        with suppress(SolverFailure):
+            agreements += judged(monkeypatch, MODEL, law)
+    assert len(agreements) >= 9 * 6
+    assert all(expected == found for expected, found in agreements)
 
 
 @pytest.mark.parametrize("shear", [4.0, 8.0])
