@@ -112,6 +112,8 @@ def run_tasks(
                 left -= 1
                 record = record.record
             yield record
+        for worker in workers:  # nothing is left to do: they end by themselves
+            worker.join(GRACE_S)
     finally:
         # Twice: where Python ignores exceptions (a finaliser), the first one is lost.
         for _ in range(2):
@@ -176,3 +178,6 @@ def _work(prepare: Callable[[], Task], tasks: Any, records: Any, parent: int) ->
         os._exit(1)
     except Exception as error:
         tell(error)
+    # Nothing is left to remove, and an exception raised after this function would pass through
+    # the code of the parent, whose copy this process is: the end is an end at once.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)

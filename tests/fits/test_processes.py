@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing.util
 import os
+import signal
+import time
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +14,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.processes import run_starts
+from bubblefit.fits.processes import run_starts, run_tasks
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.comparison import Comparison
@@ -128,3 +131,42 @@ def test_the_processes_end_when_the_reader_stops() -> None:
             next(running)
         running.close()
         assert not multiprocessing.active_children()
+
+
+def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It is a copy of the parent: an exception would run through the code that started it."""
+    parent, leave = os.getpid(), os._exit
+
+    def told_to_end(status: int) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.1)
+        leave(status)
+
+    monkeypatch.setattr(os, "_exit", told_to_end)
+    try:
+        assert list(filter(None, run_tasks(lambda: lambda number, tell: 10 * number, [1, 2], 2)))
+    finally:
+        if os.getpid() != parent:
+            (tmp_path / "went on").touch()
+            leave(0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_processes_end_by_themselves_when_all_is_done(tmp_path: Path) -> None:
+    """They are not killed while they still write what they have to write."""
+    parent = os.getpid()
+
+    def ending() -> Any:
+        atexit = multiprocessing.util.Finalize(None, written, exitpriority=1)
+        assert atexit.still_active()
+        return lambda number, tell: number
+
+    def written() -> None:
+        assert os.getpid() != parent
+        time.sleep(0.2)
+        (tmp_path / str(os.getpid())).touch()
+
+    assert sorted(filter(None, run_tasks(ending, [1, 2, 3, 4], 2))) == [1, 2, 3, 4]
+    assert len(list(tmp_path.iterdir())) == 2

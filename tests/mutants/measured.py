@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
 from coverage import CoverageData
 
 from .house import environment
@@ -86,7 +87,11 @@ def _imports(path: Path, word: str) -> set[str]:
 def measure(
     house: Path, tests: Iterable[str], folder: Path, processes: int, seconds: float | None = None
 ) -> Measured:
-    """Run test files (not what is marked slow); raises TimeoutExpired after `seconds`."""
+    """Run test files (not what is marked slow).
+
+    Raises TimeoutExpired after `seconds`, ClickException where the run itself broke: what was not
+    measured must not be taken for lines that no test runs.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     settings = folder / "settings"
     settings.write_text(SETTINGS.format(house=house, folder=folder))
@@ -95,7 +100,7 @@ def measure(
     command += ["-m", "not slow", "-o", "junit_family=xunit1", f"--junitxml={folder}/times.xml"]
     command += ["--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report="]
     with (folder / "log").open("w") as log:
-        subprocess.run(
+        done = subprocess.run(
             [*command, *tests],
             cwd=house,
             env=environment(house),
@@ -103,6 +108,9 @@ def measure(
             stderr=log,
             timeout=seconds,
         )
+    if done.returncode > 1:  # 1: some tests failed, which are left out
+        tail = "\n".join((folder / "log").read_text().splitlines()[-5:])
+        raise click.ClickException(f"pytest ended with {done.returncode}: {folder}/log\n{tail}")
     return Measured(_lines(house, folder / "coverage"), _seconds(folder / "times.xml"))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import click
 import pytest
 
 from ..places import ROOT
@@ -152,6 +153,11 @@ def test_caught_survived_and_unrun(little: Path):
         "rooms/scale.py:6\n  - return mpa > 2\n  + return mpa > 3\n  (1 tests run it and pass)\n"
         "rooms/scale.py:14\n  - return mpa * 5\n  + return mpa // 5\n  (no test near it runs it)"
     )
+
+
+def test_a_run_that_breaks_is_no_run_without_lines(tmp_path: Path):
+    with pytest.raises(click.ClickException, match=r"pytest ended with 4: .*/run/log\n"):
+        measure(tmp_path, ["nothing.py"], tmp_path / "run", processes=1)
 
 
 def test_an_interrupted_run_leaves_the_code_as_it_was(tmp_path: Path):
