@@ -45,6 +45,12 @@ class DisplacementField:
     path: Path | None = None
     source: FrameSource = field(default_factory=FrameSource)
 
+    @property
+    def frame(self) -> Frame:
+        """The same as a frame; the sheet lies at z = 0 where its height was not measured."""
+        z = np.zeros(len(self.points)) if self.z is None else self.z
+        return Frame(np.column_stack([self.points, z]), self.displacement, self.path)
+
 
 def read_fields(
     files: Sequence[Path | str],

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from ...errors import InputError
 from ..fields import DisplacementField
-from ..frames import Frame
 from .register import ALL_FOUND, Registration, RegistrationOptions, register
 
 
@@ -33,7 +30,7 @@ def register_fields(
             problem = "the files have no height z of the reference state to lay a plane through"
             raise InputError(None, "plane", problem)
         options = replace(options, plane="camera")
-    frames, registration = register([_frame(field) for field in fields], semi_axes, options)
+    frames, registration = register([field.frame for field in fields], semi_axes, options)
     moved = [
         replace(
             field,
@@ -44,8 +41,3 @@ def register_fields(
         for field, frame in zip(fields, frames, strict=True)
     ]
     return tuple(moved), registration
-
-
-def _frame(field: DisplacementField) -> Frame:
-    z = np.zeros(len(field.points)) if field.z is None else field.z
-    return Frame(np.column_stack([field.points, z]), field.displacement, field.path)

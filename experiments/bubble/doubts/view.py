@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ....data.equilibrium import Apex, apex_of
 from ....data.fields import DisplacementField
-from ....data.frames import Frame
 from ....data.registration.rim import Rim, rim_of_motion
 from ....data.registration.symmetry import Axes, symmetry_axes
 from ....errors import InputError
@@ -69,13 +68,8 @@ class View:
         quarters = {(bool(x > 0), bool(y > 0)) for x, y in self.last.points}
         if len(quarters) < 4:
             return None
-        return symmetry_axes([_frame(field) for field in self.fields], self.radius)
+        return symmetry_axes([field.frame for field in self.fields], self.radius)
 
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
         """Points well within the rim."""
         return np.asarray(np.hypot(*field.points.T) < share * self.radius)
-
-
-def _frame(field: DisplacementField) -> Frame:
-    z = np.zeros(len(field.points)) if field.z is None else field.z
-    return Frame(np.column_stack([field.points, z]), field.displacement, field.path)
