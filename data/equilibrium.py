@@ -5,17 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from .apex_shape import POWERS, apex_shape
 from .fields import DisplacementField
-
-Array = NDArray[np.float64]
-
-#: Points within this share of the radius tell the shape about the apex.
-WITHIN = 0.5
-#: Powers of the polynomial through the deformed places, each up to a total of four.
-POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))
 
 
 @dataclass(frozen=True)
@@ -52,41 +45,33 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     ------
     InputError : too few points about the centre.
     """
-    x = field.points / radius
-    near = np.hypot(*x.T) < WITHIN
-    if near.sum() < 2 * len(POWERS):
-        problem = f"expected {2 * len(POWERS)} points about the centre, got {int(near.sum())}"
-        raise InputError(field.path, "", problem)
-    z = np.zeros(len(x)) if field.z is None else field.z
-    before = np.column_stack([field.points, z])[near]
-    after = before + field.displacement[near]
-    terms = np.stack([x[near, 0] ** i * x[near, 1] ** j for i, j in POWERS], axis=1)
-    solution, *_ = np.linalg.lstsq(terms, np.hstack([after, before]), rcond=None)
-    left = after[:, 2] - terms @ solution[:, 2]
-
-    def slope(i: int, j: int, factor: float = 1.0) -> Array:
-        return np.asarray(factor * solution[POWERS.index((i, j))] / radius ** (i + j))
-
-    tangents = np.stack([slope(1, 0), slope(0, 1)])
+    before = field.frame.points
+    after = before + field.displacement
+    try:
+        shape = apex_shape(field.points, np.hstack([after, before]), radius)
+    except InputError as error:
+        raise InputError(field.path, error.field, error.problem) from None
+    left = after[shape.near, 2] - shape.terms @ shape.coefficients[:, 2]
+    tangents = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
     metric = tangents[:, :3] @ tangents[:, :3].T
     first = tangents[:, 3:] @ tangents[:, 3:].T
     normal = np.cross(tangents[0, :3], tangents[1, :3])
     normal /= np.linalg.norm(normal)
     second = np.array(
         [
-            [slope(2, 0, 2.0)[:3] @ normal, slope(1, 1)[:3] @ normal],
-            [slope(1, 1)[:3] @ normal, slope(0, 2, 2.0)[:3] @ normal],
+            [shape.at_centre(2, 0)[:3] @ normal, shape.at_centre(1, 1)[:3] @ normal],
+            [shape.at_centre(1, 1)[:3] @ normal, shape.at_centre(0, 2)[:3] @ normal],
         ]
     )
     curvature = -float(np.trace(np.linalg.solve(metric, second)))
     force = field.pressure / curvature if curvature > 0 else float("inf")
     variance = float(left @ left) / max(len(left) - len(POWERS), 1)
-    inverse = np.linalg.pinv(terms.T @ terms)
+    inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
     both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
     spread = float(np.sqrt(variance * inverse[np.ix_(both, both)].sum())) * 2 / radius**2
     stretch = np.sqrt(np.diag(metric) / np.diag(first))
     strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
-    centre = POWERS.index((0, 0))
-    height = float(solution[centre, 2] - solution[centre, 5])
+    centre = shape.at_centre()
+    height = float(centre[2] - centre[5])
     relative = spread / curvature if curvature > 0 else float("inf")
     return Apex(field.pressure, height, curvature, force, force * relative, strain)

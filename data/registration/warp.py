@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..apex_shape import apex_shape
 from ..frames import Frame
 from .symmetry import symmetry_axes
 
 Array = NDArray[np.float64]
 
-#: Points within this share of the radius tell the strain at the centre.
-WITHIN = 0.5
-#: Powers of the displacement's polynomial about the centre, each up to a total of four.
-POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))
 #: Standard error of the axes (degrees) above which the field does not tell them, and how clear
 #: they must be at least.
 UNSURE, CLEAR = 5.0, 0.5
@@ -79,16 +76,11 @@ def centre_strain(frame: Frame, radius: float) -> Array:
     ------
     InputError : too few points about the centre.
     """
-    x = frame.points[:, :2] / radius
-    whole = np.isfinite(frame.displacement).all(axis=1) & (np.hypot(*x.T) < WITHIN)
-    x, moved = x[whole], frame.displacement[whole]
-    if len(x) < 2 * len(POWERS):
-        problem = f"expected {2 * len(POWERS)} points about the centre, got {len(x)}"
-        raise InputError(None, "warp", problem)
-    terms = np.stack([x[:, 0] ** i * x[:, 1] ** j for i, j in POWERS], axis=1)
-    solution, *_ = np.linalg.lstsq(terms, moved, rcond=None)
-    gradient = np.stack([solution[POWERS.index((1, 0))], solution[POWERS.index((0, 1))]]) / radius
-    tangents = np.eye(3)[:2] + gradient
+    try:
+        shape = apex_shape(frame.points[:, :2], frame.displacement, radius)
+    except InputError as error:
+        raise InputError(None, "warp", error.problem) from None
+    tangents = np.eye(3)[:2] + np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
     return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
 
 
