@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Frame
+from .directions import in_all_quarters
 
 Array = NDArray[np.float64]
 
@@ -54,8 +55,7 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
     """
     whole = clamp & np.isfinite(frame.displacement).all(axis=1)
     before = frame.points[whole]
-    quarters = {(bool(x > 0), bool(y > 0)) for x, y in before[:, :2]}
-    if len(before) < LEAST or len(quarters) < 4:
+    if len(before) < LEAST or not in_all_quarters(before):
         return UNKNOWN
     after = before + frame.displacement[whole]
     middle_before, middle_after = before.mean(axis=0), after.mean(axis=0)

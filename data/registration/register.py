@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..frames import Frame
 from .clamp import LEAST, UNKNOWN, RigidMotion, clamp_motion, clamp_points, without
+from .directions import in_all_quarters
 from .placement import Placement, all_applied, shifted, turned
 from .plane import plane_through
 from .rim import Rim, rim_of_motion
@@ -179,8 +180,7 @@ def _rim_points(
     points: Array, semi_axes: tuple[float, float], options: RegistrationOptions
 ) -> tuple[NDArray[np.bool_], str]:
     beyond = clamp_points(points, semi_axes)
-    quarters = {(bool(x > 0), bool(y > 0)) for x, y in points[beyond, :2]}
-    seen = beyond.sum() >= LEAST and len(quarters) == 4
+    seen = beyond.sum() >= LEAST and in_all_quarters(points[beyond])
     if options.plane == "clamp" and not seen:
         problem = "too few points beyond the rim to lay a plane through the clamp; choose 'edge'"
         raise InputError(None, "plane", problem)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ....data.equilibrium import Apex, apex_of
 from ....data.fields import DisplacementField
+from ....data.registration.directions import in_all_quarters
 from ....data.registration.rim import Rim, rim_of_motion
 from ....data.registration.symmetry import Axes, symmetry_axes
 from ....errors import InputError
@@ -65,8 +66,7 @@ class View:
     @cached_property
     def axes(self) -> Axes | None:
         """About which the fields are symmetric; None where points lie on one side only."""
-        quarters = {(bool(x > 0), bool(y > 0)) for x, y in self.last.points}
-        if len(quarters) < 4:
+        if not in_all_quarters(self.last.points):
             return None
         return symmetry_axes([field.frame for field in self.fields], self.radius)
 
