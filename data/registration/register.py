@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..frames import Frame
 from .clamp import LEAST, UNKNOWN, RigidMotion, clamp_motion, clamp_points, without
-from .directions import in_all_quarters
+from .directions import in_all_quarters, line_angle
 from .placement import Placement, all_applied, shifted, turned
 from .plane import plane_through
 from .rim import Rim, rim_of_motion
@@ -216,4 +216,4 @@ def _warp(
 def _from_camera_x(placement: Placement) -> float:
     """Degrees from the camera's x, laid into the plane, to the test's x."""
     x = placement.axes @ np.array([1.0, 0.0, 0.0])
-    return float((-np.degrees(np.arctan2(x[1], x[0])) + 90.0) % 180.0 - 90.0)
+    return line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Frame
+from .directions import axes_angle
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,11 @@ class Axes:
     angle: float
     error: float
     clear: float
+
+    @property
+    def off(self) -> float:
+        """How far they are turned from x and y, degrees, from -45 to below 45."""
+        return axes_angle(self.angle)
 
 
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:

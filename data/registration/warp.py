@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..apex_shape import apex_shape
 from ..frames import Frame
+from .directions import line_angle
 from .symmetry import symmetry_axes
 
 Array = NDArray[np.float64]
@@ -65,8 +66,7 @@ def warp_of_field(
     angle = axes.angle
     if (along > across) == warp_is_stiff:
         angle, along, across = angle + 90.0, across, along
-    angle = (angle + 90.0) % 180.0 - 90.0
-    return WarpDirection(float(angle), axes.error, axes.clear, (along, across))
+    return WarpDirection(line_angle(angle), axes.error, axes.clear, (along, across))
 
 
 def centre_strain(frame: Frame, radius: float) -> Array:
@@ -94,4 +94,4 @@ def warp_of_points(first: Array, second: Array) -> float:
     x, y = np.asarray(second, dtype=float) - np.asarray(first, dtype=float)
     if np.hypot(x, y) < 1e-9:
         raise InputError(None, "warp", "expected two different points along the warp")
-    return float((np.degrees(np.arctan2(y, x)) + 90.0) % 180.0 - 90.0)
+    return line_angle(float(np.degrees(np.arctan2(y, x))))

@@ -34,9 +34,8 @@ def _facts(prepared: PreparedBubble) -> list[tuple[str, object]]:
             ("the sheet rises about, mm", f"{rim.x:.2f}, {rim.y:.2f} (+- {rim.error:.2g})")
         )
     if view.axes is not None:
-        angle = (view.axes.angle + 45.0) % 90.0 - 45.0
         clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
-        facts.append(("axes of symmetry, degrees from x and y", f"{angle:.2f} ({clear})"))
+        facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
     return facts
 
 

@@ -67,11 +67,10 @@ def turned(view: View, expected: Expected) -> list[Doubt]:
     """Warp and fill are not along x and y."""
     if view.axes is None or view.axes.clear < CLEAR or view.rim is None:
         return []
-    angle = (view.axes.angle + 45.0) % 90.0 - 45.0
-    if abs(angle) < max(TURN, SURE * view.axes.error):
+    if abs(view.axes.off) < max(TURN, SURE * view.axes.error):
         return []
     text = (
-        f"the fields are symmetric about axes {angle:.3g} degrees from x and y (+- "
+        f"the fields are symmetric about axes {view.axes.off:.3g} degrees from x and y (+- "
         f"{view.axes.error:.2g}): warp and fill lie there; {ADVICE}"
     )
     return [Doubt("turned", False, text)]
