@@ -55,7 +55,7 @@ class RegistrationOptions:
 
     def __post_init__(self) -> None:
         if self.warp is not None and self.warp_points is not None:
-            problem = "expected an angle or two points along the warp, not both"
+            problem = "expected an angle 'warp' or two points 'warp_points', not both"
             raise InputError(None, "warp", problem)
 
 

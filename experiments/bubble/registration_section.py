@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...data.registration.register import PlaneOf, RegistrationOptions
+from ...errors import InputError
 from ...sections import Number, Section
 from ..base import Place
 
@@ -38,21 +39,21 @@ def registration_options(
     """
     if section is None:
         return None
-    if section.warp is not None and section.warp_points is not None:
-        problem = "expected an angle 'warp' or two points 'warp_points', not both"
-        raise place.error("data.points.registration.warp", problem)
     marks = None
     if section.warp_points is not None:
         first, second = (_point(one, scale) for one in section.warp_points)
         marks = (first, second)
-    return RegistrationOptions(
-        plane=section.plane,
-        centre=None if section.centre is None else _point(section.centre, scale),
-        warp=section.warp,
-        warp_points=marks,
-        warp_is_stiff=section.warp_is == "stiff",
-        remove_clamp_motion=section.remove_clamp_motion,
-    )
+    try:
+        return RegistrationOptions(
+            plane=section.plane,
+            centre=None if section.centre is None else _point(section.centre, scale),
+            warp=section.warp,
+            warp_points=marks,
+            warp_is_stiff=section.warp_is == "stiff",
+            remove_clamp_motion=section.remove_clamp_motion,
+        )
+    except InputError as error:
+        raise place.error(f"data.points.registration.{error.field}", error.problem) from None
 
 
 def _point(given: list[float], scale: float) -> tuple[float, float, float]:
