@@ -7,18 +7,16 @@ from typing import Any
 
 import click
 
-from .options import data_folders
+from .arguments import DATA, PROJECT
+from .options import data_folders, folder_beside
 from .predicting import prediction_options, run_predictions
 
 KIND = "cylinder"
 
 
 @click.command("bend")
-@click.argument("project", type=click.Path(path_type=Path))
-@click.option(
-    "--data", multiple=True, metavar="[TEST=]DIR",
-    help="Folder of the measured data, of all tests or of one; several.",
-)  # fmt: skip
+@PROJECT
+@DATA
 @click.option(
     "--test", "--case", "tests", multiple=True, help="A cylinder by its name; several [all]."
 )
@@ -47,8 +45,7 @@ def command(
     settings = read_project(project, data_folders(data))
     folder = options["out"]
     if folder is None:
-        own = usual_folder(project)
         # Beside the folder of the project's fits, where it has any.
         alone = all(test.kind == KIND for test in settings.tests.values())
-        folder = own if alone else own.with_name(f"{own.name}-bend")
+        folder = usual_folder(project) if alone else folder_beside(project, "bend")
     run_predictions(settings, folder, options, tests or [KIND], cards)

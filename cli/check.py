@@ -8,22 +8,19 @@ from pathlib import Path
 
 import click
 
-from .options import data_folders, exits
+from .arguments import DATA, PROJECT, TESTS, TRUST, out_option
+from .exits import exits
+from .options import data_folders, folder_beside
 
 DOUBTFUL = 2  # as for any bad input
 
 
 @click.command("check")
-@click.argument("project", type=click.Path(path_type=Path))
-@click.option("--test", "tests", multiple=True, help="A test by its name; several [all].")
-@click.option("--out", type=click.Path(path_type=Path), help="Output folder [out/NAME-check].")
-@click.option(
-    "--data",
-    multiple=True,
-    metavar="[TEST=]DIR",
-    help="Folder of the measured data, of all tests or of one; several.",
-)
-@click.option("--trust", multiple=True, metavar="NAME", help="Let a doubt pass; several.")
+@PROJECT
+@TESTS
+@out_option("out/NAME-check")
+@DATA
+@TRUST
 @click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
 @exits
 def command(
@@ -43,11 +40,9 @@ def command(
     """
     from ..fits.check import check
     from ..fits.project import read_project
-    from ..fits.store import usual_folder
 
     found = check(read_project(project, data_folders(data)), tests or None, trust)
-    usual = usual_folder(project)
-    folder = out or usual.with_name(f"{usual.name}-check")
+    folder = out or folder_beside(project, "check")
     found.report(folder)
     if as_json:
         click.echo(json.dumps(found.result, indent=1))

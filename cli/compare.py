@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from .fitting import fit_options
-from .options import command_line, data_folders, read_with_solver
+from .options import command_line, data_folders, folder_beside, read_with_solver
 from .progress import StudyProgress
 
 
@@ -35,14 +35,12 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     more coefficients are worth it. Writes comparison.csv, figures, report.html and result.json, and
     a folder for each form, into the output folder.
     """
-    from ..fits.store import usual_folder
     from ..notes import lines as note_lines
     from ..studies.law_words import lines_of
     from ..studies.laws import STARTS, compare_laws
 
     path: Path = options["project"]
-    usual = usual_folder(path)
-    folder: Path = options["out"] or usual.with_name(f"{usual.name}-compared")
+    folder: Path = options["out"] or folder_beside(path, "compared")
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
     project = project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")})
     starts = options["starts"] or STARTS

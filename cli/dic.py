@@ -17,8 +17,8 @@ from ..data.tables import write_table
 from ..errors import InputError, OutputError
 from ..sections import LENGTH_UNITS
 from ..writing import replacing
-from .frame_arguments import check_out, columns_named
-from .options import exits
+from .exits import exits
+from .frame_arguments import check_out, columns_named, frame_options
 
 #: What a frame must hold; where it has displacements, too, they are added.
 PLACES = ("x", "y", "z")
@@ -36,12 +36,7 @@ def command() -> None:
     type=click.FloatRange(min=0, min_open=True),
     help="Of the ball, mm: the deviation from it is told.",
 )
-@click.option("--format", metavar="NAME", help="Of the frames; found by their content.")
-@click.option("--columns", metavar="x=..,..", help="Names in the files, where not found.")
-@click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost.")
-@click.option(
-    "--length-unit", type=click.Choice(list(LENGTH_UNITS)), default="mm", help="Of the files [mm]."
-)
+@frame_options
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Table to write (CSV), and beside it a picture."
 )

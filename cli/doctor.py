@@ -16,7 +16,7 @@ from ..solvers.base import Diagnosis
 from ..solvers.diagnosis import diagnose
 from ..solvers.overrides import command_line
 from ..solvers.registry import solver_names
-from .options import exits
+from .exits import exits
 
 UNUSABLE = 4
 

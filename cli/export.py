@@ -15,7 +15,7 @@ from ..materials.exports.formats import Option, options_of
 from ..notes import rows
 from ..solvers.exports import FORMATS
 from ..writing import replacing
-from .options import exits
+from .exits import exits
 
 
 def format_options(command: Any) -> Any:

@@ -11,40 +11,47 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from .options import command_line, data_folders, read_with_solver, solver_choice, with_checks
+from .arguments import (
+    AS_JSON,
+    DATA,
+    JOBS,
+    OVERWRITE,
+    PROJECT,
+    QUIET,
+    TESTS,
+    TRUST,
+    Decorator,
+    out_option,
+    solver_choice,
+    with_checks,
+)
+from .exits import WORSE, resumable
+from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 
 if TYPE_CHECKING:
     from ..fits.result import Fit
 
-WORSE = 1  # exit code of --fail-above
-
 
 def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """PROJECT and the options of every fit; the command gets them by name, errors are handled."""
-    path = click.Path(path_type=Path)
-    decorators: list[Callable[..., Any]] = [
-        click.argument("project", type=path),
-        click.option("--test", "tests", multiple=True, help="A test by its name; several [all]."),
-        click.option("--out", type=path, help="Output folder [out/NAME]."),
-        click.option(
-            "--data", multiple=True, metavar="[TEST=]DIR",
-            help="Folder of the measured data, of all tests or of one; several.",
-        ),
+    decorators: list[Decorator] = [
+        PROJECT,
+        TESTS,
+        out_option(),
+        DATA,
         click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
         click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
-        click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores]."),
+        JOBS,
         click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
         solver_choice,
         click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E."),
-        click.option(
-            "--trust", multiple=True, metavar="NAME", help="Let a doubt of the data pass; several."
-        ),
+        TRUST,
         click.option("--resume", is_flag=True, help="Go on with an interrupted fit."),
-        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
-        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
-        click.option("--quiet", is_flag=True, help="No progress."),
-    ]  # fmt: skip
+        OVERWRITE,
+        AS_JSON,
+        QUIET,
+    ]
     return with_checks(command, decorators)
 
 
@@ -64,25 +71,21 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     folder: Path = options["out"] or usual_folder(path)
     quiet = options["quiet"] or options["as_json"]
     starts = options["starts"] or project.fit.starts
-    try:
-        with StudyProgress(starts, quiet) as progress:
-            result = fit(
-                project,
-                _tests(options["tests"], kind, project.tests, path),
-                starts=options["starts"],
-                seed=options["seed"],
-                method=options["method"],
-                jobs=options["jobs"],
-                trust=options["trust"],
-                out=folder,
-                resume=options["resume"],
-                overwrite=options["overwrite"],
-                progress=progress.saw,
-                command_line=command_line(),
-            )
-    except KeyboardInterrupt:
-        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
-        raise
+    with resumable(folder), StudyProgress(starts, quiet) as progress:
+        result = fit(
+            project,
+            _tests(options["tests"], kind, project.tests, path),
+            starts=options["starts"],
+            seed=options["seed"],
+            method=options["method"],
+            jobs=options["jobs"],
+            trust=options["trust"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress.saw,
+            command_line=command_line(),
+        )
     result.report(folder)
     tell(result, folder, options["fail_above"], options["as_json"])
 

@@ -1,12 +1,28 @@
-"""What commands that read frames share: names of columns as an option, a file to write."""
+"""What commands that read frames share: how they are read, a file to write."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+import click
+
 from ..data.frames import QUANTITIES
 from ..errors import InputError, OutputError
+from ..sections import LENGTH_UNITS
+from .arguments import Command, Decorator, with_options
+
+
+def frame_options(command: Command) -> Command:
+    """How the files are read: --format, --columns, --flag-column, --length-unit."""
+    units = click.Choice(list(LENGTH_UNITS))
+    decorators: list[Decorator] = [
+        click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
+        click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
+        click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
+        click.option("--length-unit", type=units, default="mm", help="Of the files [mm]."),
+    ]
+    return with_options(command, decorators)
 
 
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:

@@ -20,8 +20,8 @@ from ..data.gauge_table import GaugeTable
 from ..errors import InputError
 from ..notes import lines as note_lines
 from ..sections import LENGTH_UNITS
-from .frame_arguments import check_out, columns_named
-from .options import exits
+from .exits import exits
+from .frame_arguments import check_out, columns_named, frame_options
 
 FILE = click.Path(path_type=Path)
 #: Options that say something of the loads, by the name of the argument.
@@ -42,12 +42,7 @@ ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", 
     "--upper", type=float, nargs=2, required=True, metavar="X Y", help="The other end, mm."
 )
 @click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
-@click.option("--format", metavar="NAME", help="Of the frames; found by their content.")
-@click.option("--columns", metavar="x=..,..", help="Names in the files, where not found.")
-@click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost.")
-@click.option(
-    "--length-unit", type=click.Choice(list(LENGTH_UNITS)), default="mm", help="Of the files [mm]."
-)
+@frame_options
 @click.option(
     "--max-gap",
     type=click.FloatRange(min=0, min_open=True),

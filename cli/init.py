@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from ..errors import InputError, OutputError
-from .options import exits, numbers
+from .exits import exits
+from .options import numbers
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 #: By name: the folder of the example, and what to type next (in the folder that was written).

@@ -1,61 +1,21 @@
-"""What the commands share: errors to exit codes, options, projects with a solver, cards."""
+"""What commands make of their options: folders, projects with a solver, cards, numbers."""
 
 from __future__ import annotations
 
-import functools
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import BubblefitError, InputError, OutputError
+from ..errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from ..fits.project import Project
     from ..materials.card import MaterialCard
 
-INTERRUPTED = 130
 #: Where click keeps what was typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
-
-
-def exits(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Deliberate errors become one line on stderr and their exit code; Ctrl-C becomes 130."""
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return command(*args, **kwargs)
-        except BubblefitError as error:
-            click.echo(f"bubblefit: {error}", err=True)
-            sys.exit(error.exit_code)
-        except KeyboardInterrupt:
-            click.echo("bubblefit: interrupted", err=True)
-            sys.exit(INTERRUPTED)
-
-    return wrapped
-
-
-def with_checks(
-    command: Callable[..., Any], decorators: Sequence[Callable[..., Any]]
-) -> Callable[..., Any]:
-    """A study's command with its options, --resume, --overwrite and --fail-above checked."""
-
-    @functools.wraps(command)
-    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-        above = kwargs["fail_above"]
-        if resume and overwrite:
-            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-        if above is not None and not above >= 0:
-            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
-        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
-
-    wrapped = exits(checked)
-    for decorate in reversed(decorators):
-        wrapped = decorate(wrapped)
-    return wrapped
 
 
 def command_line() -> list[str]:
@@ -81,6 +41,14 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
     return folders or (Path(given[0]) if given else None)
 
 
+def folder_beside(project: Path, suffix: str) -> Path:
+    """The usual output folder of what is no fit: out/NAME-`suffix`."""
+    from ..fits.store import usual_folder
+
+    own = usual_folder(project)
+    return own.with_name(f"{own.name}-{suffix}")
+
+
 def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool) -> Path:
     """The output folder of one analysis or study: `out`, or out/NAME-`suffix`.
 
@@ -88,34 +56,10 @@ def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool)
     ------
     OutputError : it holds a result already and may not be written over.
     """
-    from ..fits.store import usual_folder
-
-    own = usual_folder(project)
-    folder = out or own.with_name(f"{own.name}-{suffix}")
+    folder = out or folder_beside(project, suffix)
     if (folder / "result.json").exists() and not overwrite:
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
     return folder
-
-
-def solver_choice(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options that pick a solver; the command is given them as one dict, `solver_given`."""
-    from ..solvers.overrides import ANY, command_line
-
-    known = command_line()
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, solver: str | None, solver_option: Sequence[str], **kwargs: Any) -> Any:
-        given = {"solver": solver, "settings": solver_option}
-        given |= {one.name: kwargs.pop(one.name) for one in known}
-        return command(*args, solver_given=given, **kwargs)
-
-    words = "A setting of the solver as in [solver.NAME]; may be given more than once."
-    decorated = click.option(f"--{ANY}", metavar="KEY=VALUE", multiple=True, help=words)(wrapped)
-    for one in reversed(known):
-        kind = click.Path(path_type=Path) if one.path else str
-        option = click.option(f"--{one.name}", metavar=one.metavar, type=kind, help=one.what)
-        decorated = option(decorated)
-    return click.option("--solver", metavar="NAME", help="Solver that runs the model.")(decorated)
 
 
 def read_with_solver(

@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError, SolverFailure
-from .options import command_line, solver_choice, with_checks, with_solver
+from .arguments import (
+    AS_JSON,
+    JOBS,
+    OVERWRITE,
+    QUIET,
+    Decorator,
+    out_option,
+    solver_choice,
+    with_checks,
+)
+from .exits import WORSE, resumable
+from .options import command_line, with_solver
 from .progress import RunsProgress
 
 if TYPE_CHECKING:
@@ -19,24 +30,24 @@ if TYPE_CHECKING:
     from ..fits.project import Project
     from ..materials.card import MaterialCard
 
-WORSE = 1  # exit code of --fail-above
-
 
 def prediction_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of every series of predictions; the command gets them by name."""
-    decorators: list[Callable[..., Any]] = [
-        click.option("--out", type=click.Path(path_type=Path), help="Output folder [out/NAME]."),
-        click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores]."),
+    decorators: list[Decorator] = [
+        out_option(),
+        JOBS,
         solver_choice,
         click.option(
-            "--fail-above", type=float, metavar="E",
+            "--fail-above",
+            type=float,
+            metavar="E",
             help="Exit 1 when an RMS error is above E of the largest measured load.",
         ),
         click.option("--resume", is_flag=True, help="Keep the runs that the output folder holds."),
-        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
-        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
-        click.option("--quiet", is_flag=True, help="No progress."),
-    ]  # fmt: skip
+        OVERWRITE,
+        AS_JSON,
+        QUIET,
+    ]
     return with_checks(command, decorators)
 
 
@@ -62,22 +73,18 @@ def run_predictions(
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
     quiet = options["quiet"] or options["as_json"]
-    try:
-        with RunsProgress(quiet) as progress:
-            predictions = predict(
-                project,
-                tests,
-                cards,
-                jobs=options["jobs"],
-                out=folder,
-                resume=options["resume"],
-                overwrite=options["overwrite"],
-                progress=progress.saw,
-                command_line=command_line(),
-            )
-    except KeyboardInterrupt:
-        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
-        raise
+    with resumable(folder), RunsProgress(quiet) as progress:
+        predictions = predict(
+            project,
+            tests,
+            cards,
+            jobs=options["jobs"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress.saw,
+            command_line=command_line(),
+        )
     predictions.report(folder)
     tell(predictions, folder, options["fail_above"], options["as_json"])
 

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 from ..fits.analyses import Step
 from ..fits.start import EvaluationRecord, StartRecord
@@ -19,21 +25,21 @@ if TYPE_CHECKING:
 PLAIN_EVERY_S = 60.0
 
 
-class SeriesProgress:
-    """A few analyses one after the other, with the increments of the one that runs."""
+class LiveLine:
+    """A bar on a terminal, on stderr, so that stdout stays for results; elsewhere none."""
 
-    def __init__(self, quiet: bool) -> None:
+    def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
         self.bar: Progress | None = None
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
                 MofNCompleteColumn(),
+                *more,
                 TimeElapsedColumn(),
                 console=Console(stderr=True),
                 transient=True,
             )
-            self.task = self.bar.add_task("", total=None)
 
     def __enter__(self) -> Self:
         if self.bar is not None:
@@ -43,6 +49,15 @@ class SeriesProgress:
     def __exit__(self, *_: object) -> None:
         if self.bar is not None:
             self.bar.stop()
+
+
+class SeriesProgress(LiveLine):
+    """A few analyses one after the other, with the increments of the one that runs."""
+
+    def __init__(self, quiet: bool) -> None:
+        super().__init__(quiet)
+        if self.bar is not None:
+            self.task = self.bar.add_task("", total=None)
 
     def saw(self, step: Step) -> None:
         """Show how far the analysis is that runs."""
@@ -56,39 +71,16 @@ class SeriesProgress:
             )
 
 
-class CountProgress:
-    """Tasks done and a note; on stderr, so that stdout stays for results."""
+class CountProgress(LiveLine):
+    """Tasks done and a note."""
 
     def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
+        super().__init__(quiet, TextColumn("{task.fields[note]}"))
         self.what, self.total, self.done, self.already = what, total, done, done
         self.begun = self.said = time.monotonic()
         self.quiet = quiet
-        self.bar: Progress | None = None
-        if not quiet and sys.stderr.isatty():
-            self.bar = Progress(
-                TextColumn(what),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.fields[note]}"),
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
+        if self.bar is not None:
             self.task = self.bar.add_task(what, total=total, completed=done, note="")
-
-    def __enter__(self) -> Self:
-        if self.bar is not None:
-            self.bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self.bar is not None:
-            self.bar.stop()
 
     def show(self) -> None:
         """On a terminal at once, elsewhere a plain line a minute."""

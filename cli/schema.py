@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options import exits
+from .exits import exits
 
 
 @click.command("schema")

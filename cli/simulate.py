@@ -9,42 +9,42 @@ from typing import Any
 
 import click
 
-from .options import (
-    data_folders,
-    exits,
-    read_with_solver,
-    result_folder,
+from .arguments import (
+    AS_JSON,
+    DATA,
+    OVERWRITE,
+    PROJECT,
+    TESTS,
+    Decorator,
+    out_option,
     solver_choice,
+    with_options,
 )
+from .exits import exits
+from .options import data_folders, read_with_solver, result_folder
 from .progress import SeriesProgress
 from .simulate_bend import simulate_bend
 
 
 def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """PROJECT, cards and the options of every simulation; errors are handled."""
-    path = click.Path(path_type=Path)
-    decorators: list[Callable[..., Any]] = [
-        click.argument("project", type=path),
+    decorators: list[Decorator] = [
+        PROJECT,
         click.option(
             "--card", "cards", multiple=True, required=True,
             help="A material card's file, or a card of the project; several side by side.",
         ),
-        click.option("--test", "tests", multiple=True, help="A test by its name; several [all]."),
-        click.option("--out", type=path, help="Output folder [out/NAME-simulated]."),
-        click.option(
-            "--data", multiple=True, metavar="[TEST=]DIR", help="Folder of the measured data."
-        ),
+        TESTS,
+        out_option("out/NAME-simulated"),
+        DATA,
         solver_choice,
         click.option(
             "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
         ),
-        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
-        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+        OVERWRITE,
+        AS_JSON,
     ]  # fmt: skip
-    wrapped = exits(command)
-    for decorate in reversed(decorators):
-        wrapped = decorate(wrapped)
-    return wrapped
+    return with_options(exits(command), decorators)
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:

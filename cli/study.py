@@ -10,7 +10,18 @@ from typing import Any, Literal
 
 import click
 
-from .options import data_folders, exits, read_with_solver, result_folder, solver_choice
+from .arguments import (
+    AS_JSON,
+    DATA,
+    OVERWRITE,
+    PROJECT,
+    Decorator,
+    out_option,
+    solver_choice,
+    with_options,
+)
+from .exits import exits
+from .options import data_folders, read_with_solver, result_folder
 from .progress import SeriesProgress
 
 What = Literal["elements", "increments"]
@@ -18,9 +29,8 @@ What = Literal["elements", "increments"]
 
 def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """PROJECT, --card and the options of every study of a card; errors are handled."""
-    path = click.Path(path_type=Path)
-    decorators: list[Callable[..., Any]] = [
-        click.argument("project", type=path),
+    decorators: list[Decorator] = [
+        PROJECT,
         click.option(
             "--card", required=True,
             help="The material card's file, or the name of a card of the project.",
@@ -29,18 +39,13 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--test", "--case", "tests", multiple=True,
             help="A test by its name, or a kind of tests; several [all].",
         ),
-        click.option("--out", type=path, help="Output folder [out/NAME-STUDY]."),
-        click.option(
-            "--data", multiple=True, metavar="[TEST=]DIR", help="Folder of the measured data."
-        ),
+        out_option("out/NAME-STUDY"),
+        DATA,
         solver_choice,
-        click.option("--overwrite", is_flag=True, help="Replace what the output folder holds."),
-        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+        OVERWRITE,
+        AS_JSON,
     ]  # fmt: skip
-    wrapped = exits(command)
-    for decorate in reversed(decorators):
-        wrapped = decorate(wrapped)
-    return wrapped
+    return with_options(exits(command), decorators)
 
 
 def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **given: Any) -> None:
