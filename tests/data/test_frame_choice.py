@@ -14,7 +14,7 @@ from bubblefit.data.frame_choice import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..complaints import complaint, complaint_with
 
 #: MPa, as a camera saw a test: rest, rise, hold, release, end of the log.
 SEEN = np.array([np.nan, 0.0, -0.001, 0.010, 0.020, 0.031, 0.031, 0.052, 0.040, 0.012, np.nan])
@@ -66,8 +66,7 @@ def test_as_many_as_asked_for_and_rising(pressures, data):
     ],
 )
 def test_pressures_without_a_frame_of_their_own(asked, words):
-    said = complaint(choose_frames, SEEN, asked)
-    assert all(word in said for word in words), said
+    complaint_with(words, choose_frames, SEEN, asked)
 
 
 def test_too_few_frames():

@@ -19,7 +19,7 @@ from bubblefit.experiments.data_files import files_of
 from bubblefit.fits.project import read_project
 from bubblefit.fits.written import project_text, settings_of
 
-from ...complaints import complaint
+from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
 
 #: kPa, a picture each; the last is of the release.
@@ -245,8 +245,7 @@ def test_a_simulation_needs_no_frames(folder, tmp_path):
 )
 def test_bad_input_names_file_and_field(folder, section, asked, words):
     section = f"[bubble.data.points.pressure]\n{section}\n" if section else ""
-    said = complaint(read_project, project(folder, section, asked))
-    assert all(word in said for word in words), said
+    complaint_with(words, read_project, project(folder, section, asked))
 
 
 @pytest.mark.parametrize(
@@ -268,5 +267,4 @@ def test_bad_logs_name_file_and_field(folder, old, new, words):
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    said = complaint(read_project, path)
-    assert all(word in said for word in words), said
+    complaint_with(words, read_project, path)
