@@ -1,10 +1,11 @@
-"""Small projects, for the tests that run whole fits."""
+"""Small projects and changed ones, for the tests of reading them and of whole fits."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from bubblefit.fits.project import Project, read_project
 
 from .places import KNOWN
 
@@ -12,15 +13,29 @@ from .places import KNOWN
 EASY = "[law.bounds]\nE1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]\n\n"
 
 
-def small(folder: Path, *changes: tuple[str, str]) -> Path:
-    """The known-solution example with 48 quads, changed further by replacing text."""
-    text = KNOWN.read_text()
-    for old, new in (("elements = 800", "elements = 48"), *changes):
+def changed(text: str, *changes: tuple[str, str]) -> str:
+    """The text after each replacement of an old text, which has to be there, by a new one."""
+    for old, new in changes:
         assert old in text, old
         text = text.replace(old, new, 1)
+    return text
+
+
+def project_file(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
+    """The same as the folder's project.toml."""
     path = folder / "project.toml"
-    path.write_text(text)
+    path.write_text(changed(text, *changes))
     return path
+
+
+def edited(folder: Path, old: str, new: str, source: Path = KNOWN, **options) -> Project:
+    """The known-solution example, or another, read from `folder` after one replacement."""
+    return read_project(project_file(folder, source.read_text(), (old, new)), **options)
+
+
+def small(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The known-solution example with 48 quads, changed further by replacing text."""
+    return project_file(folder, KNOWN.read_text(), ("elements = 800", "elements = 48"), *changes)
 
 
 def with_form(folder: Path, form: str) -> Path:
@@ -91,10 +106,4 @@ def constant_strips(folder: Path, *changes: tuple[str, str]) -> Path:
                     for u, load in zip(ELONGATION.tolist(), loads.tolist(), strict=True)
                 ]
         (folder / f"{test}.csv").write_text("\n".join(lines) + "\n")
-    text = STRIPS
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    path = folder / "project.toml"
-    path.write_text(text)
-    return path
+    return project_file(folder, STRIPS, *changes)

@@ -15,6 +15,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import bubblefit, one_line, result_in
 from ..commands import in_process as quick
+from ..projects import changed
 
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
 KNOWN = [
@@ -72,12 +73,8 @@ def write_points(path: Path, law: HypoelasticLaw) -> None:
 
 
 def project_in(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = TOGETHER
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
     path = folder / "together.toml"
-    path.write_text(text)
+    path.write_text(changed(TOGETHER, *changes))
     return path
 
 

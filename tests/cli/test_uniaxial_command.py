@@ -22,6 +22,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import bubblefit, one_line, result_in
 from ..commands import in_process as quick
+from ..projects import project_file
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -36,19 +37,10 @@ TABLE_3_2 = [
 ]  # fmt: skip
 
 
-def changed(text: str, *changes: tuple[str, str]) -> str:
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    return text
-
-
 def small(folder: Path, *changes: tuple[str, str]) -> Path:
     """The example with 10 increments, changed further by replacing text."""
     shutil.copy(EXAMPLE / "curves.csv", folder)
-    path = folder / "project.toml"
-    path.write_text(changed((EXAMPLE / "project.toml").read_text(), COARSE, *changes))
-    return path
+    return project_file(folder, (EXAMPLE / "project.toml").read_text(), COARSE, *changes)
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from bubblefit.materials.forms.registry import form_names
 from bubblefit.materials.law import HypoelasticLaw
 
 from ..complaints import complaint, complaint_with
+from ..projects import project_file
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "uniaxial-valmex7318"
 #: Table 3.1: gauge and final lengths, mm.
@@ -33,13 +34,9 @@ def example(tmp_path: Path) -> Edit:
     (tmp_path / "curves.csv").write_bytes((EXAMPLE / "curves.csv").read_bytes())
 
     def read(*changes: tuple[str, str]) -> Project:
-        text = (EXAMPLE / "project.toml").read_text()
-        for old, new in changes:
-            assert old in text, old
-            text = text.replace(old, new, 1)
-        path = tmp_path / "project.toml"
-        path.write_text(text)
-        return read_project(path)
+        return read_project(
+            project_file(tmp_path, (EXAMPLE / "project.toml").read_text(), *changes)
+        )
 
     return read
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from bubblefit.materials.forms.base import pieces_of
 
 from ..complaints import complaint, complaint_with
 from ..places import EXAMPLES, KNOWN
+from ..projects import edited
 
 VALMEX = EXAMPLES / "bubble-valmex7318"
 SECOND = """
@@ -29,15 +31,7 @@ beta = [0, 0, 0, 0.02, 0, 0, 0, 0.1, 0, 0, 0, 0.5]
 @pytest.fixture
 def edit(tmp_path: Path):
     """Read the known-solution example after replacing one text by another."""
-
-    def read(old: str, new: str, source: Path = KNOWN, **options) -> Project:
-        text = source.read_text()
-        assert old in text
-        path = tmp_path / "project.toml"
-        path.write_text(text.replace(old, new, 1))
-        return read_project(path, **options)
-
-    return read
+    return partial(edited, tmp_path)
 
 
 def reaches(project: Project) -> list[Reach]:

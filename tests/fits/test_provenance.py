@@ -25,6 +25,7 @@ from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.identity import in_words
 
 from ..places import EXAMPLES
+from ..projects import project_file
 
 PROJECT = """
 [fabric]
@@ -60,10 +61,6 @@ FILES = ("low.csv", "high.csv")
 
 def written(folder: Path, *changes: tuple[str, str]) -> Path:
     """A bubble of two measured frames, and the project of it, changed by replacing text."""
-    text = PROJECT
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
     folder.mkdir(exist_ok=True)
     x, y = (a.ravel() for a in np.meshgrid(*[np.linspace(-90, 90, 9)] * 2))
     inside = np.hypot(x, y) < 95
@@ -75,9 +72,7 @@ def written(folder: Path, *changes: tuple[str, str]) -> Path:
         (folder / file).write_text("\n".join([*head, *lines]) + "\n")
     (folder / "decks").mkdir(exist_ok=True)
     (folder / "decks" / "bubble.inp.j2").write_text("** a deck of one's own\n")
-    path = folder / "project.toml"
-    path.write_text(text)
-    return path
+    return project_file(folder, PROJECT, *changes)
 
 
 def prepared(project: Project) -> FitSetup:
@@ -307,19 +302,18 @@ def test_the_record_of_data_files(tmp_path: Path) -> None:
 def test_the_record_of_load_curves(tmp_path: Path) -> None:
     text = (EXAMPLES / "uniaxial-valmex7318" / "project.toml").read_text()
     table = "[strips.warp]\ngauge_length = 20.0\nfinal_length = 22.0\n[strips.data]"
-    for old, new in (
+    path = project_file(
+        tmp_path,
+        text,
         ('polynomials = "curves.csv"', 'files = { warp = ["a.csv"] }\nfolder = "lab"'),
         ('match = "polynomial"', 'match = "points"'),
         ("[strips.data]", table),
         ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.2, 0.2, 0.2]"),
-    ):
-        assert old in text
-        text = text.replace(old, new, 1)
-    (tmp_path / "project.toml").write_text(text)
+    )
     (tmp_path / "lab").mkdir()
     rows = "".join(f"{0.25 * k:.2f};{0.01 * k}\n" for k in range(-1, 11))
     (tmp_path / "lab" / "a.csv").write_text(f"Gauge elongation [mm];Load [kN]\n{rows}")
-    (row,) = data_rows([("strips", prepared(read_project(tmp_path / "project.toml")).tests[0])])
+    (row,) = data_rows([("strips", prepared(read_project(path)).tests[0])])
     assert row["format"] == "text" and row["units"] == {"elongation": "mm", "load": "kN"}
     assert row["columns"] == {"elongation": "Gauge elongation [mm]", "load": "Load [kN]"}
     assert row["rows_used"] == 9

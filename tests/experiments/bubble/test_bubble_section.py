@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from bubblefit.fits.project import Project, read_project
 
 from ...complaints import complaint, complaint_with
 from ...places import EXAMPLES, KNOWN, SHARED
+from ...projects import edited
 
 VALMEX = EXAMPLES / "bubble-valmex7318"
 GRID = SHARED / "bubble"
@@ -22,15 +24,7 @@ GRID = SHARED / "bubble"
 @pytest.fixture
 def edit(tmp_path: Path):
     """Read the known-solution example after replacing one text by another."""
-
-    def read(old: str, new: str, source: Path = KNOWN, **options) -> Project:
-        text = source.read_text()
-        assert old in text
-        path = tmp_path / "project.toml"
-        path.write_text(text.replace(old, new, 1))
-        return read_project(path, **options)
-
-    return read
+    return partial(edited, tmp_path)
 
 
 def bubble(project: Project) -> BubbleTest:

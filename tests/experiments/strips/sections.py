@@ -66,16 +66,6 @@ def read(
     return KIND.read(section, place, section.name or "strips")
 
 
-def changed(text: str, changes: tuple[tuple[str, str], ...], folder: Path) -> Path:
-    """The text with some of it replaced, as a file in the folder."""
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    path = folder / "project.toml"
-    path.write_text(text)
-    return path
-
-
 def rows(separator: str, *columns: np.ndarray, comma: bool = False) -> str:
     lines = [separator.join(f"{v:.6f}" for v in row) for row in zip(*columns, strict=True)]
     text = "\n".join(lines)

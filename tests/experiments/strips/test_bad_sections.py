@@ -10,7 +10,8 @@ import pytest
 from bubblefit.experiments.strips.test import StripsTest
 
 from ...complaints import complaint, complaint_with
-from .sections import CURVES, PUBLISHED, SMALL, changed, read, rows, write_exports
+from ...projects import project_file
+from .sections import CURVES, PUBLISHED, SMALL, read, rows, write_exports
 
 OLD_FILES = 'files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }'
 TOP = "[warp]\n"
@@ -22,7 +23,7 @@ def small(tmp_path: Path) -> Callable[..., StripsTest]:
     write_exports(tmp_path)
 
     def edited(*changes: tuple[str, str]) -> StripsTest:
-        return read(changed(SMALL, changes, tmp_path))
+        return read(project_file(tmp_path, SMALL, *changes))
 
     return edited
 
@@ -145,7 +146,7 @@ def test_bad_data_names_the_file_or_the_project(small, tmp_path, text, words):
 def test_points_are_needed_where_they_are_to_be_matched(small, tmp_path):
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
     points = ('match = "polynomial"', 'match = "points"')
-    message = complaint(read, changed(PUBLISHED, (points,), tmp_path))
+    message = complaint(read, project_file(tmp_path, PUBLISHED, points))
     assert "strips[0].match: 'points' needs measured points (data.files)" in message
     # The first points lie beyond the end of the model.
     text = "Extension (mm),Load (N)\n" + rows(",", np.arange(1.0, 9.0), np.arange(8.0))

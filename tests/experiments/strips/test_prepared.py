@@ -22,7 +22,8 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from threadpoolctl import threadpool_limits
 
 from ...complaints import complaint
-from .sections import CURVES, PUBLISHED, SMALL, changed, read, write_exports
+from ...projects import project_file
+from .sections import CURVES, PUBLISHED, SMALL, read, write_exports
 
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 COARSE = ("increments = 100", "increments = 5")
@@ -41,7 +42,7 @@ def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
-        test = read(changed(PUBLISHED, (COARSE, *changes), tmp_path))
+        test = read(project_file(tmp_path, PUBLISHED, COARSE, *changes))
         return test.prepare(LAW, MembraneSolver)
 
     return prepared
@@ -53,7 +54,7 @@ def exported(tmp_path: Path) -> Callable[..., PreparedStrips]:
     write_exports(tmp_path)
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
-        test = read(changed(SMALL, (POINTS, *changes), tmp_path))
+        test = read(project_file(tmp_path, SMALL, POINTS, *changes))
         return test.prepare(LAW, MembraneSolver)
 
     return prepared

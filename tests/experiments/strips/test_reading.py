@@ -10,7 +10,8 @@ import pytest
 from bubblefit.experiments.strips.test import StripsTest
 
 from ...complaints import complaint
-from .sections import CURVES, ENDS, LENGTHS, PUBLISHED, SMALL, changed, read, rows, write_exports
+from ...projects import project_file
+from .sections import CURVES, ENDS, LENGTHS, PUBLISHED, SMALL, read, rows, write_exports
 
 Edit = Callable[..., StripsTest]
 
@@ -21,7 +22,7 @@ def small(tmp_path: Path) -> Edit:
     write_exports(tmp_path)
 
     def edited(*changes: tuple[str, str], **options) -> StripsTest:
-        return read(changed(SMALL, changes, tmp_path), **options)
+        return read(project_file(tmp_path, SMALL, *changes), **options)
 
     return edited
 
@@ -32,7 +33,7 @@ def example(tmp_path: Path) -> Edit:
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
 
     def edited(*changes: tuple[str, str], **options) -> StripsTest:
-        return read(changed(PUBLISHED, changes, tmp_path), **options)
+        return read(project_file(tmp_path, PUBLISHED, *changes), **options)
 
     return edited
 
@@ -220,7 +221,7 @@ def test_real_points(shared_data, tmp_path):
         f"[{d}]\ngauge_length = {a}\nfinal_length = {b}\n" for d, (a, b) in LENGTHS.items()
     )
     text = f'match = "points"\n{lengths}[data]\nfiles = ["valmex7318_load_gauge.csv"]\n'
-    p = read(changed(text, (), tmp_path), data_folder=shared_data / "uniaxial")
+    p = read(project_file(tmp_path, text), data_folder=shared_data / "uniaxial")
     assert p.match_by == "points"
     assert [len(s.curves) for s in p.strips.values()] == [5, 5, 5]
     scatter = [s.scatter for s in p.strips.values()]

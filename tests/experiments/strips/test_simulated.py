@@ -17,7 +17,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from .sections import CURVES, LENGTHS, PUBLISHED, SMALL, changed, read
+from ...projects import project_file
+from .sections import CURVES, LENGTHS, PUBLISHED, SMALL, read
 
 TABLE_3_2 = 1e3 * np.array([
     -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
@@ -31,7 +32,7 @@ LINEAR = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 @pytest.fixture
 def test(tmp_path: Path) -> StripsTest:
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
-    return read(changed(PUBLISHED, (("increments = 100", "increments = 10"),), tmp_path))
+    return read(project_file(tmp_path, PUBLISHED, ("increments = 100", "increments = 10")))
 
 
 def card(name: str, law: HypoelasticLaw) -> MaterialCard:
@@ -108,7 +109,7 @@ def test_without_data_the_loads_at_the_end_are_told(tmp_path):
     ends = [(f"gauge_length = {a}.0", f"gauge_length = {a}.0\nfinal_length = {a + 1}.0")
             for a in (20, 22, 19)]  # fmt: skip
     steps = ("[warp]", "increments = 3\n[warp]")
-    test = read(changed(SMALL, (steps, *ends), tmp_path), need_data=False)
+    test = read(project_file(tmp_path, SMALL, steps, *ends), need_data=False)
     cards = {"some": card("some", LINEAR)}
     told = KIND.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"))
     assert "N at the end" in told.lines[0]
