@@ -22,6 +22,8 @@ from bubblefit.cli.main import main
 from click.testing import CliRunner
 
 TIMEOUT_S = 300.0
+#: How long a command that is told to stop may take to end.
+ENDING_S = 30.0
 #: Rooms that commands import as they go.
 ROOMS = ("cli", "data", "experiments", "fits", "materials", "reports", "solvers", "studies")
 
@@ -110,6 +112,32 @@ def _become(
 
 def _show(message: Any, category: type, filename: str, lineno: int, *_: object) -> None:
     print(f"{filename}:{lineno}: {category.__name__}: {message}", file=sys.stderr)
+
+
+def interrupted(
+    *arguments: object,
+    cwd: Path,
+    when: Callable[[], object],
+    number: signal.Signals = signal.SIGINT,
+) -> subprocess.CompletedProcess[str]:
+    """Run the command in a new interpreter, send it a signal `when` it is time; how it ended."""
+    command = [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)]
+    running = subprocess.Popen(
+        command, cwd=cwd, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    deadline = time.monotonic() + TIMEOUT_S
+    while not when():
+        assert time.monotonic() < deadline and running.poll() is None
+        time.sleep(0.01)
+    running.send_signal(number)
+    _, said = running.communicate(timeout=ENDING_S)
+    return subprocess.CompletedProcess(command, running.returncode, None, said)
+
+
+def a_start_is_stored(out: Path) -> bool:
+    """Whether the fit that writes to `out` has finished its first start."""
+    starts = out / "starts.jsonl"
+    return starts.exists() and "\n" in starts.read_text()
 
 
 def in_process(*arguments, cwd, code=0):

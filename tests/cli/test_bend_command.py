@@ -5,10 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import meshio
@@ -24,7 +20,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers import registry
 
-from ..commands import in_process, one_line, result_in
+from ..commands import bubblefit, in_process, interrupted, one_line, result_in
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
 
 TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
@@ -400,19 +396,12 @@ def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     path = write_project(tmp_path)
     text = path.read_text().replace('solver = "formula"', 'solver = "membrane"')
     path.write_text(text.replace("frames = 24", "deflection = 8\nframes = 2"))
-    arguments = [sys.executable, "-m", "bubblefit.cli", "bend", path, "--out", "out", "--jobs", "1"]
-    running = subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    arguments = ["bend", path, "--out", "out", "--jobs", "1"]
     runs = tmp_path / "out" / "runs"
-    end = time.monotonic() + 240
-    while not list(runs.glob("[0-9a-f]*.npz")):
-        assert running.poll() is None and time.monotonic() < end
-        time.sleep(0.05)
-    running.send_signal(signal.SIGINT)
-    _, said = running.communicate(timeout=60)
-    assert running.returncode == 130 and "go on with --resume" in said, said
+    ended = interrupted(*arguments, cwd=tmp_path, when=lambda: list(runs.glob("[0-9a-f]*.npz")))
+    assert ended.returncode == 130 and "go on with --resume" in ended.stderr, ended.stderr
     first = {p: p.stat().st_mtime_ns for p in runs.glob("[0-9a-f]*.npz")}
     assert 1 <= len(first) < 4 and not (tmp_path / "out" / "result.json").exists()
-    done = subprocess.run([*arguments, "--resume"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    bubblefit(*arguments, "--resume", cwd=tmp_path)
     assert {p: p.stat().st_mtime_ns for p in first} == first
     assert [r["ended"] for r in result_in(tmp_path / "out")["runs"]] == ["finished"] * 4

@@ -1,13 +1,11 @@
 """The commands as a user runs them: subprocesses, exit codes, files, interruption, bad input."""
 
 import json
-import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pandas as pd
@@ -15,7 +13,7 @@ import pytest
 from bubblefit.materials.card import read_card
 
 from .. import needs
-from ..commands import bubblefit
+from ..commands import a_start_is_stored, bubblefit, interrupted
 from ..projects import small
 
 
@@ -80,21 +78,11 @@ def test_resume_refuses_another_study(study):
 def test_interrupted_and_resumed_ends_the_same(study, tmp_path, number):
     folder, _ = study
     arguments = ["bubble", str(folder / "project.toml"), "--out", "out", "--starts", "4"]
-    running = subprocess.Popen(
-        [sys.executable, "-m", "bubblefit.cli", *arguments],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+    out = tmp_path / "out"
+    ended = interrupted(
+        *arguments, cwd=tmp_path, when=lambda: a_start_is_stored(out), number=number
     )
-    starts = tmp_path / "out" / "starts.jsonl"
-    deadline = time.monotonic() + 120
-    while not (starts.exists() and starts.read_text().count("\n")):
-        assert time.monotonic() < deadline and running.poll() is None
-        time.sleep(0.02)
-    os.kill(running.pid, number)
-    running.wait(timeout=30)
-    assert running.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
+    assert ended.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
     rows = (tmp_path / "out" / "history.csv").read_text().splitlines()
     assert rows[0].startswith("start,analysis,solver,objective,status") and len(rows) > 3
     assert not (tmp_path / "out" / "result.json").exists()

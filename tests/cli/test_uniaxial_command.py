@@ -2,13 +2,8 @@
 
 import hashlib
 import json
-import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import bubblefit as bf
@@ -20,7 +15,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import bubblefit, one_line, result_in
+from ..commands import a_start_is_stored, bubblefit, interrupted, one_line, result_in
 from ..commands import in_process as quick
 from ..projects import project_file
 
@@ -130,21 +125,9 @@ def test_json_fail_above_and_overwrite(study, tmp_path):
 def test_interrupted_and_resumed_ends_the_same(study, tmp_path):
     folder, _ = study
     arguments = ["uniaxial", str(small(tmp_path)), "--out", "out", "--starts", "3", "--jobs", "1"]
-    running = subprocess.Popen(
-        [sys.executable, "-m", "bubblefit.cli", *arguments],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    starts = tmp_path / "out" / "starts.jsonl"
-    deadline = time.monotonic() + 120
-    while not (starts.exists() and starts.read_text().count("\n")):
-        assert time.monotonic() < deadline and running.poll() is None
-        time.sleep(0.01)
-    os.kill(running.pid, signal.SIGINT)
-    running.communicate(timeout=30)
-    assert running.returncode == 130
+    out = tmp_path / "out"
+    ended = interrupted(*arguments, cwd=tmp_path, when=lambda: a_start_is_stored(out))
+    assert ended.returncode == 130
     assert not (tmp_path / "out" / "result.json").exists()
     bubblefit(*arguments, "--resume", cwd=tmp_path)
     ours, theirs = result_in(tmp_path / "out"), result_in(folder / "out")
