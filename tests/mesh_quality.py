@@ -1,4 +1,4 @@
-"""How good the elements of a mesh are."""
+"""How good the elements of a mesh are, and how they hang together."""
 
 from __future__ import annotations
 
@@ -27,6 +27,12 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
     area = np.einsum("mcx,mx->mc", np.cross(onward, back), normal)
     edges = np.linalg.norm(onward, axis=2) * np.linalg.norm(back, axis=2)
     return np.asarray(_over(area, edges).min(axis=1))
+
+
+def edges(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Each edge once, (k, 2), and how many quads it belongs to."""
+    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
 
 
 def least_scaled_jacobian(mesh: Mesh) -> dict[str, float]:

@@ -49,6 +49,24 @@ def with_form(folder: Path, form: str) -> Path:
     return path
 
 
+#: A small bubble of a fabric of constant moduli, for the solvers that take their time.
+BUBBLE = """
+[fabric]
+thickness = 0.81
+[law]
+form = "constant"
+[law.bounds]
+lower = [0.03, 0.3, 0.3]
+upper = [0.2, 1.0, 1.0]
+[[bubble]]
+radius = 100.0
+pressures = [22, 59]
+elements = 32
+symmetry = "quarter"
+[bubble.data.known_solution]
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+"""
+
 #: Strips of a fabric of constant moduli in two tests, the second of the warp only.
 STRIPS = """
 [fabric]

@@ -17,6 +17,7 @@ from ..commands import in_process, result_in
 from ..failure_cases import MARC, failing_ccx
 from ..marc_stand_in_runs import stand_in
 from ..places import EXAMPLES, ROOT
+from ..projects import BUBBLE
 
 TEXT = (ROOT / "docs" / "reference" / "failures.md").read_text()
 FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collapse")
@@ -29,20 +30,6 @@ REASONS = {
     for command, cell in zip(COMMANDS, cells.split(" | "), strict=True)
 }
 HEAD = "[fabric]\nthickness = 0.81\n"
-BUBBLE = """
-[law]
-form = "constant"
-[law.bounds]
-lower = [0.03, 0.3, 0.3]
-upper = [0.2, 1.0, 1.0]
-[[bubble]]
-radius = 100.0
-pressures = [22, 59]
-elements = 32
-symmetry = "quarter"
-[bubble.data.known_solution]
-beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
-"""
 BEND = """
 [[cylinder]]
 name = "tube"
@@ -80,7 +67,7 @@ class Stage:
 
     def __init__(self, folder: Path, fault: str, solver: str, command: str, real: Path) -> None:
         self.folder, self.command, self.solver = folder, command, solver
-        text = {"bubble": HEAD + BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
+        text = {"bubble": BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
         if command == "uniaxial":
             shutil.copy(EXAMPLES / "uniaxial-valmex7318/curves.csv", folder)
         # What is known is computed first; a cylinder collapses when it is bent.

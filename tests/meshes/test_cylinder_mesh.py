@@ -13,7 +13,7 @@ from bubblefit.meshes.mesh import Mesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ..mesh_quality import least_scaled_jacobian
+from ..mesh_quality import edges, least_scaled_jacobian
 
 LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1
 RADIUS = DIAMETER / 2
@@ -36,12 +36,6 @@ def enclosed(mesh: Mesh) -> float:
     first = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     second = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0])
     return float(((p[:, 0] * (first + second)).sum()) / 6)
-
-
-def edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Each edge once, (k, 2), and how many quads it belongs to."""
-    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
 
 
 def check_sound(mesh: Mesh, length: float, diameter: float, seam: float, symmetry: str) -> None:

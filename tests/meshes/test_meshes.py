@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from .. import needs
-from ..mesh_quality import scaled_jacobian
+from ..mesh_quality import edges, scaled_jacobian
 
 RADIUS = 100.0
 BEST = np.sin(np.deg2rad(120))  # three quads meet in a node of each quarter
@@ -27,12 +27,6 @@ def areas(mesh: Mesh) -> np.ndarray:
     """Signed area of each quad of a flat mesh: positive is counter-clockwise."""
     p = mesh.points[mesh.quads]
     return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2]
-
-
-def edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Each edge once, (k, 2), and how many quads it belongs to."""
-    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
 
 
 def check_sound(mesh: Mesh, symmetry: str, radius: float = RADIUS) -> None:

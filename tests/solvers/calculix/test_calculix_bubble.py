@@ -26,6 +26,7 @@ from bubblefit.solvers.registry import solver_named
 from ...commands import bubblefit
 from ...fortran_build import LAWS
 from ...places import PUBLISHED
+from ...projects import BUBBLE, changed
 
 # Table 4.2, MPa.
 GPA = [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437]
@@ -289,27 +290,16 @@ def test_registered_by_name():
         solver_named("calculix", element="S9")
 
 
-PROJECT = """
-[fabric]
-thickness = 0.81
-[law]
-form = "constant"
-[law.bounds]
-lower = [0.01, 0.1, 0.1]
-upper = [0.2, 1.0, 1.0]
-[[bubble]]
-radius = 100.0
-pressures = [22, 59]
-elements = 64
-symmetry = "quarter"
-[bubble.data.known_solution]
-beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+FIT = """
 [fit]
 starts = 1
 tolerance = 1e-6
 [solver.calculix]
 element = "S4"
 """
+FINER = ("elements = 32", "elements = 64")
+WIDER = ("lower = [0.03, 0.3, 0.3]", "lower = [0.01, 0.1, 0.1]")
+PROJECT = changed(BUBBLE, FINER, WIDER) + FIT
 
 
 def test_commands(ccx, tmp_path):

@@ -24,6 +24,7 @@ from bubblefit.solvers.process import Outcome
 
 from ... import needs
 from ...commands import bubblefit, interrupted
+from ...projects import BUBBLE
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 STA = """SUMMARY OF JOB INFORMATION
@@ -311,21 +312,7 @@ def test_the_log_may_be_anything(tmp_path):
     assert process.log_tail(tmp_path / "none") == ""
 
 
-PROJECT = """
-[fabric]
-thickness = 0.81
-[law]
-form = "constant"
-[law.bounds]
-lower = [0.03, 0.3, 0.3]
-upper = [0.2, 1.0, 1.0]
-[[bubble]]
-radius = 100.0
-pressures = [22, 59]
-elements = 32
-symmetry = "quarter"
-[bubble.data.known_solution]
-beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+PROJECT = f"""{BUBBLE}
 [fit]
 tolerance = 1e-4
 solver = "calculix"
