@@ -4,7 +4,6 @@ import csv
 import json
 import os
 import shutil
-import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -21,13 +20,7 @@ from bubblefit.solvers.calculix.proof import bar_deck, prove
 from bubblefit.solvers.diagnosis import diagnose
 
 from ..places import PUBLISHED
-
-
-def program(path: Path, text: str) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    path.chmod(path.stat().st_mode | stat.S_IXUSR)
-    return path
+from ..programs import program
 
 
 def fake(path: Path, version: str = "2.99", then: str = "exit 0") -> Path:

@@ -255,16 +255,6 @@ def install(folder, name, text, distribution="acme-solvers", module=None):
     (info / "entry_points.txt").write_text(f"[bubblefit.solvers]\n{name} = {module}:Solver\n")
 
 
-@pytest.fixture
-def packages(tmp_path, monkeypatch):
-    folder = tmp_path / "packages"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(str(folder))
-    yield folder
-    for name in [name for name in sys.modules if name.startswith("acme_")]:
-        del sys.modules[name]
-
-
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_plug_in_is_one_line_with_its_distribution(packages, name):
     text, words = BROKEN[name]

@@ -2,11 +2,12 @@
 
 import os
 import shutil
-import stat
 import subprocess
 from pathlib import Path
 
 import pytest
+
+from ...programs import program
 
 SCRIPT = Path(__file__).resolve().parents[3] / ".ci" / "calculix"
 # What any machine has; apt and dpkg are not among them.
@@ -23,13 +24,6 @@ def machine(tmp_path):
         (tmp_path / "bin" / name).symlink_to(found)
     program(tmp_path / "bin" / "cc", "#!/bin/sh\n")
     return tmp_path
-
-
-def program(path, text):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    path.chmod(path.stat().st_mode | stat.S_IXUSR)
-    return path
 
 
 def build(machine, code):

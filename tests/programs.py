@@ -1,0 +1,14 @@
+"""Programs of a test: files that can be run."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+
+def program(path: Path, text: str) -> Path:
+    """The text as a file that can be run, in a folder that is made for it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
