@@ -14,14 +14,14 @@ import time
 import numpy as np
 from bench_analysis import seconds
 from bubblefit.errors import SolverFailure
-from bubblefit.fits.start import EvaluationRecord, run_start
+from bubblefit.fits.start import run_start
 from bubblefit.identification.assessment import moduli_error
 from bubblefit.identification.methods import FitOptions
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from known_solution import known_model_and_law, known_project, known_setup
+from known_solution import known_model_and_law, known_project, known_setup, objectives_of
 from threadpoolctl import threadpool_limits
 
 METHODS = (("lm", "led by the membrane"), ("slsqp", "differences"), ("cobyla", "no derivatives"))
@@ -44,11 +44,7 @@ def main() -> None:
     for method, words in METHODS:
         options = FitOptions(method, max_analyses=100 if method == "lm" else most)
         heard: list[float] = []
-
-        def hear(record: EvaluationRecord, heard: list[float] = heard) -> None:
-            if record.solver == "calculix":
-                heard.append(np.inf if record.objective is None else record.objective)
-
+        hear = objectives_of("calculix", heard)
         begun = time.perf_counter()
         with threadpool_limits(1):
             record = run_start(problem, options, 1, 0, hear)

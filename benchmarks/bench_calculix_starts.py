@@ -11,11 +11,11 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from bubblefit.fits.start import EvaluationRecord, run_start
+from bubblefit.fits.start import run_start
 from bubblefit.identification.assessment import moduli_error
 from bubblefit.identification.methods import FitOptions
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from known_solution import known_project, known_setup
+from known_solution import known_project, known_setup, objectives_of
 from threadpoolctl import threadpool_limits
 
 #: Quads of the full disk.
@@ -30,11 +30,7 @@ def main() -> None:
     reached = MembraneSolver().run(problem.comparisons[0].model, known).strain_max
     for number in range(starts):
         heard: list[float] = []
-
-        def hear(record: EvaluationRecord, heard: list[float] = heard) -> None:
-            if record.solver == "calculix":
-                heard.append(np.inf if record.objective is None else record.objective)
-
+        hear = objectives_of("calculix", heard)
         with threadpool_limits(1):
             record = run_start(problem, FitOptions("lm", max_analyses=100), 1, number, hear)
         law = known.with_beta(problem.unknowns.beta(np.array(record.unknowns)))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bubblefit.fits.start import EvaluationRecord, run_start
+from bubblefit.fits.start import run_start
 from bubblefit.identification.methods import FitOptions
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bending import inflated_cylinder
@@ -24,7 +24,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.marc.deck import TOLERANCE
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from known_solution import known_model_and_law, known_project, known_setup
+from known_solution import known_model_and_law, known_project, known_setup, objectives_of
 
 STAND_IN = Path(__file__).resolve().parent.parent / "tests" / "marc_stand_in" / "run_marc"
 MODELS: dict[str, Any] = {
@@ -68,13 +68,8 @@ def error(found: History, expected: History) -> float:
 
 def fit() -> None:
     project = known_project(ELEMENTS).with_solver("marc", {"marc": str(STAND_IN)}, [])
-    problem, heard = known_setup(project).problem(), []
-
-    def hear(record: EvaluationRecord) -> None:
-        if record.solver == "marc":
-            heard.append(np.inf if record.objective is None else record.objective)
-
-    run_start(problem, FitOptions("lm", max_analyses=100), 1, 0, hear)
+    problem, heard = known_setup(project).problem(), list[float]()
+    run_start(problem, FitOptions("lm", max_analyses=100), 1, 0, objectives_of("marc", heard))
     print("known solution: e = " + ", ".join(f"{e:.1e}" for e in heard))
 
 

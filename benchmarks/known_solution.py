@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from bubblefit.experiments.bubble.sources import KnownSolution
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup, prepare_fit
+from bubblefit.fits.start import EvaluationRecord
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
 
@@ -39,3 +41,13 @@ def known_model_and_law() -> tuple[BubbleModel, HypoelasticLaw]:
     (prepared,) = known_setup(known_project()).tests
     assert prepared.known is not None
     return prepared.test.models()["bubble"], prepared.known
+
+
+def objectives_of(solver: str, heard: list[float]) -> Callable[[EvaluationRecord], None]:
+    """What a fit may tell of its evaluations; e of each run of the solver ends up in `heard`."""
+
+    def hear(record: EvaluationRecord) -> None:
+        if record.solver == solver:
+            heard.append(np.inf if record.objective is None else record.objective)
+
+    return hear
