@@ -9,12 +9,10 @@ from bubblefit.materials.law import HypoelasticLaw
 
 from . import needs
 from .marc_stand_in.piecewise import piecewise_law
+from .published_laws import TABLE_4_2
 
-# Table 4.2, MPa.
-BETA = 1e3 * np.array(
-    [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437,
-     -479.622, 212.650, -20.2028, 0.806350]
-)  # fmt: skip
+# MPa.
+BETA = 1e3 * np.array(TABLE_4_2)
 MODULI = ((800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0))
 BREAKS = [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]]
 

@@ -18,18 +18,13 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ..commands import a_start_is_stored, bubblefit, interrupted, one_line, result_in
 from ..commands import in_process as quick
 from ..projects import project_file
+from ..published_laws import TABLE_3_2
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
 COARSE = ("increments = 100", "increments = 10")
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
-# Thesis Table 3.2, GPa.
-TABLE_3_2 = [
-    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
-    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
-    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
-]  # fmt: skip
 
 
 def small(folder: Path, *changes: tuple[str, str]) -> Path:

@@ -24,12 +24,10 @@ from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ..published_laws import TABLE_4_2
+
 # Thesis Table 4.2, GPa: solution and bounds.
-SOLUTION = [
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-]  # fmt: skip
+SOLUTION = TABLE_4_2
 LOWER = [-1e-2, 0, -3e-1, 7e-3, -1e3, -1e1, -1e1, 5e-2, -1e3, 0, -70, 0.25]
 UPPER = [0, 1, 0, 7e-2, 1e2, 1e2, 1, 0.5, 0, 7e2, 0, 1.5]
 RANGE = [0.13, 0.13, 0.13]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,13 +17,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import logm, polar, sqrtm
 
 from ..places import PUBLISHED
+from ..published_laws import TABLE_4_2
+from .paths import follow
 
-# Thesis Table 4.2, "solution", GPa.
-TABLE_4_2 = [
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-]  # fmt: skip
 BETA = 1e3 * np.array(TABLE_4_2)
 RANGE = [0.13, 0.13, 0.13]
 E1, E2, G12, NU = 300.0, 220.0, 5.0, 0.24
@@ -34,14 +29,6 @@ BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"
 
 def cubic(thickness_change: str = "constant", strain_range: list[float] | None = None):
     return HypoelasticLaw(BETA, NU, strain_range, thickness_change)
-
-
-def follow(law: HypoelasticLaw, path: np.ndarray) -> np.ndarray:
-    """Stress at the end of a strain path (steps + 1, 3)."""
-    stress = np.zeros((1, 3))
-    for old, new in pairwise(path):
-        stress, _ = law.increment(old, new, stress)
-    return stress[0]
 
 
 def straight(end: list[float], steps: int) -> np.ndarray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
@@ -15,6 +13,8 @@ from bubblefit.materials.point_moduli import by_pieces, increment_modulus
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
+from .paths import follow
 
 E1, E2, G12 = (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0)
 BREAKS = np.array([[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]])
@@ -32,13 +32,6 @@ def integral(name: str, strain: float) -> float:
     x = abs(strain) if name == "G12" else strain
     size = low * min(x, a) + middle * (min(max(x, a), b) - a) + high * max(x - b, 0.0)
     return -size if name == "G12" and strain < 0 else size
-
-
-def follow(law: HypoelasticLaw, path: np.ndarray) -> np.ndarray:
-    stress = np.zeros((1, 3))
-    for old, new in pairwise(path):
-        stress, _ = law.increment(old, new, stress)
-    return stress[0]
 
 
 def increment(law: HypoelasticLaw, name: str, x: float, x_old: float) -> tuple[float, float, float]:

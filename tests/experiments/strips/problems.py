@@ -25,12 +25,9 @@ from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
 from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-# Thesis Table 3.2, GPa, and the strains that its tests reached (logarithmic).
-TABLE_3_2 = [
-    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
-    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
-    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
-]  # fmt: skip
+from ...published_laws import TABLE_3_2
+
+# The strains that the tests of table 3.2 reached (logarithmic).
 RANGE = (0.153, 0.232, 0.883)
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, RANGE)
 BREAKS = np.array([[0.04, 0.1], [0.06, 0.15], [0.2, 0.5]])

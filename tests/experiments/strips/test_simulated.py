@@ -18,14 +18,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...projects import project_file
+from ...published_laws import TABLE_3_2
 from .sections import CURVES, LENGTHS, PUBLISHED, SMALL, read
 
-TABLE_3_2 = 1e3 * np.array([
-    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
-    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
-    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
-])  # fmt: skip
-SHORT = HypoelasticLaw(TABLE_3_2, 0.24, [0.08, 0.1, 0.2])
+SHORT = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2])
 LINEAR = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 
 

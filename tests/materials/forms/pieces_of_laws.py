@@ -8,12 +8,10 @@ from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC, LINEAR, QUADRA
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 
-# Table 4.2, "solution", MPa.
-BETA = 1e3 * np.array([
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-])  # fmt: skip
+from ...published_laws import TABLE_4_2
+
+# MPa.
+BETA = 1e3 * np.array(TABLE_4_2)
 RANGE = [0.11, 0.12, 0.13]
 KNOTS = [[0.0, 0.01, 0.04, 0.06, 0.11], [0.0, 0.06, 0.12], [0.0, 0.02, 0.05, 0.13, 0.2]]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from bubblefit.materials.point_moduli import by_pieces, increment_modulus, point
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from ..paths import follow
 from .pieces_of_laws import LAWS, integral, turning_points
 
 FORMS = pytest.mark.parametrize("form", LAWS)
@@ -23,13 +23,6 @@ strains = st.floats(-0.2, 0.2)
 
 def mean_of(form: str, name: str, x: float, x_old: float) -> tuple[float, float, float]:
     return increment_modulus(LAWS[form].pieces, COMPONENTS[name], x, x_old)
-
-
-def follow(law, path: np.ndarray) -> np.ndarray:
-    stress = np.zeros((1, 3))
-    for old, new in pairwise(path):
-        stress, _ = law.increment(old, new, stress)
-    return stress[0]
 
 
 @settings(max_examples=400, deadline=None)

@@ -27,10 +27,10 @@ from ...commands import bubblefit
 from ...fortran_build import LAWS
 from ...places import PUBLISHED
 from ...projects import BUBBLE, changed
+from ...published_laws import TABLE_4_2
 
-# Table 4.2, MPa.
-GPA = [-7.96788e-3, 0.710747, -0.156912, 0.0200439, -10.6241, 13.7830, -0.931830, 0.139437]
-BETA = 1e3 * np.array([*GPA, -479.622, 212.650, -20.2028, 0.806350])
+# MPa.
+BETA = 1e3 * np.array(TABLE_4_2)
 CUBIC = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
 LINEAR = HypoelasticLaw.linear(800.0, 400.0, 20.0)
 TRILINEAR = HypoelasticLaw.trilinear(

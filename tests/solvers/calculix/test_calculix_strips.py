@@ -21,13 +21,8 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.pulls import corrected
 
 from ...fortran_build import LAWS
+from ...published_laws import TABLE_3_2
 
-# Thesis Table 3.2, GPa.
-TABLE_3_2 = [
-    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
-    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
-    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
-]  # fmt: skip
 # Held beyond the strains that the tests reached: E1 is negative beyond 0.33, which the corners of
 # the grips get near.
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2), strain_range=[0.153, 0.232, 0.7])

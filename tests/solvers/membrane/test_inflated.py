@@ -24,13 +24,8 @@ from scipy.optimize import brentq
 
 from ...closed_forms import capped_strain
 from ...closed_meshes import half_tube, sphere_octant, tube_warp
+from ...published_laws import TABLE_4_2
 
-# Thesis Table 4.2, "solution", GPa.
-TABLE_4_2 = [
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-]  # fmt: skip
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 E, NU, THICKNESS, RADIUS = 300.0, 0.3, 0.8, 75.0
 ISOTROPIC = HypoelasticLaw.linear(E, E, 0.5 * E / (1 + NU), NU)

@@ -19,12 +19,8 @@ from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
-# Thesis Table 4.2, "solution", GPa.
-TABLE_4_2 = [
-    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
-]  # fmt: skip
+from ...published_laws import TABLE_4_2
+
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
 E1, E2, G12, NU, THICKNESS = 300.0, 220.0, 5.0, 0.24, 0.81

@@ -22,13 +22,8 @@ from bubblefit.solvers.membrane.driven import Pull
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...places import PUBLISHED
+from ...published_laws import TABLE_3_2
 
-# Thesis Table 3.2, GPa.
-TABLE_3_2 = [
-    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
-    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
-    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
-]  # fmt: skip
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2))
 PARAMETERS = parameters_of(LAW)
 # Thesis Table 3.1 and section 3.3, mm.
