@@ -14,6 +14,7 @@ import time
 
 import numpy as np
 from bubblefit.data.fields import DisplacementField
+from bubblefit.data.outline import Outline
 from bubblefit.data.registration.fields import register_fields
 from bubblefit.experiments.bubble.doubts import View, doubts_of
 from bubblefit.experiments.doubts import Expected
@@ -47,10 +48,10 @@ def main() -> None:
     points, frames = (int(a) for a in (sys.argv[1:] + ["37000", "49"][len(sys.argv) - 1 :]))
     fields = seen(points, frames)
     begun = time.process_time()
-    moved, found = register_fields(fields, (RADIUS, RADIUS))
+    moved, found = register_fields(fields, Outline.circle(RADIUS))
     registered = time.process_time()
     expected = Expected({"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (1.0, 200.0)})
-    doubts = doubts_of(View(moved, RADIUS, 0.8, True), expected)
+    doubts = doubts_of(View(moved, Outline.circle(RADIUS), 0.8, True), expected)
     looked = time.process_time()
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(

@@ -42,10 +42,15 @@ def clamp_points(
     points: Array, semi_axes: tuple[float, float], angle: float = 0.0
 ) -> NDArray[np.bool_]:
     """Which of the points (n, 3), about the rim's centre in its plane, are beyond the rim."""
+    return rim_share(points, semi_axes, angle) > BEYOND
+
+
+def rim_share(points: Array, semi_axes: tuple[float, float], angle: float = 0.0) -> Array:
+    """(n,) of the points (n, 3): 0 at the rim's centre, 1 on the rim."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     x, y = points[:, 0], points[:, 1]
     along, across = (c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]
-    return np.asarray(np.hypot(along, across) > BEYOND, dtype=bool)
+    return np.asarray(np.hypot(along, across))
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:

@@ -7,18 +7,19 @@ from dataclasses import replace
 
 from ...errors import InputError
 from ..fields import DisplacementField
+from ..outline import Outline
 from .register import ALL_FOUND, Registration, RegistrationOptions, register
 
 
 def register_fields(
     fields: Sequence[DisplacementField],
-    semi_axes: tuple[float, float],
+    outline: Outline,
     options: RegistrationOptions = ALL_FOUND,
 ) -> tuple[tuple[DisplacementField, ...], Registration]:
     """As `register`, of fields by rising pressure.
 
-    Without a measured height of the reference state the sheet is taken to lie in the camera's
-    plane.
+    outline : of the rim, its angle counted from the warp. Without a measured height of the
+    reference state the sheet is taken to lie in the camera's plane.
 
     Raises
     ------
@@ -30,6 +31,9 @@ def register_fields(
             problem = "the files have no height z of the reference state to lay a plane through"
             raise InputError(None, "plane", problem)
         options = replace(options, plane="camera")
+    semi_axes = outline.major, outline.minor
+    if not outline.round:
+        options = replace(options, rim_angle=outline.angle)
     frames, registration = register([field.frame for field in fields], semi_axes, options)
     moved = [
         replace(

@@ -11,12 +11,20 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..frames import Frame
-from .clamp import LEAST, UNKNOWN, RigidMotion, clamp_motion, clamp_points, without
+from .clamp import (
+    LEAST,
+    UNKNOWN,
+    RigidMotion,
+    clamp_motion,
+    clamp_points,
+    rim_share,
+    without,
+)
 from .directions import in_all_quarters, line_angle
 from .placement import Placement, all_applied, shifted, turned
 from .plane import plane_through
 from .rim import Rim, rim_of_motion
-from .warp import WarpDirection, warp_of_field, warp_of_points
+from .warp import WarpDirection, warp_of_field, warp_of_points, warp_of_rim
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -113,17 +121,20 @@ def register(
     flatness, plane_of = 0.0, "camera"
     if options.plane != "camera":
         # Which points lie on the clamp, or at the edge, is known once there is a centre.
-        points, plane_of = _rim_points(placement.places(reference.points), semi_axes, options)
+        angle = _rim_angle(placement, rim, options)
+        places = placement.places(reference.points)
+        points, plane_of = _rim_points(places, semi_axes, angle, options)
         placement, flatness = plane_through(reference.points[points], up)
         placement, rim = _centred(frames, placement, semi_axes, options)
     moved = all_applied(placement, frames)
-    motions = _motions(moved, semi_axes, 0.0 if rim is None else rim.angle)
+    motions = _motions(moved, semi_axes, _rim_angle(placement, rim, options))
     if options.remove_clamp_motion:
         moved = tuple(without(f, m) for f, m in zip(moved, motions, strict=True))
-    angle, warp = _warp(moved, placement, max(semi_axes), options)
+    angle, warp = _warp(moved, placement, semi_axes, rim, options)
     turn = turned(angle)
     if rim is not None:
-        rim = Rim(0.0, 0.0, (rim.angle - angle) % 180.0 if rim.angle else 0.0, rim.error)
+        rest = (rim.angle - angle) % 180.0 if rim.angle else 0.0
+        rim = Rim(0.0, 0.0, rest, rim.error, rim.turn_error)
     full = turn.after(placement)
     return all_applied(turn, moved), Registration(
         full, plane_of, flatness, rim, warp, _from_camera_x(full), motions, options
@@ -159,8 +170,9 @@ def _centred(
     weight = np.clip(rise, 0.0, None)
     start = (weight[:, None] * points).sum(axis=0) / weight.sum()
     angle = options.rim_angle
-    if angle is not None and options.warp is not None:
-        angle += options.warp
+    warp = _given_warp(placement, options)
+    if angle is not None and warp is not None:
+        angle += warp
     elif semi_axes[0] != semi_axes[1]:
         angle = None
     # The first centre decides which points lie on the disk.
@@ -176,18 +188,24 @@ def _surface(frame: Frame) -> tuple[Array, Array]:
     return frame.points[whole, :2], frame.displacement[whole, 2]
 
 
+def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptions) -> float:
+    """Degrees from the plane's x to the rim's first semi-axis; without meaning for a circle."""
+    if rim is not None:
+        return rim.angle
+    return (options.rim_angle or 0.0) + (_given_warp(placement, options) or 0.0)
+
+
 def _rim_points(
-    points: Array, semi_axes: tuple[float, float], options: RegistrationOptions
+    points: Array, semi_axes: tuple[float, float], angle: float, options: RegistrationOptions
 ) -> tuple[NDArray[np.bool_], str]:
-    beyond = clamp_points(points, semi_axes)
+    beyond = clamp_points(points, semi_axes, angle)
     seen = beyond.sum() >= LEAST and in_all_quarters(points[beyond])
     if options.plane == "clamp" and not seen:
         problem = "too few points beyond the rim to lay a plane through the clamp; choose 'edge'"
         raise InputError(None, "plane", problem)
     if seen and options.plane != "edge":
         return beyond, "clamp"
-    edge = np.hypot(points[:, 0] / semi_axes[0], points[:, 1] / semi_axes[1]) > EDGE
-    return np.asarray(edge & ~beyond), "edge"
+    return (rim_share(points, semi_axes, angle) > EDGE) & ~beyond, "edge"
 
 
 def _motions(
@@ -200,16 +218,32 @@ def _motions(
     return tuple(found)
 
 
-def _warp(
-    frames: Sequence[Frame], placement: Placement, radius: float, options: RegistrationOptions
-) -> tuple[float, WarpDirection | None]:
-    """Degrees from the plane's x to the warp."""
+def _given_warp(placement: Placement, options: RegistrationOptions) -> float | None:
+    """Degrees from the plane's x to the warp, where it is given."""
     if options.warp_points is not None:
         first, second = placement.places(np.array(options.warp_points, dtype=float))[:, :2]
-        return warp_of_points(first, second), None
-    if options.warp is not None:
-        return options.warp, None
-    found = warp_of_field(frames, radius, options.warp_is_stiff)
+        return warp_of_points(first, second)
+    return options.warp
+
+
+def _warp(
+    frames: Sequence[Frame],
+    placement: Placement,
+    semi_axes: tuple[float, float],
+    rim: Rim | None,
+    options: RegistrationOptions,
+) -> tuple[float, WarpDirection | None]:
+    """Degrees from the plane's x to the warp."""
+    given = _given_warp(placement, options)
+    if given is not None:
+        return given, None
+    if semi_axes[0] == semi_axes[1] or options.rim_angle is None:
+        found = warp_of_field(frames, min(semi_axes), options.warp_is_stiff)
+    elif rim is None:
+        problem = "expected the warp, too, where the centre of an elliptic rim is given"
+        raise InputError(None, "warp", problem)
+    else:
+        found = warp_of_rim(frames, min(semi_axes), rim, options.rim_angle)
     return found.angle, found
 
 

@@ -29,13 +29,15 @@ class Rim:
     """The clamped edge in the plane of the sheet.
 
     x, y : centre, mm. angle : of the first semi-axis from x towards y, degrees (0 for a circle).
-    error : standard error of the centre, mm, from the scatter about the shape.
+    error : standard error of the centre, mm, from the scatter about the shape. turn_error : of an
+    angle that was found, degrees; 0 where it was not looked for.
     """
 
     x: float
     y: float
     angle: float
     error: float
+    turn_error: float = 0.0
 
 
 def rim_of_motion(
@@ -81,7 +83,8 @@ def rim_of_motion(
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
     turn = float(best.x[2]) % 180.0 if free else fixed
-    return Rim(float(best.x[0]), float(best.x[1]), turn, error)
+    turn_error = float(np.sqrt(covariance[2, 2])) if free else 0.0
+    return Rim(float(best.x[0]), float(best.x[1]), turn, error, turn_error)
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:

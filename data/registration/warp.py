@@ -12,6 +12,7 @@ from ...errors import InputError
 from ..apex_shape import apex_shape
 from ..frames import Frame
 from .directions import line_angle
+from .rim import Rim
 from .symmetry import symmetry_axes
 
 Array = NDArray[np.float64]
@@ -26,13 +27,14 @@ class WarpDirection:
     """Where the warp lies, by the fields of all frames.
 
     angle : degrees from x towards y, from -90 to 90. error : standard error of their mean, degrees.
-    clear : of the axes, see `symmetry.Axes`. strains : Green-Lagrange at the centre in the highest
-    frame less those of the lowest, warp and fill.
+    clear : of the axes, see `symmetry.Axes`; None where an elliptic rim told the angle.
+    strains : Green-Lagrange at the centre in the highest frame less those of the lowest, warp and
+    fill.
     """
 
     angle: float
     error: float
-    clear: float
+    clear: float | None
     strains: tuple[float, float]
 
 
@@ -57,16 +59,46 @@ def warp_of_field(
             f" degrees, {axes.clear:.0%} clear); give the angle"
         )
         raise InputError(None, "warp", problem)
-    strain = centre_strain(frames[-1], radius)
-    if len(frames) > 1:
-        strain = strain - centre_strain(frames[0], radius)
-    turn = np.radians(axes.angle)
-    first, second = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-    along, across = float(first @ strain @ first), float(second @ strain @ second)
     angle = axes.angle
+    along, across = _strains(frames, radius, angle)
     if (along > across) == warp_is_stiff:
         angle, along, across = angle + 90.0, across, along
     return WarpDirection(line_angle(angle), axes.error, axes.clear, (along, across))
+
+
+def warp_of_rim(
+    frames: Sequence[Frame], radius: float, rim: Rim, rim_angle: float
+) -> WarpDirection:
+    """The warp by the turn of an elliptic rim, whose first semi-axis lies at `rim_angle` from it.
+
+    A sheet whose edge is an ellipse turned to the yarns has no axes of symmetry.
+
+    Parameters
+    ----------
+    frames : as for `warp_of_field`. rim : found. rim_angle : degrees from warp towards fill.
+
+    Raises
+    ------
+    InputError : an ellipse too round to tell its turn.
+    """
+    if rim.turn_error > UNSURE:
+        problem = (
+            f"the rim is too round to tell the warp (turned by {rim.angle:.0f} +- "
+            f"{rim.turn_error:.0f} degrees); give the angle"
+        )
+        raise InputError(None, "warp", problem)
+    angle = line_angle(rim.angle - rim_angle)
+    return WarpDirection(angle, rim.turn_error, None, _strains(frames, radius, angle))
+
+
+def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
+    """At the centre along an axis at `angle` degrees and across it."""
+    strain = centre_strain(frames[-1], radius)
+    if len(frames) > 1:
+        strain = strain - centre_strain(frames[0], radius)
+    turn = np.radians(angle)
+    first, second = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    return float(first @ strain @ first), float(second @ strain @ second)
 
 
 def centre_strain(frame: Frame, radius: float) -> Array:

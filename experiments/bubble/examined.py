@@ -21,7 +21,7 @@ def exhibit(prepared: PreparedBubble, out: Output) -> Exhibit:
         tables.insert(0, registration_table(prepared.registration))
     if prepared.view.apexes:
         tables.append(_equilibrium(prepared))
-    maps = registration_picture(prepared.fields, prepared.test.radius, out)
+    maps = registration_picture(prepared.fields, prepared.test.outline, out)
     return Exhibit(facts=_facts(prepared), figures=[maps, _rises(prepared, out)], tables=tables)
 
 

@@ -34,7 +34,7 @@ def exhibit(
     files += of_sheet[1]
     tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
     if prepared.registration is not None:
-        figures.append(registration_picture(prepared.fields, prepared.test.radius, out))
+        figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
     taken = recorded_of(prepared)
     if taken is not None:

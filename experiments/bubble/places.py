@@ -100,11 +100,11 @@ def _check_scale(test: BubbleTest, field: DisplacementField, inside: NDArray[np.
     """Metres taken for millimetres, or the other way round, show in where the points lie."""
     reach = float(np.abs(field.points).max())
     if inside.mean() < LEAST_SHARE:
-        where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of radius"
-    elif reach < LEAST_SHARE * test.radius:
-        where = f"all points lie within {reach:.3g} mm of the centre of a disk of radius"
+        where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of"
+    elif reach < LEAST_SHARE * test.outline.major:
+        where = f"all points lie within {reach:.3g} mm of the centre of a disk of"
     else:
         return
     at = f"{test.place.at}, data at {field.pressure * 1e3:g} kPa"
-    problem = f"{where} {test.radius:g} mm: are the length unit and the columns x and y right?"
+    problem = f"{where} {test.outline.words}: are the length unit and the columns x and y right?"
     raise InputError(test.place.path, at, problem)

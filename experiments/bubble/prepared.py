@@ -137,7 +137,7 @@ class PreparedBubble:
     @property
     def model(self) -> BubbleModel:
         """Of the sheet as it was, with the unknown shapes at zero."""
-        return with_sheet(self.test.model(), self.test.sheet, self.test.radius, self.sheet)
+        return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
 
     @property
     def outside(self) -> int:
@@ -150,7 +150,7 @@ class PreparedBubble:
     def view(self) -> View:
         """What is looked at before a fit."""
         test = self.test
-        return View(self.fields, test.radius, test.thickness, self.registration is not None)
+        return View(self.fields, test.outline, test.thickness, self.registration is not None)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """What makes the measured fields doubtful; nothing where they were computed."""
@@ -208,7 +208,7 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     surfaces = _surfaces(test, fields, known is not None)
     prepared = PreparedBubble(test, fields, surfaces, known, registration, same)
     try:
-        sheet = measured_sheet(test.sheet, test.radius, prepared.matched)
+        sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
     except InputError as error:
         raise in_section(test.place, error) from None
     return replace(prepared, sheet=sheet)
@@ -300,7 +300,7 @@ def _measured(
     if data.registration is None:
         return fields, None
     try:
-        return register_fields(fields, (test.radius, test.radius), data.registration)
+        return register_fields(fields, test.outline, data.registration)
     except InputError as error:
         field = f"data.points.registration.{error.field}".rstrip(".")
         raise test.place.error(field, error.problem) from None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...data.fields import DisplacementField
+from ...data.outline import Outline
 from ...data.registration.register import Registration
 from ...reports import Table, plot_registration
 from ..base import Output, Shown
@@ -80,6 +81,8 @@ def registration_line(found: Registration) -> str:
 
 def _warp_words(found: Registration) -> str:
     assert found.warp is not None
+    if found.warp.clear is None:
+        return f"found by the turn of the elliptic rim, +- {found.warp.error:.2g}"
     stiff = "stiffer" if found.options.warp_is_stiff else "softer"
     return (
         f"found by symmetry ({found.warp.clear:.0%} clear), +- {found.warp.error:.2g}; the "
@@ -97,11 +100,13 @@ def _motion_words(found: Registration) -> tuple[str, str]:
     return f"{shift:.3g} mm, {turn:.2g} degrees at most", removed
 
 
-def registration_picture(fields: Sequence[DisplacementField], radius: float, out: Output) -> Shown:
+def registration_picture(
+    fields: Sequence[DisplacementField], outline: Outline, out: Output
+) -> Shown:
     """Maps of the reference height, where it was measured, and of the highest rise."""
     last = fields[-1]
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))
-    plot_registration(out.path(PICTURE), last.points, maps, radius)
+    plot_registration(out.path(PICTURE), last.points, maps, outline.edge())
     return out.name(PICTURE), "measured points in the test's coordinates, the rim, warp and fill"

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
+from .outline_section import EllipseSection
 from .pressure_section import PressureSection
 from .registration_section import RegistrationSection
 from .sheet_section import SheetSection
@@ -84,7 +85,8 @@ class BubbleSection(Section):
 
     name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
     weight: Positive = 1.0
-    radius: Positive
+    radius: Positive | None = None
+    ellipse: EllipseSection | None = None
     pressures: Annotated[list[Positive], Field(min_length=1)] | None = None
     increments: list[Positive] | None = None
     elements: Elements = 800

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...data.disk_polynomials import DiskPolynomial, fit_disk_polynomial
 from ...data.fields import DisplacementField
+from ...data.outline import Outline
 from ...errors import InputError
 from ...identification.nuisance import Nuisance
 from ...meshes.disk_modes import disk_modes
@@ -45,9 +46,9 @@ FLAT = MeasuredSheet()
 
 
 def measured_sheet(
-    sheet: Sheet, radius: float, fields: Sequence[DisplacementField]
+    sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]
 ) -> MeasuredSheet:
-    """Polynomials through what was measured on the disk of a radius (mm).
+    """Polynomials through what was measured on the disk.
 
     Raises
     ------
@@ -55,18 +56,20 @@ def measured_sheet(
     """
     surface = None
     if sheet.measured:
-        surface = _surface(sheet, radius, fields)
+        surface = _surface(sheet, outline, fields)
     if not sheet.moving_rim:
         return MeasuredSheet(surface)
     polynomials = []
     for field in fields:
-        on = _on_disk(field, radius, "rim")
+        on = _on_disk(field, outline, "rim")
         values = field.displacement[on]
-        polynomials.append(fit_disk_polynomial(field.points[on], values, radius, sheet.degree))
+        polynomials.append(
+            fit_disk_polynomial(field.points[on], values, outline.major, sheet.degree)
+        )
     return MeasuredSheet(surface, tuple(polynomials))
 
 
-def _surface(sheet: Sheet, radius: float, fields: Sequence[DisplacementField]) -> DiskPolynomial:
+def _surface(sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]) -> DiskPolynomial:
     having = [f for f in fields if f.z is not None]
     if not having:
         problem = (
@@ -76,23 +79,23 @@ def _surface(sheet: Sheet, radius: float, fields: Sequence[DisplacementField]) -
     # The reference is the same in all frames; the one with the most points tells most.
     field = max(having, key=lambda f: len(f.points))
     assert field.z is not None
-    on = _on_disk(field, radius, "surface")
+    on = _on_disk(field, outline, "surface")
     heights = field.z[on] - np.median(field.z[on])
-    if np.ptp(heights) > MOST_HEIGHT * radius:
+    if np.ptp(heights) > MOST_HEIGHT * outline.radius:
         problem = (
             f"heights z of the reference picture differ by {np.ptp(heights):.3g} mm: expected a "
             "clamped sheet that is nearly flat; is it the reference, and the unit of z right?"
         )
         raise InputError(None, "sheet.surface", problem)
-    return fit_disk_polynomial(field.points[on], heights[:, None], radius, sheet.degree)
+    return fit_disk_polynomial(field.points[on], heights[:, None], outline.major, sheet.degree)
 
 
-def _on_disk(field: DisplacementField, radius: float, key: str) -> NDArray[np.bool_]:
-    distance = np.hypot(field.points[:, 0], field.points[:, 1])
-    on = distance <= radius
+def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np.bool_]:
+    share = outline.share(field.points)
+    on = share <= 1.0
     if field.z is not None and key == "surface":
         on &= np.isfinite(field.z)
-    reach = float(distance[on].max()) / radius if on.any() else 0.0
+    reach = float(share[on].max()) if on.any() else 0.0
     if reach < LEAST_REACH:
         problem = (
             f"points go out to {100 * reach:.0f} % of the radius; at least {100 * LEAST_REACH:.0f} "
@@ -102,7 +105,9 @@ def _on_disk(field: DisplacementField, radius: float, key: str) -> NDArray[np.bo
     return on
 
 
-def with_sheet(model: BubbleModel, sheet: Sheet, radius: float, of: MeasuredSheet) -> BubbleModel:
+def with_sheet(
+    model: BubbleModel, sheet: Sheet, outline: Outline, of: MeasuredSheet
+) -> BubbleModel:
     """The model of a flat disk as that of the sheet as it was."""
     places = model.mesh.points[:, :2]
     if of.surface is not None:
@@ -118,7 +123,9 @@ def with_sheet(model: BubbleModel, sheet: Sheet, radius: float, of: MeasuredShee
         motion = [np.interp(model.increments, levels, column) for column in flat.T]
         shape = (len(model.increments), len(rim), 3)
         model = replace(model, rim_motion=np.array(motion).T.reshape(shape))
-    return replace(model, modes=disk_modes(places, radius, sheet.modes)) if sheet.modes else model
+    if not sheet.modes:
+        return model
+    return replace(model, modes=disk_modes(outline.unit(places), 1.0, sheet.modes))
 
 
 def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:

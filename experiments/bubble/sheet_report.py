@@ -99,11 +99,11 @@ def sheet_exhibit(
 ) -> tuple[list[Shown], list[Shown]]:
     """Figures and files of the surface and of a constant field, where there are any."""
     figures, files = [], []
-    sheet, radius = prepared.test.sheet, prepared.test.radius
+    sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
-        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], radius)
+        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], edge)
         how = " and ".join(w for w in _used(prepared) if w in ("measured surface", "modes"))
         words = "surface of the sheet in the reference picture"
         figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
@@ -113,7 +113,7 @@ def sheet_exhibit(
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
         _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
-        plot_disk(out.path(CONSTANT_PICTURE), own, radius)
+        plot_disk(out.path(CONSTANT_PICTURE), own, edge)
         words = "measured less modelled, as far as it is the same at all pressures"
         figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
         files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))

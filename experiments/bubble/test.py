@@ -9,11 +9,13 @@ from typing import Literal
 
 import numpy as np
 
+from ...data.outline import Outline
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
-from ...meshes.disk import disk_mesh
+from ...meshes.elliptic_disk import elliptic_disk_mesh
 from ...models.bubble import BubbleModel, default_increments
 from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
+from .outline_section import outline_of
 from .section import BubbleSection, Symmetry
 from .sheet_section import Sheet, sheet_of
 from .sources import KnownSolution, PointFiles, data_source, measured_files, merge_increments
@@ -36,7 +38,7 @@ class BubbleTest:
     name: str
     place: Place
     weight: float
-    radius: float
+    outline: Outline
     elements: int
     symmetry: Symmetry
     generator: Literal["blocks", "gmsh"]
@@ -51,6 +53,11 @@ class BubbleTest:
     sheet: Sheet
     noise: float | None = None
     kind: str = "bubble"
+
+    @property
+    def radius(self) -> float:
+        """Of the disk, mm; of an ellipse the mean of the semi-axes."""
+        return self.outline.radius
 
     @property
     def thickness(self) -> float:
@@ -80,8 +87,8 @@ class BubbleTest:
         ------
         InputError : a mesh that cannot be had.
         """
-        mesh = disk_mesh(
-            self.radius, elements or self.elements, symmetry or self.symmetry, self.generator
+        mesh = elliptic_disk_mesh(
+            self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
         thick = self.thickness if thickness is None else thickness
         return BubbleModel(mesh, thick, self.pressures, increments or self.increments)
@@ -114,10 +121,11 @@ class BubbleTest:
     def settings(self) -> Mapping[str, object]:
         """Everything but names and places of files."""
         names = (
-            "radius", "elements", "symmetry", "generator", "pressures", "increments", "match_by",
+            "elements", "symmetry", "generator", "pressures", "increments", "match_by",
             "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
         )  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
+        said["outline"] = asdict(self.outline)
         if self.sheet != Sheet():
             said["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
@@ -156,19 +164,13 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
-    radius = section.radius * scales.length
-    if place.fabric.thickness >= radius:
-        problem = (
-            f"expected more than the fabric's thickness {place.fabric.thickness:g} mm, got "
-            f"{radius:g} mm"
-        )
-        raise place.error("radius", problem)
+    outline = outline_of(section, place)
     source = data_source(section, place, pressures, increments, measured)
     return BubbleTest(
         name=name,
         place=place,
         weight=section.weight,
-        radius=radius,
+        outline=outline,
         elements=section.elements,
         symmetry=section.symmetry,
         generator=section.generator,

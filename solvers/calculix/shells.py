@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...meshes.mesh import Mesh
+from ...meshes.rim import rim_form, rim_share
 
 Element = Literal["S4", "S8R"]
 ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
@@ -32,8 +33,8 @@ class ShellMesh:
 def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
     """The mesh as S4, or as S8R with a midside node on every edge.
 
-    A midside between two rim nodes is moved out onto the rim's circle; a midside whose two ends
-    are in a set is in the set when the edge bounds the mesh.
+    A midside between two rim nodes is moved out onto the rim's circle or ellipse; a midside whose
+    two ends are in a set is in the set when the edge bounds the mesh.
 
     Raises
     ------
@@ -57,8 +58,8 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
         inside = border & np.isin(edges, nodes).all(axis=1)
         sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(inside)])
         if name == "rim":
-            radius = np.hypot(*np.moveaxis(points[edges[inside]][..., :2], -1, 0)).mean(axis=1)
-            length = np.hypot(*midsides[inside, :2].T)
-            midsides[np.flatnonzero(inside), :2] *= (radius / length)[:, None]
+            form = rim_form(points[nodes, :2])
+            own = np.flatnonzero(inside)
+            midsides[own, :2] /= rim_share(form, midsides[own, :2])[:, None]
     elements = np.concatenate([quads, len(points) + which.reshape(quads.shape)], axis=1)
     return ShellMesh(np.concatenate([points, midsides]), elements, sets, len(points))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
+from ...meshes.rim import rim_form, rim_share
 from ...models.bubble import PRESSURE_OFFSET, BubbleModel
 from ..base import History
 from .derivatives import Derivatives
@@ -144,14 +145,18 @@ class Inflation(Loading):
         """From paraboloids of about the height that Hencky's membrane has."""
         membrane = self.membrane
         moduli = initial_moduli(membrane.law)
-        radius = np.hypot(membrane.reference[:, 0], membrane.reference[:, 1])
-        size = float(radius.max())
+        held = np.setdiff1d(np.arange(membrane.reference.size), membrane.free)
+        edge = membrane.reference[held[held % 3 == 2] // 3, :2]
+        if not len(edge):
+            return None  # nothing holds the sheet down
+        form = rim_form(edge)
+        # Of a taut flat sheet with an elliptic edge, the circle that rises as high.
+        size = math.sqrt(2.0 / float(np.trace(form)))
         stiffness = 0.5 * float(np.median(membrane.section)) * (moduli[0] + moduli[1])
         # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
         height = 0.662 * size * (level * size / stiffness) ** (1.0 / 3.0)
         dome = np.zeros_like(membrane.reference)
-        dome[:, 2] = 1.0 - (radius / size) ** 2
-        held = np.setdiff1d(np.arange(dome.size), membrane.free)
+        dome[:, 2] = 1.0 - rim_share(form, membrane.reference[:, :2]) ** 2
         for factor in FIRST_HEIGHTS:
             start = factor * height * dome
             start.reshape(-1)[held] = 0.0

@@ -194,6 +194,60 @@ def test_an_ellipse_is_found_with_its_direction():
     assert rim.angle == pytest.approx(35.0, abs=1e-3)
 
 
+def elliptic(angle: float, reach: float = 1.0) -> list[Frame]:
+    """Frames of a sheet whose edge is an ellipse (100 by 70 mm) at an angle from its x, the warp.
+
+    Its shape follows the edge and nothing else: it has no other axes.
+    """
+    points = grid(7.0, reach)
+    turn = rotation("z", angle)
+    u, v = (points @ turn)[:, :2].T / [[100.0], [70.0]]
+    on = np.clip(1 - u**2 - v**2, 0.0, None)
+    kept = (on > 0) | (reach > 1)
+    frames = []
+    for rise in (8.0, 20.0, 30.0):
+        along = on * (0.1 * u + 0.05 * v)
+        moved = np.stack([along, 0.1 * on * v, rise * on * (1 + 0.1 * u**2)], axis=1)
+        frames.append(Frame(points[kept], moved[kept]))
+    return frames
+
+
+@pytest.mark.parametrize(("reach", "within"), [(1.0, 0.05), (1.25, 0.6)])
+def test_the_turn_of_an_elliptic_rim_tells_the_warp(reach, within):
+    """Its major axis lies 25 degrees from the warp, and the camera sees the warp at 40.
+
+    Still points just beyond the rim turn what is found by 0.2 degrees.
+    """
+    frames = elliptic(25.0, reach)
+    turn = rotation("zx", [40.0, 5.0])
+    options = RegistrationOptions(rim_angle=25.0)
+    seen_frames = [seen(f, turn, (6.0, -4.0, 500.0)) for f in frames]
+    moved, found = register(seen_frames, (100.0, 70.0), options)
+    sense = np.sign(found.placement.axes[0] @ turn[:, 0])
+    flip = np.array([sense, sense, 1.0])
+    np.testing.assert_allclose(moved[-1].points * flip, frames[-1].points, atol=within)
+    assert found.warp is not None and found.rim is not None and found.warp.clear is None
+    assert found.plane_of == ("edge" if reach == 1.0 else "clamp")
+    assert found.rim.angle == pytest.approx(25.0, abs=0.02)
+    # Given: by the angle, or by two marks on the fabric.
+    marks = tuple(tuple(p) for p in np.array([[0.0, 0, 0], [30, 0, 0]]) @ turn.T)
+    for known in ({"warp": found.warp_angle}, {"warp_points": marks}):
+        fixed = register(seen_frames, (100.0, 70.0), RegistrationOptions(rim_angle=25.0, **known))
+        np.testing.assert_allclose(fixed[0][-1].points * flip, frames[-1].points, atol=within)
+        assert fixed[1].warp is None
+
+
+def test_an_ellipse_that_does_not_tell_the_warp_asks_for_it():
+    rng = np.random.default_rng(1)
+    frames = [
+        Frame(f.points, f.displacement + 0.3 * rng.standard_normal(f.points.shape)) for f in FRAMES
+    ]
+    with pytest.raises(InputError, match=r"too round to tell the warp.*give the angle"):
+        register(frames, (100.0, 99.9), RegistrationOptions(rim_angle=0.0))
+    with pytest.raises(InputError, match="expected the warp, too"):
+        register(elliptic(0.0), (100.0, 70.0), RegistrationOptions(rim_angle=0.0, centre=(0, 0, 0)))
+
+
 def test_strain_at_the_centre_is_that_of_the_gradient():
     points = grid()
     gradient = np.array([[0.02, 0.01], [0.03, -0.01], [0.1, 0.05]])

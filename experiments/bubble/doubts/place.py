@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....data.registration.directions import line_angle
 from ...doubts import Doubt, Expected
 from .view import View
 
@@ -65,6 +66,8 @@ def tilted(view: View, expected: Expected) -> list[Doubt]:
 
 def turned(view: View, expected: Expected) -> list[Doubt]:
     """Warp and fill are not along x and y."""
+    if not view.outline.round:
+        return _turned_rim(view)
     if view.axes is None or view.axes.clear < CLEAR or view.rim is None:
         return []
     if abs(view.axes.off) < max(TURN, SURE * view.axes.error):
@@ -76,8 +79,28 @@ def turned(view: View, expected: Expected) -> list[Doubt]:
     return [Doubt("turned", False, text)]
 
 
+def _turned_rim(view: View) -> list[Doubt]:
+    """An elliptic rim does not lie where it is said to."""
+    if view.rim is None:
+        return []
+    said = view.outline.angle
+    off = line_angle(view.rim.angle - said)
+    if abs(off) < max(TURN, SURE * view.rim.turn_error):
+        return []
+    text = (
+        f"the sheet rises within an ellipse whose major axis lies {said + off:.3g} degrees from x "
+        f"(+- {view.rim.turn_error:.2g}), not {said:.3g}: is its angle right, and {ADVICE}"
+    )
+    return [Doubt("turned", False, text)]
+
+
 def swapped(view: View, expected: Expected) -> list[Doubt]:
-    """Warp and fill for one another, by the bounds of the moduli."""
+    """Warp and fill for one another, by the bounds of the moduli.
+
+    An ellipse is strained more along its minor axis, whatever the law.
+    """
+    if not view.outline.round:
+        return []
     if not view.apexes or not expected.moduli or not expected.warp_is_stiffer:
         return []
     warp, fill = view.apexes[-1].strain

@@ -19,7 +19,7 @@ TELLING = 0.002
 
 def length_unit(view: View, expected: Expected) -> list[Doubt]:
     """mm beside m, in places or in displacements."""
-    reach = float(np.hypot(*view.last.points.T).max()) / view.radius
+    reach = float(view.outline.share(view.last.points).max())
     rise = abs(float(view.rises[-1])) / view.radius
     found = []
     if not LEAST_REACH < reach < MOST_REACH:

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from bubblefit.data.equilibrium import apex_of
 from bubblefit.data.fields import DisplacementField
+from bubblefit.data.outline import Outline
 from bubblefit.experiments.bubble.doubts import View, doubts_of
 from bubblefit.experiments.bubble.places import mirrored
 from bubblefit.experiments.doubts import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator
@@ -50,8 +52,37 @@ def good() -> Fields:
 
 
 def names(fields: Fields, expected: Expected = FABRIC, radius=RADIUS, thickness=THICKNESS):
-    found = doubts_of(View(tuple(fields), radius, thickness, False), expected)
+    found = doubts_of(View(tuple(fields), Outline.circle(radius), thickness, False), expected)
     return {doubt.name: doubt for doubt in found}
+
+
+def elliptic(outline: Outline) -> Fields:
+    """Fields of a sheet with an elliptic edge, a little noise in them."""
+    mesh = elliptic_disk_mesh(outline, 192)
+    history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, PRESSURES), LAW)
+    line = np.linspace(-1, 1, 29)[1:-1] + 0.01
+    points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
+    points = outline.places(points[np.hypot(*points.T) < 0.97])
+    fields = []
+    for pressure, moved in zip(PRESSURES, history.displacement, strict=True):
+        at = CloughTocher2DInterpolator(mesh.points[:, :2], moved)(points)
+        fields.append(DisplacementField(pressure, points, at, z=np.zeros(len(points))))
+    return noisy(tuple(fields), 0.02)
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0, 30.0])
+def test_an_elliptic_sheet_raises_no_doubt_where_it_is_said_to_lie(angle):
+    outline = Outline(120.0, 80.0, angle)
+    fields = elliptic(outline)
+    assert not doubts_of(View(fields, outline, THICKNESS, False), FABRIC)
+    off = Outline(120.0, 80.0, angle - 12.0)
+    found = doubts_of(View(fields, off, THICKNESS, False), FABRIC)
+    assert [doubt.name for doubt in found] == ["turned"]
+    assert f"{angle:.3g} degrees from x" in found[0].text or angle in (0.0, 90.0)
+    assert f"not {angle - 12.0:.3g}:" in found[0].text, found[0].text
+    inches = columns(1 / 25.4)(fields)
+    (unit,) = doubts_of(View(inches, outline, THICKNESS, False), FABRIC)
+    assert unit.name == "length-unit"
 
 
 def each(change: Callable[[DisplacementField], DisplacementField]):

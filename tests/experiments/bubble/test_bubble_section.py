@@ -59,6 +59,14 @@ def test_units_of_the_file_do_not_matter(edit):
     assert metre.radius == pytest.approx(reference.radius * 1000)
 
 
+def test_an_ellipse_in_place_of_the_radius(edit):
+    p = bubble(edit("radius = 100.0", "ellipse = { major = 120, minor = 80, angle = 90 }"))
+    assert (p.outline.major, p.outline.minor, p.outline.angle) == (120.0, 80.0, 90.0)
+    mesh = p.model().mesh
+    np.testing.assert_allclose(mesh.points.max(axis=0), (80.0, 120.0, 0.0))
+    assert str(p.settings()) != str(bubble(read_project(KNOWN)).settings())
+
+
 def test_data_from_another_model(edit):
     other = bubble(edit("# elements = 1800\n# increments", "elements = 1800\nincrements"))
     assert isinstance(other.data, KnownSolution) and other.data.elements == 1800
@@ -128,6 +136,37 @@ def test_data_folder_is_relative_to_the_project(tmp_path: Path):
         ("radius = 100.0", 'radius = "100 mm"', ["bubble[0].radius", "number", "'100 mm'"]),
         ("radius = 100.0", "radius = -1.0", ["bubble[0].radius", "greater than 0"]),
         ("radius = 100.0", "radius = 0.5", ["bubble[0].radius", "thickness 0.81 mm"]),
+        (
+            "radius = 100.0",
+            "radius = 100.0\nellipse = { major = 9, minor = 8 }",
+            ["bubble[0].radius", "not both"],
+        ),
+        (
+            "radius = 100.0",
+            "ellipse = { major = 80, minor = 120 }",
+            ["bubble[0].ellipse.minor", "at most the major 80 mm, got 120 mm", "'angle'"],
+        ),
+        (
+            "radius = 100.0",
+            "ellipse = { major = 120, minor = 20 }",
+            ["bubble[0].ellipse.minor", "4th part", "got 20 mm"],
+        ),
+        (
+            "radius = 100.0",
+            "ellipse = { major = 1.2, minor = 0.7 }",
+            ["bubble[0].ellipse.minor", "thickness 0.81 mm"],
+        ),
+        (
+            "radius = 100.0",
+            "ellipse = { major = 120, minor = 80, angle = 30 }",
+            ["bubble[0].symmetry", "30 degrees from the yarns", "'full'"],
+        ),
+        (
+            "radius = 100.0",
+            "ellipse = { major = 120, minor = 80, angle = 120 }",
+            ["bubble[0].ellipse.angle", "90"],
+        ),
+        ("radius = 100.0", "ellipse = { major = 120 }", ["bubble[0].ellipse.minor", "missing"]),
         ("[22, 59, 97", "[22, 97, 59", ["bubble[0].pressures[2]", "59 after 97"]),
         ("[22, 59, 97", "[22, 22, 97", ["bubble[0].pressures[1]", "increase"]),
         ("[22, 59, 97", "[0, 59, 97", ["bubble[0].pressures[0]", "greater than 0"]),

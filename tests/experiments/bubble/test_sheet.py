@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from bubblefit.data.disk_polynomials import fit_disk_polynomial
 from bubblefit.data.fields import DisplacementField
+from bubblefit.data.outline import Outline
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.bubble.relative import counted_from, with_places
@@ -22,6 +23,7 @@ from bubblefit.fits.fit import fit
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
 from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.base import History
 
@@ -29,6 +31,33 @@ from ...places import ROOT
 from ...projects import small
 
 PRESSURES = (0.02, 0.09, 0.19)
+EDGE = Outline.circle(100.0)
+
+
+def test_modes_and_a_measured_rim_of_an_ellipse():
+    """The modes vanish on its edge; the polynomials reach out to its ends."""
+    outline = Outline(120.0, 80.0, 30.0)
+    mesh = elliptic_disk_mesh(outline, 112)
+    flat = BubbleModel(mesh, 0.81, PRESSURES, default_increments(PRESSURES))
+    places = outline.places(np.random.default_rng(3).uniform(-0.7, 0.7, (400, 2)))
+    far = outline.edge(120)[:, :2] * 0.99
+    places = np.concatenate([places, far])
+    tilt = 2.0 + 0.02 * places[:, 0]
+    fields = [
+        DisplacementField(p, places, np.outer(tilt, [0.0, 0.0, p]), z=0.1 * tilt) for p in PRESSURES
+    ]
+    sheet = Sheet(measured=True, degree=4, modes=6, moving_rim=True)
+    model = with_sheet(flat, sheet, outline, measured_sheet(sheet, outline, fields))
+    rim = mesh.node_sets["rim"]
+    expected = PRESSURES[-1] * (2.0 + 0.02 * mesh.points[rim, 0])
+    np.testing.assert_allclose(model.rim_motion[-1, :, 2], expected, atol=1e-9)
+    np.testing.assert_allclose(model.mesh.points[:, 2], 0.002 * mesh.points[:, 0], atol=1e-9)
+    for name, mode in model.modes.items():
+        np.testing.assert_allclose(mode[rim], 0.0, atol=1e-12)
+        assert np.abs(mode).max() > 0.1, name
+    # Beyond the ellipse, within its circle: points of another outline do not reach the edge.
+    with pytest.raises(InputError, match="points go out to"):
+        measured_sheet(sheet, Outline(200.0, 160.0, 30.0), fields)
 
 
 def uneven_test():
@@ -125,7 +154,7 @@ def test_the_surface_and_the_rim_follow_the_measurement() -> None:
     flat = BubbleModel(mesh, 0.81, (0.05, 0.1), default_increments((0.05, 0.1)))
     sheet = Sheet(measured=True, degree=6, moving_rim=True, modes=6)
     fields = [field, replace(field, pressure=0.1, displacement=2 * field.displacement)]
-    model = with_sheet(flat, sheet, 100.0, measured_sheet(sheet, 100.0, fields))
+    model = with_sheet(flat, sheet, EDGE, measured_sheet(sheet, EDGE, fields))
     x, y = mesh.points[:, :2].T / 100
     expected = bumpy(x, y)
     rim = mesh.node_sets["rim"]
@@ -148,7 +177,7 @@ def test_the_surface_and_the_rim_follow_the_measurement() -> None:
 )
 def test_surfaces_that_are_not_known(field, problem) -> None:
     with pytest.raises(InputError, match=problem):
-        measured_sheet(Sheet(measured=True), 100.0, [field])
+        measured_sheet(Sheet(measured=True), EDGE, [field])
 
 
 def test_noise_of_the_surface_is_told() -> None:
