@@ -213,8 +213,11 @@ def test_the_gas_keeps_its_mass(bent):
 def test_the_crown_follows_the_collar(bent):
     model, history = bent
     top = history.displacement[:, model.mesh.node_sets["top_line"][0], 1]
-    # Pressed into the contact's springs, by a pressure over 5 MPa/mm.
-    np.testing.assert_allclose(top[0] - top[1:], model.deflections, atol=0.3)
+    behind = model.deflections - (top[0] - top[1:])
+    # The crown is pressed into the springs of contact, at the few points of a 30 mm element that
+    # touch: 0.10 and 0.17 mm at 5 MPa/mm, half as far at 20. A collar that touches 0.05 mm early
+    # or late is out of this.
+    assert 0.06 < behind[0] < behind[1] < 0.21
 
 
 def test_a_bent_cylinder_is_the_membrane_s(ccx):
