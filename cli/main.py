@@ -25,6 +25,7 @@ COMMANDS = {
     "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("init", "Write a commented project: an example, or for your own tests."),
     "schema": ("schema", "The JSON Schema of the project file, for editors."),
+    "verify": ("verify", "Published and closed-form numbers beside this program's."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }
 

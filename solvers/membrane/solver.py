@@ -133,6 +133,19 @@ class MembraneSolver:
             raise InputError(None, "parameters", f"{unknown} not among {known}")
         return self._analyse(model, law, parameters, guess)
 
+    @property
+    def stress(self) -> Array:
+        """(quads, points of a quad, 3) MPa: Cauchy stress along warp, fill and in shear at the end
+        of the last run.
+
+        Raises
+        ------
+        LookupError : nothing was run yet.
+        """
+        if self._prepared is None:
+            raise LookupError("no run yet: there is no stress")
+        return self._prepared[1].stress_old.copy()
+
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
         self,

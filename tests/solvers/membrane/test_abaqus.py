@@ -1,9 +1,10 @@
 """The bubble against an Abaqus M3D4 analysis with linear orthotropic constants.
 
-Digitised figures of a public repository (see `tests/published`); about 0.03 mm. Abaqus'
-membranes are incompressible in thickness. 400 quads of a quarter; 1600 find no equilibrium of
-test 1, model e beyond 290 kPa. Likely reason: with so low a G12 the acoustic tensor is indefinite
-near the rim from 115 kPa on (on every mesh), so the problem is not well posed under refinement.
+Digitised figures of a public repository (`studies/verification/published`); about 0.03 mm.
+Abaqus' membranes are incompressible in thickness. 400 quads of a quarter; 1600 find no
+equilibrium of test 1, model e beyond 290 kPa. Likely reason: with so low a G12 the acoustic tensor
+is indefinite near the rim from 115 kPa on (on every mesh), so the problem is not well posed under
+refinement.
 """
 
 from __future__ import annotations
@@ -13,37 +14,19 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.verification.abaqus import cases, shapes
 
-from ...places import PUBLISHED
-
-MODELS = [(1, "e"), (1, "ew"), (2, "e"), (2, "ew")]
 #: Error of reading the published figures, mm.
 DIGITISED = 0.03
+MODELS = [(1, "e"), (1, "ew"), (2, "e"), (2, "ew")]
 
 
 @cache
 def compare(test: int, model: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Ours and theirs: apex and extreme in-plane displacements, a row a pressure."""
-    rows = pd.read_csv(PUBLISHED / "abaqus_linear_orthotropic.csv", comment="#")
-    rows = rows[(rows["test"] == test) & (rows["model"] == model)].reset_index(drop=True)
-    law = HypoelasticLaw.linear(*(1e3 * rows[["E1", "E2", "G12"]].iloc[0]), 0.24, "incompressible")
-    pressures = 0.1 * rows["p_bar"].to_numpy()
-    mesh = disk_mesh(100.0, 1600, "quarter")
-    steps = np.unique(np.concatenate([pressures[0] * np.array([0.25, 0.5]), pressures]))
-    history = MembraneSolver().run(BubbleModel(mesh, 0.81, pressures, steps), law)
-    u = history.displacement
-    ours = pd.DataFrame(
-        {
-            "apex": u[:, mesh.node_sets["apex"][0], 2],
-            "du_x": u[..., 0].max(axis=1),
-            "du_y": u[..., 1].max(axis=1),
-        }
-    )
-    return ours, rows
+    rows = dict(cases())[test, model]
+    return shapes(rows, 1600, MembraneSolver()), rows
 
 
 @pytest.mark.parametrize(("test", "model"), MODELS)

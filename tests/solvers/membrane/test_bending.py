@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.closed import half_tube, tube_warp
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
 from bubblefit.solvers.base import History
@@ -19,8 +20,6 @@ from bubblefit.solvers.membrane.flexure import flexure_of
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.wall import Wall
-
-from ...closed_meshes import half_tube, tube_warp
 
 RADIUS, LENGTH, SPAN = 75.0, 600.0, 800.0
 POST = RigidCylinder("support", (1.0, 0.0, 0.0), (0.0, 0.0, 0.5 * SPAN), 50.0)

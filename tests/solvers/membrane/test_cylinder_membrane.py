@@ -18,8 +18,8 @@ from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.factorisation import BandedTangent, tangent_for
 from bubblefit.solvers.membrane.ordering import swept
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.verification.thin_walls import capped_strain
 
-from ...closed_forms import capped_strain
 from ...solvers.membrane.test_inflated import LAW
 
 PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]

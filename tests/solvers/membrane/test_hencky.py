@@ -1,10 +1,4 @@
-"""Hencky's inflated circular membrane (1915): the solver at small strains, and its order.
-
-With S = N_r (E t p^2 R^2)^(-1/3) and r in units of R the equilibrium and compatibility of a flat,
-linear elastic membrane under vertical pressure are  S'' + 3 S'/r + 1/(8 S^2) = 0, regular at
-r = 0, with u = 0 at the rim: N_theta = nu N_r, (1 - nu) S + S' = 0 at r = 1. The slope of the
-dome is -r/(2 S) (p R/(E t))^(1/3), whose integral is the height of the apex.
-"""
+"""Hencky's inflated circular membrane (1915): the solver at small strains, and its order."""
 
 from __future__ import annotations
 
@@ -14,40 +8,15 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from scipy.optimize import brentq
-
-TERMS = 60
-RADIUS, THICKNESS, MODULUS = 100.0, 0.81, 300.0
-
-
-def stress_series(first: float) -> np.ndarray:
-    """Coefficients c_n of S = sum c_n r^(2n) for S(0) = first."""
-    c, square = np.zeros(TERMS), np.zeros(TERMS)
-    c[0], square[0] = first, first**2
-    # Powers of S^2 (S'' + 3 S'/r) = -1/8; S'' + 3 S'/r = sum 2n (2n + 2) c_n r^(2n - 2).
-    curvature = np.zeros(TERMS)
-    for n in range(1, TERMS):
-        k = n - 1
-        target = -0.125 if k == 0 else 0.0
-        curvature[k] = (target - square[1 : k + 1] @ curvature[k - 1 :: -1][:k]) / square[0]
-        c[n] = curvature[k] / (2 * n * (2 * n + 2))
-        square[n] = c[: n + 1] @ c[n::-1]
-    return c
-
-
-def apex_coefficient(nu: float) -> float:
-    """Apex height over R (p R/(E t))^(1/3)."""
-    powers = 2 * np.arange(TERMS)
-
-    def rim(first: float) -> float:
-        c = stress_series(first)
-        return float((1 - nu) * c.sum() + powers @ c)
-
-    # The series converges at the rim for all of these; b_0 = 4 S(0) is 1.6 to 2 in the tables.
-    c = stress_series(brentq(rim, 0.36, 0.60, xtol=1e-14))
-    r, weight = np.polynomial.legendre.leggauss(40)
-    r, weight = 0.5 * (r + 1), 0.5 * weight
-    return float(weight @ (r / (2 * (c @ r ** powers[:, None]))))
+from bubblefit.studies.verification.hencky import (
+    FICHTER,
+    MODULUS,
+    RADIUS,
+    TERMS,
+    THICKNESS,
+    apex_coefficient,
+    stress_series,
+)
 
 
 def apex(elements: int, pressure: float, nu: float, change: str = "constant") -> float:
@@ -67,7 +36,7 @@ def pressure_for(height: float, nu: float) -> float:
     return (height / apex_coefficient(nu)) ** 3 * MODULUS * THICKNESS / RADIUS
 
 
-@pytest.mark.parametrize(("nu", "b_0"), [(0.2, 1.6827), (0.3, 1.7244), (0.4, 1.7769)])
+@pytest.mark.parametrize(("nu", "b_0"), FICHTER.items())
 def test_the_series_itself_against_fichter(nu: float, b_0: float) -> None:
     """W. B. Fichter, NASA TP 3658 (1997), table of b_0 for Hencky's problem; four decimals."""
     c = stress_series(b_0 / 4)

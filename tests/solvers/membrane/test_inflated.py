@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.closed import half_tube, sphere_octant, tube_warp
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strain import log_strain_of
 from bubblefit.models.gas import ClosedGas
@@ -19,11 +20,10 @@ from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.wall import Wall
+from bubblefit.studies.verification.thin_walls import capped_strain
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ...closed_forms import capped_strain
-from ...closed_meshes import half_tube, sphere_octant, tube_warp
 from ...published_laws import TABLE_4_2
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])

@@ -7,15 +7,10 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import SLOPES
 from bubblefit.materials.relaxation import relaxed_update
-from bubblefit.meshes.mesh import Mesh
-from bubblefit.models.inflated import InflatedModel
-from bubblefit.solvers.membrane.closed_model import closed_membrane
-from bubblefit.solvers.membrane.wall import Wall
+from bubblefit.studies.verification.bent_tube import FIRST, PlaneEnds, published_moment
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import brentq, newton
 
-from ...closed_meshes import half_tube, tube_warp
 from ...solvers.membrane.test_inflated import LAW
 
 strains = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.2, 0.2)).map(np.array)
@@ -98,80 +93,13 @@ def test_what_is_left_to_wrinkles_vanishes_with_its_share() -> None:
     assert excess[2] == 0.0
 
 
-# A tube under pressure p, its ends kept plane and turned against each other. Comer and Levy, AIAA
-# Journal 1 (1963) 1652: no stress at angles below t from the compressed side, where
-# cos t = (mean strain over strain by bending), and M/(pi p r^3) between 1/2 (first wrinkle) and 1.
-
-RADIUS, LENGTH, THICKNESS, MODULUS, PRESSURE = 100.0, 60.0, 1.0, 1000.0, 0.02
-
-
-def published_moment(curvature: float, radius: float) -> tuple[float, float]:
-    """Share of the circumference that wrinkles, and M/(pi p r^3)."""
-
-    def excess_force(t: float) -> float:
-        by_bending = 2.0 * radius**2 * THICKNESS * MODULUS * curvature
-        return by_bending * ((np.pi - t) * np.cos(t) + np.sin(t)) - np.pi * radius**2 * PRESSURE
-
-    t = brentq(excess_force, 0.0, 3.1)
-    moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
-    return t / np.pi, moment
-
-
-class PlaneEnds:
-    """Half of half a tube whose end at `LENGTH` stays plane, at a given turn and stretch."""
-
-    def __init__(self, across: int, share: float | None) -> None:
-        tube = half_tube(across, across // 8, RADIUS, LENGTH, caps=False)
-        self.points = tube.points
-        self.end = np.flatnonzero(tube.points[:, 2] > LENGTH - 1e-6)
-        low = np.array([np.argmin(tube.points @ [0.0, 1.0, 1e-3])])
-        sets = {**tube.node_sets, "end": self.end, "low": low}
-        mesh = Mesh(tube.points, tube.quads, sets)
-        supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
-        model = InflatedModel(mesh, THICKNESS, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4)
-        law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2.6, 0.3)
-        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
-        self.displacement = np.zeros_like(self.points)
-        self.stretched = 0.2 * PRESSURE * RADIUS / (THICKNESS * MODULUS)
-        self.displacement[self.end, 2] = LENGTH * self.stretched
-        found = self.membrane.equilibrium_from_slack(self.displacement, PRESSURE)
-        assert found is not None
-        self.displacement = found
-
-    def moment(self, curvature: float) -> tuple[float, float, float]:
-        """Share of the wall that wrinkles, M/(pi p r^3), r; the end carries what p pushes on it."""
-
-        def excess_force(stretch: float) -> float:
-            start = self.displacement.copy()
-            start[self.end, 2] = LENGTH * (stretch + curvature * self.points[self.end, 1])
-            found = self.membrane.equilibrium(start, PRESSURE)
-            assert found is not None
-            self.displacement = found
-            return float(self.pull().sum() - np.pi * self.radius() ** 2 * PRESSURE)
-
-        ahead = self.stretched - 0.05 * curvature * RADIUS
-        self.stretched = newton(excess_force, self.stretched, x1=ahead, tol=1e-11)
-        excess_force(self.stretched)
-        radius, height = self.radius(), (self.points + self.displacement)[self.end, 1]
-        middle = 0.5 * (height.max() + height.min())
-        wrinkled = self.membrane.wrinkled_share(np.ones(len(self.membrane.quads), dtype=bool))
-        return wrinkled, self.pull() @ (height - middle) / (np.pi * PRESSURE * radius**3), radius
-
-    def pull(self) -> np.ndarray:
-        return 2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2]
-
-    def radius(self) -> float:
-        return float(np.hypot(*(self.points + self.displacement)[self.end, :2].T).mean())
-
-
 def test_bent_tube_wrinkles_as_published() -> None:
     """At multiples of the curvature of the first wrinkle; 1e-4 is left to wrinkles."""
-    first = 0.5 * PRESSURE / (THICKNESS * MODULUS)
     tube, taut = PlaneEnds(32, 1e-4), PlaneEnds(32, None)
     for times in (1.5, 2.5, 4.0):
-        wrinkled, moment, radius = tube.moment(times * first)
-        expected_wrinkled, expected = published_moment(times * first, radius)
+        wrinkled, moment, radius = tube.moment(times * FIRST)
+        expected_wrinkled, expected = published_moment(times * FIRST, radius)
         assert moment == pytest.approx(expected, rel=2e-3)
         assert wrinkled == pytest.approx(expected_wrinkled, abs=1.0 / 32)
     # A membrane that carries compression goes on as it began.
-    assert taut.moment(1.5 * first)[1] == pytest.approx(0.75, rel=1e-2)
+    assert taut.moment(1.5 * FIRST)[1] == pytest.approx(0.75, rel=1e-2)

@@ -1,9 +1,10 @@
-"""Closed surfaces for the tests of the membrane solver: an octant of a sphere, a capped tube."""
+"""Closed surfaces whose answers are known: an octant of a sphere, half a tube with a flat cap."""
 
 from __future__ import annotations
 
 import numpy as np
-from bubblefit.meshes.mesh import Mesh
+
+from .mesh import Mesh
 
 
 def merged(points: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
