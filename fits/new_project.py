@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from .. import __version__
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
 from ..materials.forms.registry import form_names
+from ..rendering import TEMPLATES, render
 from ..writing import write_text
 from .project import read_project
 
-#: A template for the head and, named as it, one for each kind of test.
-TEMPLATES = Path(__file__).resolve().parent.parent / "templates" / "project"
 #: What a test is like unless something else is said; mm and kPa.
 USUAL: Mapping[str, Any] = {
     "radius": 100.0,
@@ -27,8 +24,9 @@ USUAL: Mapping[str, Any] = {
 
 
 def writable_kinds() -> list[str]:
-    """Kinds of test that a project file can be written for."""
-    return [name for name in kinds() if (TEMPLATES / f"{name}.toml.j2").is_file()]
+    """Kinds of test that a project file can be written for: those with a template."""
+    folder = TEMPLATES / "project"
+    return [name for name in kinds() if (folder / f"{name}.toml.j2").is_file()]
 
 
 def write_project(
@@ -100,12 +98,4 @@ def _quoted(text: str) -> str:
 
 
 def _render(template: str, /, **context: Any) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    return environment.get_template(f"{template}.toml.j2").render(context)
+    return render(f"project/{template}.toml.j2", **context)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field, fields
 from math import inf, isfinite
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import FileSystemLoader
 
+from ..rendering import TEMPLATES, environment
 from ..writing import replacing
-
-TEMPLATES = Path(__file__).parent.parent / "templates" / "report"
 
 
 @dataclass(frozen=True)
@@ -88,17 +87,10 @@ def write_report(folder: Path | str, report: Report) -> Path:
     OutputError : the file cannot be written.
     jinja2.UndefinedError : the template asks for what the report does not have.
     """
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["number"] = number
-    environment.filters["percent"] = percent
-    template = environment.get_template("report.html.j2")
+    html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
+    html.filters["number"] = number
+    html.filters["percent"] = percent
+    template = html.get_template("report.html.j2")
     context = {f.name: getattr(report, f.name) for f in fields(report)}
     context["starts"] = sorted(report.starts, key=_best_first)
     page = template.render(context)

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-from jinja2.sandbox import SandboxedEnvironment
 
 from ..errors import InputError
-
-OURS = Path(__file__).resolve().parent.parent / "templates"
+from ..rendering import TEMPLATES, environment
 
 
 def render(
@@ -34,29 +32,21 @@ def render(
     InputError : the template is not there or not readable; a variable that it asks for does not
         exist, a mistake in its syntax or its arithmetic: template, line and what is wrong.
     """
-    folders = [OURS / solver]
+    folders = [TEMPLATES / solver]
     if folder is not None:
         if not (folder / name).is_file():
-            problem = f"holds no {name}; copy {OURS / solver / name} there and change it"
+            problem = f"holds no {name}; copy {TEMPLATES / solver / name} there and change it"
             raise InputError(folder, "templates", problem)
         folders.insert(0, folder)
     files = dict(instead or {})
-    environment = SandboxedEnvironment(
-        loader=jinja2.ChoiceLoader(
-            [
-                jinja2.FunctionLoader(lambda wanted: _of_file(files, wanted)),
-                jinja2.FileSystemLoader(folders),
-            ]
-        ),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    environment.filters |= {"number": _number, "i10": _i10, "e20": _e20}
+    loaders: list[jinja2.BaseLoader] = [
+        jinja2.FunctionLoader(lambda wanted: _of_file(files, wanted)),
+        jinja2.FileSystemLoader(folders),
+    ]
+    decks = environment(jinja2.ChoiceLoader(loaders), trusted=False)
+    decks.filters |= {"number": _number, "i10": _i10, "e20": _e20}
     try:
-        return environment.get_template(name).render(context)
+        return decks.get_template(name).render(context)
     except jinja2.TemplateSyntaxError as error:
         where = Path(error.filename or folders[0] / name)
         raise InputError(where, f"line {error.lineno}", error.message or "syntax error") from None

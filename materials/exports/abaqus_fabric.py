@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...rendering import render
 from ..card import MaterialCard
 from .base import (
     DENSITY,
@@ -10,7 +11,6 @@ from .base import (
     density_remarks,
     heading,
     range_remarks,
-    render,
 )
 from .curves import fabric_curves
 from .formats import CurveOptions, Format

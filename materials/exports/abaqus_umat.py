@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ...rendering import render
 from ..card import MaterialCard
 from .abaqus_fabric import material_name
-from .base import Export, Says, heading, render
+from .base import Export, Says, heading
 from .formats import Format, NoOptions
 from .fortran import law_constants
 

@@ -1,14 +1,11 @@
-"""What every export gives, and how its text is made."""
+"""What every export gives, and what heads its text."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
-import jinja2
 import numpy as np
 
 from ... import __version__
@@ -17,7 +14,6 @@ from ...notes import Note, NoteKind
 from ..card import MaterialCard
 from ..forms.base import COMPONENTS, UNLIMITED
 
-TEMPLATES = Path(__file__).resolve().parent.parent.parent / "templates"
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
 #: Strains a modulus at which a card is looked at.
@@ -93,19 +89,6 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
     lines += [f"units: mm, N, MPa; thickness {card.thickness:g} mm", *says.lines()]
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
-
-
-def render(template: str, /, **context: Any) -> str:
-    """Text of `template` (a path below templates/)."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    return environment.get_template(template).render(context)
 
 
 def density_remarks(density: float | None) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...rendering import render
 from ..card import MaterialCard
 from ..responses import MEASURES, Measure
 from .base import (
@@ -16,7 +17,6 @@ from .base import (
     density_remarks,
     heading,
     range_remarks,
-    render,
 )
 from .curves import fabric_curves
 from .formats import CurveOptions, Format, option

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...rendering import render
 from ..card import MaterialCard
 from ..law import HypoelasticLaw
 from ..responses import bar
-from .base import Export, Says, heading, render
+from .base import Export, Says, heading
 from .formats import Format, NoOptions
 from .fortran import double, law_constants, logical
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ...rendering import render
 from ..card import MaterialCard
 from ..tables import JUMP, ModulusTable, modulus_tables
-from .base import Export, Says, heading, range_remarks, render
+from .base import Export, Says, heading, range_remarks
 from .formats import Format, TableOptions
 
 #: Table numbers in the deck, by modulus.

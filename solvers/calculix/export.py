@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...materials.card import MaterialCard
-from ...materials.exports.base import Export, Says, heading, render
+from ...materials.exports.base import Export, Says, heading
 from ...materials.exports.formats import Format, NoOptions
+from ...rendering import render
 from .law_file import SUFFIX, law_text
 from .library import FLAGS, LIBRARY_FILE, MATERIAL, SOURCE, STATE_VARIABLES, constants
 

@@ -8,14 +8,12 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import jinja2
-
 from ...errors import OutputError, SolverFailure
+from ...rendering import render
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law
 from .law_file import law_files
 from .library import MATERIAL, STATE_VARIABLES, constants, material_library
 
-TEMPLATES = Path(__file__).parent.parent.parent / "templates" / "calculix"
 SECONDS = 120.0
 #: Corners of a bar, in the order of C3D8.
 NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -23,9 +21,6 @@ NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 
 def bar_deck() -> str:
     """The deck: every bar pulled along x, the fabric turned so that its direction lies there."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), undefined=jinja2.StrictUndefined
-    )
     bars = [
         {
             "index": index,
@@ -36,7 +31,8 @@ def bar_deck() -> str:
         }
         for index, bar in enumerate(BARS)
     ]
-    return environment.get_template("bars.inp.j2").render(
+    return render(
+        "calculix/bars.inp.j2",
         bars=bars,
         nodes=NODES,
         increments=INCREMENTS,

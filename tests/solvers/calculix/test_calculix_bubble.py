@@ -15,13 +15,14 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.disk_modes import disk_modes
 from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
 from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.rendering import TEMPLATES
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.bubble import decks
 from bubblefit.solvers.calculix.pressure import pressure_forces
 from bubblefit.solvers.calculix.sheet import rim_paths, tilt_remarks, without_stress
 from bubblefit.solvers.calculix.shells import shell_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.decks import OURS, render
+from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
@@ -188,7 +189,7 @@ def test_a_whole_disk_is_four_quarters(ccx):
 def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
     """The strain path is the model's: a deck that cuts every step in four gives the same."""
     model = bubble(64, "quarter", (0.059, 0.132, 0.186))
-    text = (OURS / "calculix" / "bubble.inp.j2").read_text()
+    text = (TEMPLATES / "calculix" / "bubble.inp.j2").read_text()
     (tmp_path / "bubble.inp.j2").write_text(
         text.replace("least | number }}, 1\n", "least | number }}, 0.25\n")
     )

@@ -12,11 +12,11 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from bubblefit.rendering import TEMPLATES
 from bubblefit.solvers.calculix import strip
 from bubblefit.solvers.calculix.shells import shell_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.calculix.strip_results import StripRun, strip_history
-from bubblefit.solvers.decks import OURS
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.pulls import corrected
 
@@ -115,8 +115,8 @@ def test_the_homogeneous_strip(ccx, name, element, thickness_change):
 
 def plane_stress(folder: Path) -> Path:
     """Templates of a user who takes plane stress elements: the membrane's own shape functions."""
-    deck = (OURS / "calculix" / "strip.inp.j2").read_text()
-    mesh = (OURS / "calculix" / "mesh.inp.j2").read_text()
+    deck = (TEMPLATES / "calculix" / "strip.inp.j2").read_text()
+    mesh = (TEMPLATES / "calculix" / "mesh.inp.j2").read_text()
     deck = deck.replace("*SHELL SECTION", "*SOLID SECTION").replace("ALL, 3, 3\n", "")
     (folder / "strip.inp.j2").write_text(deck)
     (folder / "mesh.inp.j2").write_text(mesh.replace("TYPE={{ element }}", "TYPE=CPS4"))
@@ -142,7 +142,7 @@ def test_the_same_element_gives_the_same(ccx, tmp_path, thickness_change, angle)
 
 def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
     """Cut into four each, they still meet every whole time."""
-    text = (OURS / "calculix" / "strip.inp.j2").read_text()
+    text = (TEMPLATES / "calculix" / "strip.inp.j2").read_text()
     cut = text.replace("least | number }}, 1\n", "least | number }}, 0.25\n")
     (tmp_path / "strip.inp.j2").write_text(cut)
     coarse = model("bias", 6, **COARSE)
