@@ -7,12 +7,12 @@ the separator. All of it is found by what the names mean (`frame_headings`).
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from .decimal_marks import decimal_mark, is_number
 from .frame_headings import LENGTHS, PIXELS, Heading, columns_of, heading_of
 from .tables import read_lines
 
@@ -25,10 +25,6 @@ SEPARATORS = ("\t", ";", ",", None)
 TOP = 300
 #: So many rows are looked at for the decimal mark.
 SAMPLE = 500
-
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 @dataclass(frozen=True)
@@ -138,14 +134,14 @@ def _best_header(
 
 def _is_numbers(row: Sequence[str]) -> bool:
     """Whether half of the cells or more are numbers."""
-    return 2 * sum(bool(_NUMBER.fullmatch(cell)) for cell in row) >= max(len(row), 1)
+    return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
 
 
 def _is_units(row: Sequence[str]) -> bool:
     """Whether a row below the names is one of units: some are lengths, and none is a number."""
     plain = [cell.strip("()[]<>{} ").casefold() for cell in row]
     known = any(cell in LENGTHS or cell in PIXELS for cell in plain)
-    return known and not any(_NUMBER.fullmatch(cell) for cell in plain)
+    return known and not any(is_number(cell) for cell in plain)
 
 
 def _decimal(
@@ -157,21 +153,13 @@ def _decimal(
 ) -> str:
     wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
     cells = [
-        (number, i, row[i])
+        (number, headings[i].name, row[i])
         for number, text in body[:SAMPLE]
         for row in [cells_of(text, separator) or []]
         for i in wanted
         if i < len(row)
     ]
-    commas = [one for one in cells if _COMMA.fullmatch(one[2])]
-    points = any("." in cell and _NUMBER.fullmatch(cell) for _, _, cell in cells)
-    if not commas or points:
-        return "."
-    if all(_GROUPED.fullmatch(cell) for _, _, cell in commas):
-        number, i, cell = commas[0]
-        problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
-        raise InputError(path, f"line {number}, column {headings[i].name!r}", problem)
-    return ","
+    return decimal_mark(path, cells)
 
 
 def _nothing_found(lines: Lines) -> str:

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..column_names import LENGTH_UNITS, LOAD_UNITS, TIME_UNITS, columns_of, split_unit
+from ..decimal_marks import decimal_mark, is_number
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
 from ..tables import TextTable, read_lines
@@ -28,10 +29,7 @@ Rows = list[tuple[int, list[str]]]
 
 SEPARATORS = ("\t", ";", ",")
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _LETTER = re.compile(r"[^\W\d_eE]")
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
@@ -170,11 +168,11 @@ def _is_header(rows: Rows, index: int, named: Mapping[str, str], quantities: Seq
 
 
 def _begins_with_a_number(row: list[str]) -> bool:
-    return bool(_NUMBER.fullmatch(next((cell for cell in row if cell), "")))
+    return is_number(next((cell for cell in row if cell), ""))
 
 
 def _is_number(row: list[str], column: int) -> bool:
-    return column < len(row) and bool(_NUMBER.fullmatch(row[column]))
+    return column < len(row) and is_number(row[column])
 
 
 def _is_unit_row(row: list[str], needed: list[int]) -> bool:
@@ -200,15 +198,7 @@ def _unit_row(
 
 def _decimal(path: Path, rows: Rows, names: list[str], needed: list[int]) -> str:
     cells = [(n, names[i], row[i]) for n, row in rows for i in needed if i < len(row)]
-    commas = [one for one in cells if _COMMA.fullmatch(one[2])]
-    points = any("." in cell and _NUMBER.fullmatch(cell) for _, _, cell in cells)
-    if not commas or points:
-        return "."
-    if all(_GROUPED.fullmatch(cell) for _, _, cell in commas):
-        number, name, cell = commas[0]
-        problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
-        raise InputError(path, f"line {number}, column {name!r}", problem)
-    return ","
+    return decimal_mark(path, cells)
 
 
 def _nothing_found(
