@@ -12,11 +12,11 @@ from ...materials.forms.base import COMPONENTS
 from ...notes import Note, NoteKind
 from ..base import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
+from .point_files import PointFiles
 from .recorded import RecordedFrames
 from .recorded_words import recorded_lines, recorded_numbers
 from .registration import registration_line, registration_numbers
 from .sheet_report import sheet_lines, sheet_numbers, sheet_warnings
-from .sources import PointFiles
 
 if TYPE_CHECKING:
     from .prepared import PreparedBubble

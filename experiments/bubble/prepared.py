@@ -27,9 +27,10 @@ from .doubts import View, doubts_of
 from .findings import findings_of
 from .objective import OFFSETS, FieldObjective
 from .places import at_nodes, at_points, folded, mirrored
+from .point_files import PointFiles
 from .relative import counted_from, with_places
 from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
-from .sources import KnownSolution, PointFiles, in_section
+from .sources import KnownSolution
 from .test import BubbleTest
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
@@ -111,7 +112,7 @@ class PreparedBubble:
             kind = "e" if weighting.relative else test.objective
             objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
         except InputError as error:
-            raise in_section(test.place, error) from None
+            raise test.place.error(error.field, error.problem) from None
         nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
 
@@ -210,7 +211,7 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     try:
         sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
     except InputError as error:
-        raise in_section(test.place, error) from None
+        raise test.place.error(error.field, error.problem) from None
     return replace(prepared, sheet=sheet)
 
 

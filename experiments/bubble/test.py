@@ -15,10 +15,12 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.elliptic_disk import elliptic_disk_mesh
 from ...models.bubble import BubbleModel, default_increments
 from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
+from .increments import merge_increments
 from .outline_section import outline_of
+from .point_files import PointFiles, measured_files
 from .section import BubbleSection, Symmetry
 from .sheet_section import Sheet, sheet_of
-from .sources import KnownSolution, PointFiles, data_source, measured_files, merge_increments
+from .sources import KnownSolution, data_source
 
 PART = "bubble"
 NO_PRESSURES = (

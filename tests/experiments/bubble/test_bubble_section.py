@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.sources import KnownSolution, PointFiles
+from bubblefit.experiments.bubble.point_files import PointFiles
+from bubblefit.experiments.bubble.sources import KnownSolution
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.fits.project import Project, read_project
 
