@@ -16,15 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .rising import LEAST_FRAMES, WITHIN, misfit_of, straightest
+from .offset_misfits import log_at, offset_misfits
+from .rising import LEAST_FRAMES
 
 Array = NDArray[np.float64]
 
-#: Offsets looked at: half a frame apart, no more than so many; then finer about the best.
-MOST, FINE = 20_000, 20
-#: Frames are at rest within so many standard deviations of the lowest, and below this share of the
-#: most; share of the log that is below its least pressure, by noise.
-SIGMAS, AT_REST, BELOW = 6.0, 0.02, 0.01
 #: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
 FLOOR = 1e-6
 #: Offsets of a misfit up to so many times the smallest may be the right one.
@@ -69,7 +65,7 @@ def given_offset(
     ------
     InputError : no frame lies within the log.
     """
-    there = _at(offset, times, log_times, pressures)
+    there = log_at(offset, times, log_times, pressures)
     if not np.isfinite(there).any():
         problem = (
             f"no frame lies within the log: frames from {times.min() + offset:.2f} to"
@@ -98,24 +94,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     if known.sum() < LEAST_FRAMES:
         problem = f"{known.sum()} frames are too few to find it by; give it in s"
         raise InputError(None, "offset", problem)
-    order = np.argsort(times[known], kind="stable")
-    t, h = times[known][order], heights[known][order]
-    h = np.where(h > _rest_height(h), h, 0.0)
-    rest = float(np.quantile(pressures, BELOW))
-
-    def misfit(offset: float) -> float:
-        return misfit_of(_at(offset, t, log_times, pressures), h, rest)
-
-    coarse = _offsets(t, log_times)
-    h = h ** straightest(h, [_at(s, t, log_times, pressures) for s in coarse])
-    misfits = np.array([misfit(s) for s in coarse])
-    step = coarse[1] - coarse[0] if len(coarse) > 1 else 0.0
-    fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
-    fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
-    offsets = np.concatenate([coarse, fine])
-    misfits = np.append(misfits, [misfit(s) for s in fine])
-    order = np.argsort(offsets, kind="stable")
-    offsets, misfits = offsets[order], misfits[order]
+    offsets, misfits = offset_misfits(times[known], heights[known], log_times, pressures)
     best = int(np.argmin(misfits))
     if misfits[best] > WORST_MISFIT:
         problem = (
@@ -133,8 +112,8 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     offset = float(offsets[first] + offsets[last]) / 2
     may_be = offsets[able]
     some = np.append(may_be[:: max(1, len(may_be) // 200)], may_be[-1])
-    each = np.array([_at(s, times, log_times, pressures) for s in some])
-    there = _at(offset, times, log_times, pressures)
+    each = np.array([log_at(s, times, log_times, pressures) for s in some])
+    there = log_at(offset, times, log_times, pressures)
     doubt = _half_range(each)
     span = float(np.ptp(there[np.isfinite(there)]))
     if float(np.nanmean(doubt)) > MOST_DOUBT * span:
@@ -148,33 +127,6 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     lower, upper = float(may_be[0]), float(may_be[-1])
     least = float(misfits[best])
     return ClockOffset(offset, lower, upper, least, there, doubt, times, heights)
-
-
-def _offsets(t: Array, log_times: Array) -> Array:
-    """The offsets at which enough frames lie within the log, half a frame apart."""
-    enough = int(np.ceil(WITHIN * len(t)))
-    least = log_times[0] - t[len(t) - enough]
-    most = log_times[-1] - t[enough - 1]
-    if least > most:
-        problem = (
-            f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s; are the units of"
-            " time and the rate right?"
-        )
-        raise InputError(None, "", problem)
-    gaps = np.diff(t)
-    step = float(np.median(gaps[gaps > 0])) / 2 if (gaps > 0).any() else most - least
-    count = 2 + int(min((most - least) / step if step else 0, MOST))
-    return np.linspace(least, most, count)
-
-
-def _at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
-    return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
-
-
-def _rest_height(h: Array) -> float:
-    """Up to where a frame is at rest, by the noise from one frame to the next."""
-    noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
-    return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
 
 
 def _half_range(each: Array) -> Array:
