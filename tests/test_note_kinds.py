@@ -29,108 +29,115 @@ from bubblefit.studies.poisson import vary_nu12
 from bubblefit.studies.refinement import refine
 from matplotlib.figure import Figure
 
-from . import note_cases as made
 from .bars import BarTest
 from .cylinder_cases import Formula, write_project
+from .note_cases import fits, membrane, programs, series
 
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
 K = NoteKind
 #: By kind: who makes such notes, and their words.
 CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.EARLY: (
-        (made.notes_of_bending, "the run stopped early: no equilibrium between 6 and 8 mm"),
-        (made.notes_of_marc_bending, "the run stopped early; the last increment is at 60 mm"),
-        (made.notes_of_marc_bending, "the time step could not get smaller: no convergence"),
+        (membrane.notes_of_bending, "the run stopped early: no equilibrium between 6 and 8 mm"),
+        (programs.notes_of_marc_bending, "the run stopped early; the last increment is at 60 mm"),
+        (programs.notes_of_marc_bending, "the time step could not get smaller: no convergence"),
         (
-            made.notes_of_calculix_bending,
+            programs.notes_of_calculix_bending,
             "the run stopped early; the last increment is at 6 mm: no step left",
         ),
     ),
     K.SNAP: (
-        (made.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
-        (made.notes_of_inflation, "snaps, or nearly, between 50 and 100 kPa: passed by leading"),
+        (membrane.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
+        (
+            membrane.notes_of_inflation,
+            "snaps, or nearly, between 50 and 100 kPa: passed by leading",
+        ),
     ),
-    K.PENETRATION: ((made.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),),
+    K.PENETRATION: ((membrane.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),),
     K.WRINKLES: (
         (
-            made.notes_of_bending,
+            membrane.notes_of_bending,
             r"left to wrinkles \(0\.01 of the taut fabric's\) carries 0\.\d+ %",
         ),
     ),
     K.GAS: (
         (
-            made.notes_of_calculix_bending,
+            programs.notes_of_calculix_bending,
             r"gas: pass 1, p V constant within \S+ \(wanted: 0.0003\)",
         ),
     ),
     K.TILT: (
-        (made.notes_of_tilted_shells, r"slopes of up to 0\.30 lower its stiffness .* 18\.2 %"),
+        (programs.notes_of_tilted_shells, r"slopes of up to 0\.30 lower its stiffness .* 18\.2 %"),
     ),
-    K.REPEATED: ((made.notes_of_marc_bending, "1 increments were repeated after they did not"),),
+    K.REPEATED: (
+        (programs.notes_of_marc_bending, "1 increments were repeated after they did not"),
+    ),
     K.UNCONFIRMED: (
-        (made.notes_of_marc_bending, "'Contact Normal Force', which is not confirmed"),
+        (programs.notes_of_marc_bending, "'Contact Normal Force', which is not confirmed"),
     ),
-    K.UNBALANCED: ((made.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),),
-    K.NO_REACTIONS: ((made.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),),
+    K.UNBALANCED: (
+        (programs.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),
+    ),
+    K.NO_REACTIONS: ((programs.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),),
     K.SOLVER: (
-        (made.notes_of_simulation, "thick: as a plug-in says it"),
-        (made.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
-        (made.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
+        (series.notes_of_simulation, "thick: as a plug-in says it"),
+        (series.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
+        (series.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
     ),
     K.BEYOND_CARD: (
-        (made.notes_of_analysis, r"warp strain 0\.077 is beyond the card's valid range 0\.050"),
-        (made.notes_of_simulation, r"thick: warp strain 0\.095 is beyond the card's valid range"),
+        (membrane.notes_of_analysis, r"warp strain 0\.077 is beyond the card's valid range 0\.050"),
+        (series.notes_of_simulation, r"thick: warp strain 0\.095 is beyond the card's valid range"),
     ),
-    K.UNSTABLE: ((made.notes_of_analysis, "unstable equilibrium at .* would not stay there"),),
+    K.UNSTABLE: ((membrane.notes_of_analysis, "unstable equilibrium at .* would not stay there"),),
     K.THICKNESS: (
         (
-            made.notes_of_simulation,
+            series.notes_of_simulation,
             r"thick: the card was fitted for a thickness of 1 mm, this is 0\.5",
         ),
     ),
     K.FAILED: (
-        (made.notes_of_simulation, "stiff: the bar breaks"),
-        (made.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
-        (made.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
+        (series.notes_of_simulation, "stiff: the bar breaks"),
+        (series.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
+        (series.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
     ),
     K.BEYOND_LAW: (
         (
-            made.notes_of_fit,
+            fits.notes_of_fit,
             r"one: warp: warp strain reached 0\.135, beyond law\.strain_range 0\.12",
         ),
     ),
     K.STARTS: (
         (
-            made.notes_of_fit,
+            fits.notes_of_fit,
             r"1 of 2 starts ended because membrane failed \(one: warp: too tired\)",
         ),
     ),
-    K.UNCERTAIN: ((made.notes_of_fit, "G12 is uncertain by up to 1000 % "),),
-    K.MARGIN: ((made.notes_of_fit, "E2 touches its positivity margin"),),
+    K.UNCERTAIN: ((fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),),
+    K.MARGIN: ((fits.notes_of_fit, "E2 touches its positivity margin"),),
     K.BOUND: (
-        (made.notes_of_fit, "E1 touches its upper bound"),
-        (made.notes_of_certainty, "pressure_offset lies on its lower bound"),
+        (fits.notes_of_fit, "E1 touches its upper bound"),
+        (fits.notes_of_certainty, "pressure_offset lies on its lower bound"),
     ),
-    K.ALONE: ((made.notes_of_fit, "two alone does not determine E2 "),),
-    K.INVERSE_CRIME: ((made.notes_of_bubble, "computed by the very model that is fitted to them"),),
+    K.ALONE: ((fits.notes_of_fit, "two alone does not determine E2 "),),
+    K.INVERSE_CRIME: ((fits.notes_of_bubble, "computed by the very model that is fitted to them"),),
     K.ABOVE_NOISE: (
-        (made.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N\)"),
+        (fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N\)"),
     ),
-    K.SURFACES: ((made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),
-    K.FLAT_SHEET: ((made.notes_of_bubble, "the sheet is taken for flat and taut"),),
-    K.UNMATCHED: ((made.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),),
-    K.LEFT_OUT: ((made.notes_of_fit, "one, warp: 2 points beyond the final length"),),
-    K.DOUBTFUL: ((made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),),
+    K.SURFACES: ((fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),
+    K.FLAT_SHEET: ((fits.notes_of_bubble, "the sheet is taken for flat and taut"),),
+    K.UNMATCHED: ((fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),),
+    K.LEFT_OUT: ((fits.notes_of_fit, "one, warp: 2 points beyond the final length"),),
+    K.DOUBTFUL: ((fits.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),),
     K.READING: (
-        (made.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
+        (fits.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
     ),
-    K.FOLD: ((made.notes_of_comparison, "spline:3, fold 3: no fit without its points ended well"),),
-    K.LOST: ((made.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),),
-    K.ORDER: ((made.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),),
-    K.NO_LOAD: ((made.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),),
-    K.LOSES: ((made.notes_of_exports, "there the curve ends at log strain 0.3"),),
+    K.FOLD: ((fits.notes_of_comparison, "spline:3, fold 3: no fit without its points ended well"),),
+    K.LOST: ((series.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),),
+    K.ORDER: ((series.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),),
+    K.NO_LOAD: ((series.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),),
+    K.LOSES: ((series.notes_of_exports, "there the curve ends at log strain 0.3"),),
     K.CONFIRM: (
-        (made.notes_of_exports, "that tables of G12 are looked up with the engineering shear"),
+        (series.notes_of_exports, "that tables of G12 are looked up with the engineering shear"),
     ),
 }
 
@@ -160,7 +167,7 @@ class Told(NamedTuple):
 
 
 def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    fit = replace(made.fit())
+    fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
     for name in ("_optima", "_moduli"):
         patch.setattr(fit_page, name, lambda *_: ("a.png", "a picture"))
@@ -171,11 +178,11 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
 
 
 def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    fit = replace(made.fit())
+    fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
     patch.setattr(law_page, "plot_laws", lambda *_: None)
     patch.setattr(law_page, "_side_by_side", lambda *_: [])
-    done = made.comparison(fit)
+    done = fits.comparison(fit)
     page = done.report(folder)
     return Told(lines(done.notes), _json(folder), folder, page.read_text())
 
@@ -192,26 +199,28 @@ def told_by_predictions(folder: Path, patch: pytest.MonkeyPatch, notes: list[Not
 
 
 def told_by_simulation(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    done = simulate_cards(made.bars(patch, notes), [BarTest("a bar")], {"soft": made.CARD}, folder)
+    done = simulate_cards(
+        series.bars(patch, notes), [BarTest("a bar")], {"soft": series.CARD}, folder
+    )
     return Told(done.lines, _json(folder), folder)
 
 
 def told_by_nu12(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
     patch.setattr(Figure, "savefig", lambda _, path, **__: Path(path).touch())
-    study = vary_nu12(made.bars(patch, notes), made.CARD, [0.2])
+    study = vary_nu12(series.bars(patch, notes), series.CARD, [0.2])
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
 def told_by_refinement(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
     patch.setattr(Figure, "savefig", lambda _, path, **__: Path(path).touch())
-    study = refine(made.bars(patch, notes), made.CARD)
+    study = refine(series.bars(patch, notes), series.CARD)
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
 def told_by_gauge(folder: Path, _: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    table = made.gauge(folder)
+    table = series.gauge(folder)
     table = replace(table, record=replace(table.record, warnings=tuple(notes)))
     table.write(folder / "gauge.csv")
     said = [line[2:] for line in (folder / "gauge.csv").read_text().splitlines() if line[0] == "#"]

@@ -1,0 +1,94 @@
+"""Notes of a fit, a bubble's findings and a comparison of forms, provoked.
+
+The fit, which is costly, is run once: it goes wrong in many ways at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.bubble import findings as bubble_findings
+from bubblefit.experiments.bubble.sheet_report import sheet_warnings
+from bubblefit.fits.setup import prepare_fit
+from bubblefit.identification.assessment import certainty
+from bubblefit.identification.nuisance import Nuisance, NuisanceOf
+from bubblefit.notes import Note
+from bubblefit.solvers import registry
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.folds import FoldError
+from bubblefit.studies.laws import FormFit, LawComparison
+
+from ..identification import cases
+from ..projects import constant_strips, small
+
+
+@cache
+def fit() -> bf.Fit:
+    """Strips in two tests: bounds too narrow, noise too small, a preload, a start that fails."""
+    with TemporaryDirectory() as name, pytest.MonkeyPatch.context() as patch:
+        folder = Path(name)
+        path = constant_strips(
+            folder,
+            ("E1 = [0.02, 2.0]", "E1 = [0.02, 0.3]"),
+            ("E2 = [0.03, 1.0]", "E2 = [0.24, 1.0]"),
+            ('name = "one"', 'name = "one"\nnoise = 0.01'),
+            ("increments = 8", "increments = 4"),
+            ("seed = 7", "seed = 7\nmax_analyses = 12"),
+        )
+        # Another column of elongations, and a load before any.
+        head, *rows = (folder / "one.csv").read_text().splitlines()
+        rows = [f"{head},crosshead [mm]", "warp,a,0.0,60.0,0.0", *(f"{row},0.0" for row in rows)]
+        (folder / "one.csv").write_text("\n".join(rows) + "\n")
+        (folder / "tired").touch()
+
+        class Tired(MembraneSolver):
+            def run_with_sensitivity(self, *arguments: Any, **named: Any) -> Any:
+                if (folder / "tired").exists():
+                    (folder / "tired").unlink()
+                    raise SolverFailure("too tired", self.name)
+                return super().run_with_sensitivity(*arguments, **named)
+
+        patch.setitem(registry.SOLVERS, "membrane", Tired)
+        return bf.fit(bf.read_project(path), jobs=1)
+
+
+def notes_of_fit(*_: Any) -> list[Note]:
+    return fit().notes
+
+
+def comparison(fit: bf.Fit) -> LawComparison:
+    """A fit as that of a form whose third fold failed."""
+    folds = (FoldError(0, 0.1, {}), FoldError(1, 0.1, {}), FoldError(2, None, {}))
+    return LawComparison((FormFit("spline:3", fit, folds, ("one: warp",)),), 1)
+
+
+def notes_of_comparison(*_: Any) -> list[Note]:
+    return comparison(fit()).notes
+
+
+def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
+    """Matched by crude surfaces to data of its own model; and were they measured."""
+    match = ('by = "points"', 'by = "surfaces"\ndegree = 4')
+    project = bf.read_project(small(folder, match))
+    (prepared,) = prepare_fit(project, list(project.tests.values())).tests
+    return [*bubble_findings._warnings(prepared), *sheet_warnings(replace(prepared, known=None))]
+
+
+def notes_of_certainty(*_: Any) -> Iterable[Note]:
+    """A pressure that is as far off as it may be."""
+    offset = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
+    problem = cases.problem(replace(cases.CUBIC, nuisance=NuisanceOf({"bubble": (offset,)})))
+    unknowns = problem.unknowns.at(cases.LAW.beta)
+    unknowns[-1] = offset.lower
+    point = problem.evaluate(unknowns, True)
+    assert point is not None
+    return certainty(problem, point, cases.LAW, np.full(3, 0.08)).undetermined
