@@ -144,7 +144,7 @@ class BubbleTest:
         ------
         InputError : in the data. SolverFailure : the known solution cannot be run.
         """
-        from .prepared import prepare
+        from .preparation import prepare
 
         return prepare(self, law, make_solver)
 

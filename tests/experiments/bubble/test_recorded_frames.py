@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.experiments.base import Output
-from bubblefit.experiments.bubble.prepared import prepare
+from bubblefit.experiments.bubble.preparation import prepare
 from bubblefit.experiments.bubble.recorded_words import (
     clock_pictures,
     recorded_lines,
