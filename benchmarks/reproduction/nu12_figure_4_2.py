@@ -19,7 +19,8 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.poisson import Ratios, vary_nu12
+from bubblefit.studies.poisson import vary_nu12
+from bubblefit.studies.ratios import Ratios
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
 #: By nu12, as read off the figure to three decimals.

@@ -14,7 +14,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.poisson import by_response, ratios, vary_nu12
+from bubblefit.studies.poisson import vary_nu12
+from bubblefit.studies.ratios import by_response, ratios
 from matplotlib.figure import Figure
 
 from ..bars import STRETCH, BarSolver, BarTest, project_of
