@@ -18,7 +18,9 @@ def test_a_line_and_two_axes_are_told_by_one_angle_each(degrees):
 
 @pytest.mark.parametrize("missing", range(4))
 def test_points_in_three_quarters_are_not_all_around(missing):
-    points = np.array([[1.0, 1, 9], [1, -1, 9], [-1, 1, 9], [-1, -1, 9]])
+    # Heights of both signs are neither here nor there.
+    points = np.array([[1.0, 1, 9], [1, -1, 9], [-1, 1, -9], [-1, -1, -9]] * 2)
+    points[4:, 2] *= -1
     assert in_all_quarters(points) and in_all_quarters(points[:, :2])
-    assert not in_all_quarters(np.delete(points, missing, axis=0))
+    assert not in_all_quarters(np.delete(points, [missing, missing + 4], axis=0))
     assert not in_all_quarters(points[:0])
