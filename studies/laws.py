@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,22 +14,20 @@ from .. import __version__
 from ..errors import InputError
 from ..experiments.base import FittableTest
 from ..fits.fit import Event, fit
-from ..fits.project import Project, cores
+from ..fits.project import Project
 from ..fits.result import Fit
-from ..fits.setup import FitSetup, fingerprints, prepare_fit
+from ..fits.setup import prepare_fit
 from ..fits.store import Store
-from ..materials.forms.registry import form_names, form_settings
 from ..notes import Note, NoteKind
-from .folds import FoldError, errors, part_of_objective, specimens_of, validate
+from .fold_record import validated_folds
+from .folds import FoldError, errors, part_of_objective, specimens_of
+from .law_candidates import candidates, plain
 
 #: Of the smallest cross-validated error: a simpler form within it is as good.
 AS_GOOD = 0.05
 #: Starts of the fit of a form, and of the fit of a fold, unless said otherwise.
 STARTS, FOLD_STARTS = 5, 2
 FOLDS = 5
-#: Of a spline, where neither the project nor the caller says how many.
-KNOTS = 6
-VALIDATION = "validation.json"
 LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
 
 #: Told the name of each form as its turn comes, then the records of its starts and folds; None
@@ -93,38 +89,6 @@ class FormFit:
     def _residual(self) -> np.ndarray:
         rows = [self.fit.problem.rows(k) for k in self._numbers]
         return np.concatenate([self.fit.best.point.residual[part] for part in rows])
-
-
-def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
-    """The project with each of the forms asked for, by name; with all forms unless any is.
-
-    names : of forms; "spline:8" is a spline of eight knots for each modulus.
-
-    Raises
-    ------
-    InputError : no such form, or bounds that do not go with every form.
-    """
-    bounds = project.law.bounds
-    if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
-        problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
-        raise InputError(project.path, "law.bounds", problem)
-    own = project.law.model_extra or {}
-    chosen: dict[str, Project] = {}
-    for asked in names or form_names():
-        form, _, knots = asked.partition(":")
-        settings: dict[str, Any] = {}
-        if form not in form_names():
-            problem = f"there is no form {form!r}; there are: {', '.join(form_names())}"
-            raise InputError(None, "--form", problem)
-        if knots and (not knots.isdecimal() or "knots" not in form_settings(form)):
-            problem = f"expected a form, or one with its number of knots (spline:8), got {asked!r}"
-            raise InputError(None, "--form", problem)
-        if knots:
-            settings = {"knots": int(knots)}
-        elif "knots" in form_settings(form) and "knots" not in own:
-            asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
-        chosen[asked] = project.with_law(form, settings)
-    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,52 +195,10 @@ def compare_laws(
         )
         if place is not None:
             found.report(place)
-        errors = _validated(setups[name], found, folds, fold_starts, place, tell)
+        errors = validated_folds(setups[name], found, folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return LawComparison(tuple(done), fold_starts)
 
 
-def plain(name: str) -> str:
-    """A form's name as that of a folder."""
-    return name.replace(":", "-")
-
-
 def _fittable(tests: Sequence[Any]) -> Sequence[FittableTest]:
     return tests
-
-
-def _validated(
-    setup: FitSetup,
-    found: Fit,
-    folds: int,
-    starts: int,
-    folder: Path | None,
-    tell: Progress,
-) -> tuple[FoldError, ...]:
-    """Errors of the folds, as they were written where they are of this fit."""
-    parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
-    mark = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-    known = None if folder is None else _written(folder / VALIDATION, mark)
-    if known is not None:
-        return known
-    ended: dict[int, FoldError] = {}
-    for event in validate(setup, folds, starts, setup.project.fit.jobs or cores()):
-        if event is not None:
-            ended[event.fold] = event
-        tell(event)
-    errors = tuple(ended[fold] for fold in sorted(ended))
-    if folder is not None:
-        content = {"of": mark, "folds": [fold.to_json() for fold in errors]}
-        Store(folder).write(VALIDATION, json.dumps(content, indent=1) + "\n")
-    return errors
-
-
-def _written(path: Path, mark: str) -> tuple[FoldError, ...] | None:
-    """What an interrupted run has validated already; None when it is not of this fit."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["of"] != mark:
-            return None
-        return tuple(FoldError(**fold) for fold in content["folds"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None

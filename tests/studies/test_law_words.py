@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from bubblefit.studies.fold_record import written_folds
 from bubblefit.studies.law_words import conclusion, lines_of
-from bubblefit.studies.laws import _written
 
 RESULT = {
     "objective_is": "sum of RMS errors, N",
@@ -38,9 +38,9 @@ def test_without_a_fold_that_ended_there_is_no_conclusion() -> None:
 def test_folds_of_another_fit_are_not_taken(tmp_path: Path) -> None:
     path = tmp_path / "validation.json"
     path.write_text(json.dumps({"of": "this", "folds": []}))
-    assert _written(path, "this") == ()
-    assert _written(path, "another") is None
+    assert written_folds(path, "this") == ()
+    assert written_folds(path, "another") is None
     path.write_text(json.dumps({"of": "this", "folds": [{"colour": 1}]}))
-    assert _written(path, "this") is None
+    assert written_folds(path, "this") is None
     path.write_text("{")
-    assert _written(path, "this") is None and _written(tmp_path / "none", "this") is None
+    assert written_folds(path, "this") is None and written_folds(tmp_path / "none", "this") is None

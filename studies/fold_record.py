@@ -1,0 +1,57 @@
+"""Errors of the folds of one fit: computed, or as an interrupted comparison has written them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from ..fits.project import cores
+from ..fits.result import Fit
+from ..fits.setup import FitSetup, fingerprints
+from ..fits.store import Store
+from .folds import FoldError, validate
+
+VALIDATION = "validation.json"
+
+
+def validated_folds(
+    setup: FitSetup,
+    found: Fit,
+    folds: int,
+    starts: int,
+    folder: Path | None,
+    tell: Callable[[FoldError | None], None],
+) -> tuple[FoldError, ...]:
+    """Errors of the folds, as they were written where they are of this fit.
+
+    folds, starts : how many folds at most, and random starts of each. folder : of the fit, where
+    the errors are written; None where nothing is. tell : hears each fold that ended, and time pass.
+    """
+    parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
+    mark = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    known = None if folder is None else written_folds(folder / VALIDATION, mark)
+    if known is not None:
+        return known
+    ended: dict[int, FoldError] = {}
+    for event in validate(setup, folds, starts, setup.project.fit.jobs or cores()):
+        if event is not None:
+            ended[event.fold] = event
+        tell(event)
+    errors = tuple(ended[fold] for fold in sorted(ended))
+    if folder is not None:
+        content = {"of": mark, "folds": [fold.to_json() for fold in errors]}
+        Store(folder).write(VALIDATION, json.dumps(content, indent=1) + "\n")
+    return errors
+
+
+def written_folds(path: Path, mark: str) -> tuple[FoldError, ...] | None:
+    """What an interrupted run has validated already; None when it is not of this fit."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["of"] != mark:
+            return None
+        return tuple(FoldError(**fold) for fold in content["folds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
