@@ -76,6 +76,26 @@ def test_orders_that_cannot_be_compared():
     assert "specimens: expected 3 names" in complaint(compare_orders, u, u**2, [1], specimens=["a"])
 
 
+@pytest.mark.parametrize("through_origin", [True, False])
+def test_as_few_points_as_can_be_compared(through_origin: bool):
+    """Two more than coefficients; one less is refused (above)."""
+    u = np.arange(1.0, 5.0 if through_origin else 6.0)
+    load = np.array([1.0, 5.0, 8.0, 17.0, 26.0])[: len(u)]
+    (score,) = compare_orders(u, load, [2], through_origin).scores
+    assert np.isfinite([score.left_out, score.adjusted_r_squared]).all()
+    assert "comparing needs" in complaint(compare_orders, u[1:], load[1:], [2], through_origin)
+
+
+@pytest.mark.parametrize(("other", "finite"), [(1.0, True), (0.0, False)])
+def test_a_specimen_that_the_others_do_not_settle(other: float, finite: bool):
+    """Its error is that of a line through the one other point, which may lie at the origin."""
+    u, load = np.array([100.0, 100.0, other]), np.array([205.0, 195.0, 3.0])
+    (score,) = compare_orders(u, load, [1], specimens=["a", "a", "b"]).scores
+    # Without a: 3 u, off by 95 and 105. Without b: 2 u, off by 1.
+    expected = np.sqrt((95.0**2 + 105.0**2 + 1.0) / 3) if finite else np.inf
+    assert score.left_out == pytest.approx(expected)
+
+
 def test_the_orders_offered_decide_the_thesis_choice(shared_data):
     for curve in read_load_curves(shared_data / "uniaxial/valmex7318_load_gauge.csv"):
         parts = split_at_restarts(curve)

@@ -68,6 +68,8 @@ def test_optima(tmp_path: Path, drawn: list[Figure], values: list[float]):
         ]
         low, high = axes.get_ylim()
         assert all(low <= y <= high for y in (*optima[1], *references.values()))
+        # Room for every start, the failed ones too, half a place to either side.
+        assert axes.get_xlim() == (0.5, max(len(values), 2) + 0.5)
         said = axes.get_title("left")
         assert said.startswith(f"Optima of {len(values)} start")
         failed = len(values) - len(ended)

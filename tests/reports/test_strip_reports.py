@@ -121,6 +121,18 @@ def test_points_before_zero_are_seen(tmp_path: Path, drawn: list[Figure]) -> Non
     assert (first.get_xlim()[0], second.get_xlim()[0]) == (-0.2, 0.0)
 
 
+@pytest.mark.parametrize(("least", "bottom"), [(40.0, 0.0), (-40.0, -40.0)])
+def test_loads_stand_on_zero_and_all_are_seen(
+    tmp_path: Path, drawn: list[Figure], least: float, bottom: float
+) -> None:
+    """The axis begins at no load, or below where a machine recorded less."""
+    pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
+    plot_loads(tmp_path / "l.png", [pulled])
+    low, high = drawn[0].axes[0].get_ylim()
+    assert low == 0.0 if bottom == 0.0 else low < bottom
+    assert high > 200.0
+
+
 def test_no_strips(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no strips"):
         plot_loads(tmp_path / "l.png", [])
@@ -321,6 +333,19 @@ def test_what_is_not_determined_is_marked(tmp_path: Path, drawn: list[Figure]) -
     assert np.isnan(lines(warp, NAMED[0])[1][1]).all() and not warp.texts
     assert lines(shear, NAMED[1])[0][1] == pytest.approx(1.0)
     assert shear.get_yscale() == "log" and legend(drawn[0]) == ["bubble", "both"]
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "ends"),
+    [(3.0, 3.0, (1.0, 10.0)), (0.02, 0.03, (0.01, 0.1)), (0.02, 30.0, (0.01, 100.0))],
+)
+def test_what_is_determined_is_seen_in_whole_decades(
+    tmp_path: Path, drawn: list[Figure], least: float, most: float, ends: tuple[float, float]
+) -> None:
+    sigma = np.tile(np.geomspace(least, most, 20), (3, 1))
+    plot_pinned(tmp_path / "p.png", STRAINS, {"both": sigma})
+    for panel in drawn[0].axes:
+        assert panel.get_ylim() == pytest.approx(ends)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.4, 1000.0, np.inf])

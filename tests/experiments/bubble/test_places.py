@@ -52,3 +52,15 @@ def test_each_point_keeps_its_height_and_sigma():
 
 def test_a_field_without_height_has_none_when_mirrored():
     assert mirrored(DisplacementField(0.1, POINTS, MOVED)).z is None
+
+
+def test_a_whole_field_is_not_mirrored_again():
+    whole = DisplacementField(0.1, POINTS * (-1, 1), MOVED * (-1, 1, 1))
+    assert mirrored(whole) is whole
+
+
+def test_a_point_beside_the_axis_by_rounding_is_on_it():
+    """A field of the quarter stays one, and has such a point once on either side."""
+    points = POINTS.copy()
+    points[2, 0] = -1e-12
+    assert len(mirrored(DisplacementField(0.1, points, MOVED)).points) == 1 + 2 + 2 + 4

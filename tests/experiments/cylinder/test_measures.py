@@ -12,6 +12,7 @@ from bubblefit.experiments.cylinder.measures import (
     initial_stiffness,
     knee_point,
     limit_point,
+    loads_at,
     straightness,
     wrinkle_onset,
 )
@@ -59,6 +60,21 @@ def test_a_bilinear_curve() -> None:
     assert limit_point(WAY, load) is None
     r2, off = straightness(WAY, load, force)
     assert r2 == pytest.approx(1.0) and off == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_initial_slope_is_of_the_frames_up_to_there() -> None:
+    """The frame that lies there counts, by rounding beyond or not; the next one does not."""
+    load = np.array([0.0, 20.0, 40.0, 60.0, 30.0, 200.0])
+    for end in (20.0, 20.0 * (1 + 1e-12)):
+        found = initial_stiffness(np.array([0.0, 5.0, 10.0, 15.0, end, 30.0]), load, OVER)
+        assert found == pytest.approx(2.0)  # the straight line through five points
+
+
+def test_loads_at_places() -> None:
+    """Between frames, and at the last, which may end short of it by rounding; not beyond."""
+    way, load = np.array([0.0, 50.0, 100.0 * (1 - 1e-12)]), np.array([0.0, 200.0, 300.0])
+    found = loads_at(way, load, {"40 mm": 40.0, "100 mm": 100.0, "101 mm": 101.0})
+    assert found == {"40 mm": pytest.approx(160.0), "100 mm": pytest.approx(300.0), "101 mm": None}
 
 
 def test_a_curve_with_a_limit_point() -> None:

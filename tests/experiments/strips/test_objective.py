@@ -54,11 +54,24 @@ def test_scale_and_weight_of_a_strip(scale: float, weight: float) -> None:
 
 @pytest.mark.parametrize(
     "elongation, words",
-    [([], "no point"), ([-0.1], "got -0.1"), ([3.4], "got 3.4"), ([1.0, 1e6], "1e\\+06")],
+    [
+        ([], "no point"),
+        ([-0.1], "expected elongations from 0 to 3.307 mm, got -0.1$"),
+        ([3.4], "got 3.4$"),
+        ([1.0, 1e6], "1e\\+06"),
+    ],
 )
 def test_load_curves_outside_the_model_are_refused(elongation: list[float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         LoadObjective(STRIPS["warp"].elongations, elongation, np.zeros(len(elongation)))
+
+
+def test_an_elongation_at_the_model_s_end_is_inside_it() -> None:
+    """Also where another sum of the same steps is larger by rounding."""
+    end = float(STRIPS["warp"].elongations[-1])
+    objective = LoadObjective(STRIPS["warp"].elongations, [0.0, end * (1 + 1e-12)], np.zeros(2))
+    assert objective.sample[1] == pytest.approx([*[0.0] * 9, 1.0], abs=1e-9)
+    assert objective.unit == "N"
 
 
 def test_blocks() -> None:
