@@ -13,7 +13,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...commands import in_process, result_in
 from ...dic_exports import EXPORTS
-from ...projects import small
+from ...projects import EASY, small
 
 DATA = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
 
@@ -21,8 +21,23 @@ DATA = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
     """The text of a project of computed data, and its frames."""
-    folder = tmp_path_factory.mktemp("computed")
-    path = small(folder, ("elements = 48", "elements = 108"))
+    return computed(tmp_path_factory.mktemp("computed"), ("elements = 48", "elements = 108"))
+
+
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory):
+    """The same of two pressures and a law of constant moduli, for whole fits."""
+    changes = (("[22, 59, 97, 132, 186, 251, 300]", "[59, 186]"),)
+    text, frames = computed(tmp_path_factory.mktemp("coarse"), *changes)
+    first, last = text.index("# Table 4.2. Order"), text.index("[[bubble]]")
+    margin = next(line for line in text.splitlines() if line.startswith("margin"))
+    text = (text[:first] + EASY + text[last:]).replace(margin, "")
+    return text.replace('form = "cubic"', 'form = "constant"'), frames
+
+
+def computed(folder, *changes):
+    """The text of the known-solution example, whole, and its frames."""
+    path = small(folder, *changes)
     path.write_text(path.read_text().replace('symmetry = "quarter"', 'symmetry = "full"'))
     project = bf.read_project(path)
     test = project.tests["bubble"]
@@ -53,6 +68,23 @@ def test_a_fit_gets_the_same_data_from_every_export(bubble, tmp_path, case):
     expected = targets(project_of(bubble, tmp_path / "plain", "plain"))
     for one, other in zip(targets(project_of(bubble, tmp_path, case)), expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
+
+
+def constant_fit(coarse, folder, case: str) -> np.ndarray:
+    """Moduli of a whole fit, one start."""
+    result = bf.fit(bf.read_project(project_of(coarse, folder, case)), starts=1, jobs=1)
+    return np.array([float(result.law.modulus(name, 0.0)) for name in ("E1", "E2", "G12")])
+
+
+@pytest.fixture(scope="module")
+def plain_moduli(coarse, tmp_path_factory) -> np.ndarray:
+    return constant_fit(coarse, tmp_path_factory.mktemp("plain"), "plain")
+
+
+@pytest.mark.parametrize("case", [case for case in EXPORTS if case != "plain"])
+def test_the_moduli_are_the_same_from_every_export(coarse, plain_moduli, tmp_path, case):
+    moduli = constant_fit(coarse, tmp_path, case)
+    np.testing.assert_allclose(moduli, plain_moduli, rtol=1e-9)
 
 
 def test_the_fit_is_the_same_and_says_what_was_read(bubble, tmp_path):
