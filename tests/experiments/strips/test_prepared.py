@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ from bubblefit.experiments.strips.strip import Strip
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from threadpoolctl import threadpool_limits
 
 from ...complaints import complaint
 from ...projects import project_file
@@ -28,12 +27,6 @@ from .sections import CURVES, PUBLISHED, SMALL, read, write_exports
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 COARSE = ("increments = 100", "increments = 5")
 POINTS = ("[warp]", 'match = "points"\nincrements = 5\n[warp]')
-
-
-@pytest.fixture(autouse=True, scope="module")
-def one_thread() -> Iterator[None]:
-    with threadpool_limits(1):
-        yield
 
 
 @pytest.fixture
