@@ -8,7 +8,7 @@ import pytest
 from bubblefit.data.outline import Outline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.meshes.location import sampling_matrix
+from bubblefit.meshes.smooth_reading import SmoothReading
 from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
@@ -58,7 +58,7 @@ def folder(tmp_path_factory):
     line = np.linspace(-1, 1, 25)
     points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
     points = OUTLINE.places(points[np.hypot(*points.T) < 0.98])
-    sample, inside = sampling_matrix(mesh, points)
+    sample, inside = SmoothReading.of(mesh).matrix(points)
     places = np.column_stack([points[inside], np.zeros(inside.sum())]) @ turn + [2.0, -3.0, 600.0]
     for k, moved in enumerate(MembraneSolver().run(model, LAW).displacement):
         table = np.hstack([places, (sample @ moved) @ turn])
@@ -72,7 +72,7 @@ def test_the_moduli_come_back(folder):
     done = in_process("bubble", folder / "project.toml", "--out", folder / "out", cwd=folder)
     result = result_in(folder / "out")
     law = bf.read_card(folder / "out" / "material.toml").law
-    # A field of facets tells the turn of the rim to a few tenths of a degree; G12 feels it.
+    # The turn of the rim is told to a few tenths of a degree; G12 feels it.
     for name, modulus, within in (("E1", 700.0, 0.01), ("E2", 300.0, 0.01), ("G12", 15.0, 0.06)):
         assert float(law.modulus(name, 0.02)) == pytest.approx(modulus, rel=within), name
     assert result["registration"]["warp_degrees"] == pytest.approx(20.0, abs=0.6)
