@@ -24,7 +24,7 @@ from .findings import findings_of
 from .objective import OFFSETS, FieldObjective
 from .places import at_nodes, at_points, folded
 from .point_files import PointFiles
-from .relative import counted_from, with_places
+from .relative import at_rest, counted_from, with_places
 from .sheet import FLAT, MeasuredSheet, sheet_nuisance, with_sheet
 from .test import BubbleTest
 
@@ -126,9 +126,10 @@ class PreparedBubble:
 
     @property
     def matched(self) -> Sequence[DisplacementField]:
-        """The fields as they are matched: folded where the model is a quarter."""
-        quarter = self.test.symmetry == "quarter"
-        return [folded(f) for f in self.fields] if quarter else self.fields
+        """The fields as they are matched: at places without load, folded for a quarter."""
+        since = self.test.sheet.since
+        fields = self.fields if since is None else at_rest(self.fields, since)
+        return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
     def model(self) -> BubbleModel:

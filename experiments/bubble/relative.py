@@ -1,4 +1,4 @@
-"""Which places of several frames are the same, and displacements counted from one of the frames."""
+"""Displacements counted from one of the frames: which places are the same, and where they are."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from ...data.fields import DisplacementField
 from ...errors import InputError
 from .objective import FieldTarget
 
@@ -16,6 +18,26 @@ Array = NDArray[np.float64]
 DECIMALS = 3
 #: Of a frame's places, that the frame it is counted from has to have, too.
 LEAST_SHARE = 0.5
+#: In-plane displacements of an inflated sheet go with the square of its height, and this with the
+#: cube root of the pressure.
+POWER = 2.0 / 3.0
+
+
+def at_rest(fields: Sequence[DisplacementField], since: int) -> list[DisplacementField]:
+    """The fields with places in the sheet without load, where they are those of frame `since`.
+
+    That is so where the picture that all displacements are counted from was taken at the pressure
+    of this frame: nothing moves in it. How far its places have moved already is told by the next
+    frame: in-plane displacements grow with p^(2/3). Other fields are left as they are.
+    """
+    first = fields[since]
+    if first.displacement.any():
+        return list(fields)
+    other = fields[since + 1 if since + 1 < len(fields) else since - 1]
+    powers = [field.pressure**POWER for field in (first, other)]
+    moved = other.displacement[:, :2] * (powers[0] / (powers[1] - powers[0]))
+    tree = cKDTree(other.points)
+    return [replace(f, points=f.points - moved[tree.query(f.points)[1]]) for f in fields]
 
 
 def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarget]:
