@@ -49,6 +49,7 @@ class NoteKind(StrEnum):
     BEYOND_LAW = "beyond law.strain_range"
     STARTS = "starts that failed"
     UNCERTAIN = "uncertain"
+    MESH = "mesh error"
     MARGIN = "on its margin"
     BOUND = "on a bound"
     ALONE = "undetermined alone"

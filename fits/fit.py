@@ -14,6 +14,7 @@ from .best import BestFit, best_fit
 from .doubts import judge
 from .facts import facts_of, solver_facts
 from .failure_page import failure_page
+from .mesh_error import with_mesh_error
 from .processes import run_starts
 from .project import Project, cores
 from .record import Record, data_rows, this_run
@@ -96,7 +97,7 @@ def fit(
         done = files.begin(resume)
     with failure_page(None if out is None else Path(out), project.title):
         records = _records(setup, files, done, progress or _nobody)
-        best = _best(problem, records, project)
+        best = with_mesh_error(setup, problem, _best(problem, records, project))
     return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
 
 

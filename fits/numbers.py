@@ -85,6 +85,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "noise": sure.noise,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+            "largest_relative_mesh": _largest(sure.mesh),
+            "largest_relative_total": _largest(sure.total),
         }
     if fit.record is not None:
         result["provenance"] = PROVENANCE
@@ -95,6 +97,10 @@ def result_of(fit: Fit) -> dict[str, Any]:
         result |= _together(fit)
     warnings = [note.line for note in fit.notes]
     return result | {"warnings": warnings, "notes": rows(fit.notes)}
+
+
+def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:
+    return None if relative is None else {n: float(np.abs(s).max()) for n, s in relative.items()}
 
 
 def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:

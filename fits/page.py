@@ -175,7 +175,7 @@ def _moduli(fit: Fit, folder: Path) -> tuple[str, str]:
     if sure is not None:
         sigma = curves[0] * np.array(
             [
-                np.interp(x, sure.strain[name], sure.sigma[name])
+                np.interp(x, sure.strain[name], sure.total[name])
                 for name, x in zip(COMPONENTS, strains, strict=True)
             ]
         )
@@ -235,15 +235,21 @@ def _determined(fit: Fit) -> Sequence[Table]:
     sure = fit.best.certainty
     if sure is None:
         return []
+    mesh = {name: "not known" for name in sure.sigma}
+    if sure.mesh is not None:
+        mesh = {n: percent(round(float(np.abs(off).max()), 6)) for n, off in sure.mesh.items()}
     rows: list[list[object]] = [
-        [name, percent(float(np.median(s))), percent(float(s.max()))]
+        [name, percent(float(np.median(s))), percent(float(s.max())), mesh[name],
+         percent(float(sure.total[name].max()))]
         for name, s in sure.sigma.items()
-    ]
+    ]  # fmt: skip
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
     noise = ", ".join(f"{value:.2g} {units[name]} ({name})" for name, value in sure.noise.items())
     note = (
-        f"white noise of {noise} on everything matched: neighbouring values err together, so this "
-        "flatters; single coefficients are far less certain than the moduli they make"
+        f"white noise of {noise} on everything matched: neighbouring values err together, so "
+        "this flatters; single coefficients are far less certain than the moduli they make. Mesh: "
+        "by how much a modulus would be another on ever finer meshes, from one run of a finer "
+        "model at the best fit"
     )
-    header = ["modulus", "median 1 sigma", "largest 1 sigma"]
+    header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest", "together, largest"]
     return [Table("What the data determine", header, rows, note)]

@@ -118,16 +118,21 @@ class Fit:
     def moduli(self) -> pd.DataFrame:
         """E1, E2 and G12 (MPa) along their strains, with one standard deviation.
 
-        Columns modulus, strain, MPa, sigma_relative (NaN where it is not known).
+        Columns modulus, strain, MPa, sigma_relative, and what it is made of: noise_relative,
+        mesh_relative (by how much the modulus would be another on ever finer meshes). NaN where
+        it is not known; sigma is that of the noise alone where the mesh's part is not known.
         """
         import pandas as pd
 
         sure, rows = self.best.certainty, []
         for name, component in COMPONENTS.items():
             strain = np.linspace(0.0, self.best.valid[component], PLACES)
-            sigma = np.full(PLACES, np.nan)
+            sigma = noise = mesh = np.full(PLACES, np.nan)
             if sure is not None:
-                sigma = np.interp(strain, sure.strain[name], sure.sigma[name])
+                at = sure.strain[name]
+                sigma, noise = (np.interp(strain, at, s[name]) for s in (sure.total, sure.sigma))
+                if sure.mesh is not None:
+                    mesh = np.interp(strain, at, sure.mesh[name])
             rows.append(
                 pd.DataFrame(
                     {
@@ -135,6 +140,8 @@ class Fit:
                         "strain": strain,
                         "MPa": self.law.modulus(name, strain),
                         "sigma_relative": sigma,
+                        "noise_relative": noise,
+                        "mesh_relative": mesh,
                     }
                 )
             )

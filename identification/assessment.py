@@ -86,13 +86,23 @@ class Certainty:
     """1-sigma relative uncertainty of each modulus up to the strains reached, and plain words.
 
     noise : by comparison, in the unit of its data (mm, N). strain, sigma : (n,) by modulus.
-    undetermined : what the data do not determine, and what lies on its bound.
+    undetermined : what the data do not determine, and what lies on its bound. mesh : (n,) by
+    modulus, by how much it would be another on ever finer meshes, relative; None where that is
+    not known.
     """
 
     noise: dict[str, float]
     strain: dict[str, Array]
     sigma: dict[str, Array]
     undetermined: tuple[Note, ...]
+    mesh: dict[str, Array] | None = None
+
+    @property
+    def total(self) -> dict[str, Array]:
+        """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma."""
+        if self.mesh is None:
+            return dict(self.sigma)
+        return {name: np.hypot(sigma, self.mesh[name]) for name, sigma in self.sigma.items()}
 
 
 def certainty(

@@ -111,6 +111,16 @@ class PreparedBubble:
         nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
 
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """The same places on a finer mesh with finer increments."""
+        from .finer import finer_bubble
+
+        if self.by_this_model:
+            return self.comparisons(make_solver, weighting)
+        return finer_bubble(self, make_solver, weighting, factor)
+
     def data_files(self) -> Sequence[DataFile]:
         """The files of the measured fields; none where they were computed."""
         data = self.test.data

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -109,6 +109,17 @@ class PreparedStrips:
                 must_be_stable=False,
             )
             for direction in test.matched
+        )
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """The same loads on finer quads; the increments hardly matter (a bar has their limit)."""
+        models = self.test.models(what="elements", factor=factor)
+        own = self.comparisons(make_solver, weighting)
+        return tuple(
+            replace(comparison, model=models[direction])
+            for comparison, direction in zip(own, self.test.matched, strict=True)
         )
 
     def _objective(

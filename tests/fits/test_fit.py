@@ -64,7 +64,8 @@ def test_every_place_says_the_same_objective(fitted: bf.Fit, tmp_path: Path):
 
 def test_tables(fitted: bf.Fit, tmp_path: Path):
     moduli = fitted.moduli()
-    assert list(moduli.columns) == ["modulus", "strain", "MPa", "sigma_relative"]
+    sigma = ["sigma_relative", "noise_relative", "mesh_relative"]
+    assert list(moduli.columns) == ["modulus", "strain", "MPa", *sigma]
     e1 = moduli[moduli["modulus"] == "E1"]
     assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
     assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))

@@ -74,6 +74,8 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
             "noise": sure.noise,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
+            "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},
+            "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
         },
         "weights": {"one": 1.0, "two": 3.0},
     }

@@ -16,15 +16,15 @@ from .operators import operators
 #: How a figure looks, which is judged by eye: arguments of matplotlib.
 LOOKS = {
     "alpha", "capsize", "clip_on", "dpi", "figsize", "fontsize", "frameon", "handlelength",
-    "hspace", "labelpad", "labelsize", "linewidth", "linewidths", "markersize", "ncol", "ncols",
-    "pad", "rotation", "wspace", "zorder",
+    "hspace", "labelpad", "labelsize", "linestyle", "linewidth", "linewidths", "markeredgewidth",
+    "markerscale", "markersize", "ncol", "ncols", "pad", "rotation", "wspace", "zorder",
 }  # fmt: skip
 
 
 #: Functions whose numbers are nothing but size and layout.
 LAYOUTS = {"new_figure", "legend_above", "add_gridspec"}
 #: Arguments that forbid what correct code does not do anyway.
-PROMISES = {"eq", "frozen", "slots", "strict"}
+PROMISES = {"allow_nan", "eq", "frozen", "slots", "strict"}
 
 
 @dataclass(frozen=True)

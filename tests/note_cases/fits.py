@@ -18,9 +18,11 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble import findings as bubble_findings
 from bubblefit.experiments.bubble.sheet_report import sheet_warnings
+from bubblefit.fits import mesh_error
 from bubblefit.fits.setup import prepare_fit
-from bubblefit.identification.assessment import certainty
+from bubblefit.identification.assessment import Certainty, certainty
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
+from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -81,6 +83,14 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     project = bf.read_project(small(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     return [*bubble_findings._warnings(prepared), *sheet_warnings(replace(prepared, known=None))]
+
+
+def notes_of_mesh(*_: Any) -> Iterable[Note]:
+    """A mesh that moves the warp modulus by 4 % beside noise of 1 %."""
+    strain = {name: np.array([0.0, 0.05]) for name in COMPONENTS}
+    sigma = {name: np.full(2, 0.01) for name in COMPONENTS}
+    mesh = {name: np.array([0.0, 0.04 * (name == "E1")]) for name in COMPONENTS}
+    return mesh_error.notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
 
 
 def notes_of_certainty(*_: Any) -> Iterable[Note]:
