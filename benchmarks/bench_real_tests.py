@@ -1,7 +1,7 @@
 """Bubble tests 1 to 3 of VALMEX 7318, of which the surface of the reference picture is unknown.
 
 Usage: bench_real_tests.py [--data DIR] [--elements N] [--modes N] [--starts N]
-[--without-strips] [TEST ...].
+[--without-strips | --with-strips] [TEST ...].
 For every test one line of its fit with z0 of few modes, without the strips (G12 from the bubble
 alone) and with them, and z0 at the three points where it was measured. Moduli are quadratic in
 the strain (with the strips: splines, because the strips go to far larger strains); pressures are
@@ -120,8 +120,10 @@ def main() -> None:
     parser.add_argument("--modes", type=int, default=10)
     parser.add_argument("--starts", type=int, default=3)
     parser.add_argument("--without-strips", action="store_true")
+    parser.add_argument("--with-strips", action="store_true")
     given = parser.parse_args()
-    for strips in (False, True)[: 1 if given.without_strips else 2]:
+    kinds = [False] * (not given.with_strips) + [True] * (not given.without_strips)
+    for strips in kinds:
         print("with strips" if strips else "without strips", flush=True)
         for test in given.tests or (1, 2, 3):
             result = fitted(test, given.data, given.elements, given.modes, given.starts, strips)

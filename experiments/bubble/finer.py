@@ -6,11 +6,12 @@ import copy
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...identification.comparison import Comparison
-from ...meshes.location import sampling_matrix
 from ...meshes.mesh import Mesh
+from ...meshes.smooth_reading import SmoothReading
 from ..base import MakeSolver, Weighting
 from .objective import FieldObjective, FieldTarget
 from .prepared import PreparedBubble
@@ -20,7 +21,7 @@ from .test import PART
 Array = NDArray[np.float64]
 
 #: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
-INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2)
+INWARD = (1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.9)
 
 
 def finer_bubble(
@@ -28,8 +29,8 @@ def finer_bubble(
 ) -> tuple[Comparison, ...]:
     """Its one comparison, of quads and increments divided by a factor.
 
-    What lies between nodes is interpolated by straight lines on either mesh: the chords' sag is
-    part of the difference.
+    What lies between nodes is read as the fit reads it: what that does is part of the
+    difference.
     """
     test = prepared.test
     (own,) = prepared.comparisons(make_solver, weighting)
@@ -45,19 +46,24 @@ def finer_bubble(
 
 def resampled(targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh) -> tuple[FieldTarget, ...]:
     """The same targets at the same places, from the nodes of another mesh."""
-    found: list[tuple[Array, FieldTarget]] = []
+    reading = SmoothReading.of(other)
+    found: list[tuple[Array, sp.csr_matrix]] = []
+    moved = []
     for target in targets:
         places = np.ascontiguousarray(target.at(own.points)[:, :2])
-        sample = next((t.sample for p, t in found if np.array_equal(p, places)), None)
+        sample = next((s for p, s in found if np.array_equal(p, places)), None)
         if sample is None:
-            sample = _sample(other, places)
-        found.append((places, replace(target, sample=sample)))
-    return tuple(target for _, target in found)
+            sample = _sample(reading, places)
+            found.append((places, sample))
+        moved.append(replace(target, sample=sample))
+    return tuple(moved)
 
 
-def _sample(mesh: Mesh, places: Array):  # type: ignore[no-untyped-def]
+def _sample(reading: SmoothReading, places: Array) -> sp.csr_matrix:
     at = places.copy()
     for share in INWARD:
-        _, inside = sampling_matrix(mesh, at)
+        matrix, inside = reading.matrix(at)
+        if inside.all():
+            break
         at[~inside] = share * places[~inside]
-    return sampling_matrix(mesh, at)[0]
+    return matrix
