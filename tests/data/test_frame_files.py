@@ -21,6 +21,8 @@ def test_the_order_of_frames(tmp_path):
     files, note = order("f1.csv", "f10.csv", "f2.csv")
     assert files == ["f1.csv", "f10.csv", "f2.csv"]
     assert note is not None and "f10.csv before f2.csv; quote the pattern" in note
+    # Of quoted patterns the order is meant, whatever a shell would have made of it.
+    assert order("f1*.csv", "f2.csv") == (["f1.csv", "f10.csv", "f2.csv"], None)
     # A name with a bracket in it is a file before it is a pattern.
     (tmp_path / "a[1].csv").write_text("")
     assert order("a[1].csv")[0] == ["a[1].csv"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.frames import FrameOptions, read_frames
+from bubblefit.data.frames import Frame, FrameOptions, read_frames
 from bubblefit.errors import InputError
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -42,6 +42,21 @@ def test_frames_are_read_with_holes(tmp_path):
     assert "length unit" in complaint(
         read_frames, [path], options(names, flag_column="mask", length_scale=1e308)
     )
+
+
+@pytest.mark.parametrize(
+    ("points", "displacement", "sigma", "shapes"),
+    [
+        ((2, 3), (3, 3), None, r"\(2, 3\) and \(3, 3\)"),
+        ((2, 2), (2, 2), None, r"\(2, 2\) and \(2, 2\)"),
+        ((2, 3), (2, 3), (3,), r"\(m,\) sigma, got \(3,\)"),
+        ((2, 3), (2, 3), (2, 3), r"\(m,\) sigma, got \(2, 3\)"),
+    ],
+)
+def test_arrays_that_make_no_frame(points, displacement, sigma, shapes):
+    with pytest.raises(ValueError, match=shapes):
+        Frame(np.zeros(points), np.zeros(displacement), sigma=sigma and np.zeros(sigma))
+    assert len(Frame(np.zeros((2, 3)), np.zeros((2, 3)), sigma=np.zeros(2)).points) == 2
 
 
 @settings(deadline=None, max_examples=200)

@@ -147,6 +147,7 @@ def variable(kind: int, shape: list[int], rest: bytes) -> bytes:
     ("body", "words"),
     [
         (variable(1, [2**31 - 1, 2**31 - 1], b""), "parts in"),
+        (variable(1, [3, 1], part(14, b"") * 2), "3 parts in 64 bytes"),
         (variable(2, [2**31 - 1, 1], part(5, struct.pack("<i", 8)) + part(1, b"a" * 8)), "parts"),
         (variable(6, [2**31 - 1, 2], part(9, b"\0" * 16)), "2 numbers for a shape"),
         (variable(6, [-1, -2], part(9, b"\0" * 16)), "no shape"),

@@ -48,6 +48,15 @@ def test_numbers_that_are_none(tmp_path: Path) -> None:
     assert not complaint(long.numbers, "a").endswith("rows")
 
 
+def test_texts_stay_as_they_are(tmp_path: Path) -> None:
+    """A specimen may be called NA."""
+    read = read_table(table(tmp_path, "name,load\nNA,1\nnull,2\n,3\n nan ,4\n5\n"))
+    assert read.text("name").tolist() == ["NA", "null", "", " nan ", "5"]
+    assert read.lines.tolist() == [2, 3, 4, 5, 6]
+    assert read.numbers("load", holes=True)[:4].tolist() == [1, 2, 3, 4]
+    assert "line 2, column 'name': expected a number, found 'NA'" in complaint(read.numbers, "name")
+
+
 def test_floats_read_back_exactly(tmp_path: Path) -> None:
     path, values = tmp_path / "b.csv", [0.1 + 0.2, 1e-300, -3.0]
     write_table(path, ["v", "n"], [[v, i] for i, v in enumerate(values)], comment="mm")

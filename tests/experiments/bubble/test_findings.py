@@ -34,7 +34,7 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path: Path) -> None:
     moved = MembraneSolver().run(model, law)
     np.testing.assert_allclose(history.displacement, moved.displacement, atol=1e-7)
     nuisance = problem.unknowns.nuisance_values("bubble", y)
-    reached = np.full(3, 0.1)
+    reached = np.array([0.1, 0.2, 0.3])
     own = setup.own(prepared)
     fitted = FittedTest(own, (history,), nuisance, law, [law], reached, reached, None)
     findings = prepared.findings(fitted)
@@ -45,6 +45,14 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path: Path) -> None:
         "nuisance: offset_x 0.100 mm, offset_y -0.200 mm, offset_z 0.300 mm, "
         "pressure_offset 2.000 kPa"
     )
+    # The law is the known solution, over the strain that was reached.
+    assert findings.numbers["moduli_error"] == {"E1": 0.0, "E2": 0.0, "G12": 0.0}
+    ranges = {"E1": [0.0, 0.1], "E2": [0.0, 0.2], "G12": [0.0, 0.3]}
+    assert findings.numbers["moduli_error_range"] == ranges
+    assert (
+        "largest error of the moduli over the strain reached: E1 0 % (strain 0 to 0.1), "
+        "E2 0 % (strain 0 to 0.2), G12 0 % (strain 0 to 0.3)"
+    ) in findings.lines
     facts = dict(prepared.show(fitted, findings, Output(tmp_path / "out")).facts)
     assert facts["pressure offset, kPa"] == "2.000"
     assert facts["displacement offset, mm"] == "0.100, -0.200, 0.300"

@@ -5,11 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from bubblefit.data.bending import BendingCurve
 from bubblefit.data.bending_scatter import BendingError
 from bubblefit.experiments.cylinder.measures import BendingMeasures
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.cylinder.tables import columns_of, terminal_table
+from bubblefit.experiments.cylinder.record import BendingRun
+from bubblefit.experiments.cylinder.tables import (
+    columns_of,
+    curve_of,
+    measured_table,
+    terminal_table,
+)
 from bubblefit.notes import Note, NoteKind
 
 MEASURES = BendingMeasures(
@@ -76,6 +84,31 @@ def test_a_row_of_the_table_of_runs() -> None:
     }  # fmt: skip
     empty = columns_of(None, ["20 mm", "a long way"])
     assert list(empty) == list(row) and set(empty.values()) == {None}
+
+
+def test_curves_and_readings() -> None:
+    """Lists of rows as they go into load_deflection.csv and measured.csv."""
+    way = np.array([0.0, 30.0])
+    read = [BendingCurve("a", way, np.array([0.0, 58.0])), BendingCurve("b", way, 2.0 * way)]
+    tests = [SimpleNamespace(name="x", measured=read), SimpleNamespace(name="y", measured=())]
+    table = measured_table(tests)
+    assert list(table.columns) == [
+        "test", "deflection_mm", "mean_N", "standard_deviation_N", "repetitions"
+    ]  # fmt: skip
+    assert len(table) == 61 and set(table["test"]) == {"x"}
+    assert table.iloc[30].tolist()[1:] == pytest.approx([15.0, 29.5, np.sqrt(0.5), 2])
+    assert list(measured_table(tests[1:]).columns) == list(table.columns)
+    bent = BendingRun(
+        way, np.array([0.0, 60.0]), np.array([0.1, 0.102]), np.array([5e7, 4e7]),
+        np.empty(0), np.empty(0), np.empty(0),
+    )  # fmt: skip
+    curve = curve_of(bent)
+    assert list(curve.columns) == [
+        "deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3", "wrinkled_share"
+    ]  # fmt: skip
+    assert curve.iloc[1].tolist()[:4] == pytest.approx([30.0, 60.0, 102.0, 4e7])
+    assert curve["wrinkled_share"].isna().all()
+    assert list(curve_of(None).columns) == list(curve.columns) and len(curve_of(None)) == 0
 
 
 def test_the_terminals_table() -> None:
