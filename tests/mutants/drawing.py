@@ -32,7 +32,8 @@ class Mutant:
     """One change of one file.
 
     file: from the repository's root; first, last: the lines of the statement it is in;
-    before, after: the line of the change; source: the whole file with it
+    before, after: the line of the change; source: the whole file with it; loading: whether the
+    statement runs when the module is loaded, as a constant does or a default of an argument
     """
 
     file: str
@@ -43,6 +44,7 @@ class Mutant:
     before: str
     after: str
     source: str
+    loading: bool = False
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}\n  - {self.before}\n  + {self.after}"
@@ -90,9 +92,15 @@ def change(place: Place, source: str, operator: str, occurrence: int) -> Mutant 
         return None
     pairs = zip(source.split("\n"), mutated.split("\n"), strict=False)
     before, after = next((a, b) for a, b in pairs if a != b)
-    first, last = _statement(ast.parse(source), place.position[0])
-    line, text = place.position[0], (before.strip(), after.strip())
-    return Mutant(place.file, line, first, last, operator, *text, mutated)
+    tree, line = ast.parse(source), place.position[0]
+    first, last = _statement(tree, line)
+    text = before.strip(), after.strip()
+    return Mutant(place.file, line, first, last, operator, *text, mutated, _loading(tree, line))
+
+
+def _loading(tree: ast.AST, line: int) -> bool:
+    functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
+    return not any(one.body[0].lineno <= line <= (one.end_lineno or 0) for one in functions)
 
 
 def _code(text: str) -> bool:

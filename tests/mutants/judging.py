@@ -77,7 +77,8 @@ class Judge:
     def judge(self, mutant: Mutant) -> Verdict:
         """A test that fails without the change, too, catches nothing and is left out."""
         while True:
-            tests = self.measured.tests(mutant.file, mutant.first, mutant.last, self.limit)
+            where = mutant.file, mutant.first, mutant.last
+            tests = self.measured.tests(*where, self.limit, mutant.loading)
             tests = [test for test in tests if test not in self.unfit]
             if not tests:
                 return Verdict(mutant, "unrun")

@@ -34,14 +34,19 @@ class Measured:
     lines: dict[str, dict[int, set[str]]]
     seconds: dict[str, float]
 
-    def tests(self, file: str, first: int, last: int, limit: float) -> list[str]:
+    def tests(
+        self, file: str, first: int, last: int, limit: float, loading: bool = False
+    ) -> list[str]:
         """Those that run a line of a statement; if it runs at import, those of the file, or all.
+
+        loading : it does. Where a test is the first that needs the module, only that one has run
+        the line.
 
         Tests of the module's own name first, then the quick ones, for `limit` seconds in all.
         """
         known = self.lines.get(file, {})
         found = set().union(*(known.get(line, set()) for line in range(first, last + 1)))
-        if found <= {""}:
+        if loading or found <= {""}:
             at_import = any(line in known for line in range(first, last + 1))
             found = set().union(*known.values()) - {""} if at_import else set()
             # Nothing but declarations: any test may show it.

@@ -46,6 +46,12 @@ def test_what_is_drawn():
     assert not any(" is " in after or "<<" in after for after in every)
 
 
+def test_what_runs_when_a_module_is_loaded():
+    source = "MOST = 2\n\n\ndef one(\n    a: int = 3,\n) -> int:\n    return 4 + a\n"
+    found = {mutant.line: mutant.loading for mutant in drawn(source=source)}
+    assert found == {1: True, 5: True, 7: False}
+
+
 def test_a_seed_draws_the_same_and_another_seed_others():
     source = (ROOT / "identification" / "assessment.py").read_text()
     one, again, other = (drawn(seed, 12, source) for seed in (1, 1, 2))
@@ -78,6 +84,10 @@ def test_tests_of_a_line():
     assert known.tests("fits/store.py", 2, 3, 6.0) == ["test_store.py::own", "t::quick"]
     assert len(known.tests("fits/store.py", 1, 1, 60.0)) == 3  # runs when the module is loaded
     assert known.tests("fits/store.py", 7, 7, 60.0) == []
+    # A test was the first that needed the module.
+    late = Measured({"fits/store.py": {1: {"t::quick"}, 2: {"t::slow", ""}}}, known.seconds)
+    assert late.tests("fits/store.py", 1, 1, 60.0) == ["t::quick"]
+    assert late.tests("fits/store.py", 1, 1, 60.0, loading=True) == ["t::quick", "t::slow"]
     # A module of declarations: no test runs a line of it, and any may show it.
     declared = Measured({"fits/schema.py": {1: {""}}}, known.seconds)
     assert sorted(declared.tests("fits/schema.py", 1, 1, 60.0)) == sorted(known.seconds)
