@@ -17,6 +17,7 @@ COMMANDS = {
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests only."),
     "check": ("check", "Look at the data before anything is fitted."),
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
+    "validate": ("validate", "Does a fit foretell the test that it was not given?"),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),

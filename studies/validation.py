@@ -1,0 +1,116 @@
+"""Does a fit foretell a test that it was not given? Each test left out of the fit in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import cast
+
+from .. import __version__
+from ..errors import InputError
+from ..experiments.base import FittableTest, PreparedTest
+from ..fits.fit import Event, fit
+from ..fits.project import Project
+from ..fits.result import Fit
+from ..fits.setup import prepare_fit
+from ..fits.store import Store
+from ..materials.card import MaterialCard, thickness_difference
+from .held_out import HeldOut, held_out
+from .law_candidates import candidates, plain
+from .validated import Judged, Validation
+
+STARTS = 3
+#: Told the words of what is fitted as its turn comes, then the records of its starts; None now
+#: and then.
+Progress = Callable[[str | Event | None], None]
+
+
+def validate(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    forms: Sequence[str] = (),
+    *,
+    starts: int = STARTS,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
+) -> Validation:
+    """Fit all tests, then all but each in turn, and judge the fits at the test left out.
+
+    Offsets and the sheet's surface of the test left out are no property of the fabric: they are
+    fitted to it, with the law as it is.
+
+    Parameters
+    ----------
+    tests : by name or kind; every test that can be fitted unless given.
+    forms : of the moduli, as for `compare_laws`; the project's own unless given.
+    out : folder with a folder for each fit, in which everything is written as it ends.
+
+    Raises
+    ------
+    InputError : in the project or its data, fewer than two tests, nothing to go on with.
+    OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    """
+    tell = progress or (lambda event: None)
+    project = project.with_fit(starts=starts)
+    chosen = project.chosen(tests, fitted=True)
+    if len(chosen) < 2:
+        raise InputError(project.path, "", "one test is left out of two or more: there is only one")
+    projects = candidates(project, forms) if forms else {project.law.form: project}
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        Store(folder).begin(
+            {"version": __version__, "forms": ", ".join(projects)}, resume, overwrite
+        )
+    judged = []
+
+    def fitted(own: Project, name: str, names: Sequence[str], place: str) -> Fit:
+        tell(name)
+        into = None if folder is None else folder / place
+        found = fit(
+            own, names, out=into, resume=resume and into is not None and Store(into).used,
+            overwrite=overwrite, progress=tell, command_line=command_line,
+        )  # fmt: skip
+        if into is not None:
+            found.report(into)
+        return found
+
+    for form, own in projects.items():
+        names = [test.name for test in chosen]
+        together = fitted(own, f"{form}: all tests", names, f"{plain(form)}-all")
+        for k, test in enumerate(together.setup.tests):
+            others = [name for name in names if name != test.test.name]
+            words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
+            alone = fitted(own, words, others, place)
+            judged.append(Judged(form, _judge(alone, test), _judge(together, test)))
+    return Validation(project.title, tuple(judged))
+
+
+def judge_cards(
+    project: Project,
+    cards: Mapping[str, MaterialCard],
+    tests: str | Sequence[str] | None = None,
+) -> Validation:
+    """Cards at the tests of a project, without any fit of the law.
+
+    Raises
+    ------
+    InputError : in the project or its data, a card of another thickness than the fabric's.
+    """
+    for name, card in cards.items():
+        if (words := thickness_difference(card, project.fabric.thickness)) is not None:
+            raise InputError(project.path, "fabric.thickness", f"{name}: {words}")
+    chosen = project.chosen(tests, fitted=True)
+    setup = prepare_fit(project, cast(Sequence[FittableTest], chosen))
+    judged = [
+        Judged(name, held_out(test, card.law, setup.make_solver))
+        for name, card in cards.items()
+        for test in setup.tests
+    ]
+    return Validation(project.title, tuple(judged))
+
+
+def _judge(found: Fit, test: PreparedTest) -> HeldOut:
+    return held_out(test, found.card.law, found.setup.make_solver)
