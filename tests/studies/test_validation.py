@@ -83,7 +83,7 @@ def test_a_card_is_judged_without_a_fit(tmp_path: Path) -> None:
     )
     assert np.isnan(row["fitted_rms"])
     assert (
-        "card, two: warp strain 0.118 is beyond 0.100, up to which the law is known" in done.stdout
+        "made, two: warp strain 0.118 is beyond 0.100, up to which the law is known" in done.stdout
     )
     assert f"{rms:12.4g}" in done.stdout and path.exists()
     again = bubblefit(*command, cwd=tmp_path, code=2)
