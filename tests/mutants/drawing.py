@@ -87,7 +87,10 @@ def draw(sources: Mapping[str, str], seed: int, number: int | None = None) -> It
 
 def change(place: Place, source: str, operator: str, occurrence: int) -> Mutant | None:
     """The mutant, or None where there is no such change or it is no Python (`**` of a call)."""
-    mutated = mutate_code(source, operators()[operator], occurrence)
+    try:
+        mutated = mutate_code(source, operators()[operator], occurrence)
+    except AttributeError:  # cosmic-ray finds `except struct.error`, and cannot replace it
+        return None
     if mutated is None or not _code(mutated):
         return None
     pairs = zip(source.split("\n"), mutated.split("\n"), strict=False)

@@ -46,6 +46,13 @@ def test_what_is_drawn():
     assert not any(" is " in after or "<<" in after for after in every)
 
 
+def test_exceptions_of_a_module_stop_no_drawing():
+    source = (
+        "try:\n    f()\nexcept zlib.error:\n    pass\nexcept (OSError, struct.error):\n    pass\n"
+    )
+    assert {mutant.line for seed in range(9) for mutant in drawn(seed, source=source)} == {3, 5}
+
+
 def test_what_runs_when_a_module_is_loaded():
     source = "MOST = 2\n\n\ndef one(\n    a: int = 3,\n) -> int:\n    return 4 + a\n"
     found = {mutant.line: mutant.loading for mutant in drawn(source=source)}
