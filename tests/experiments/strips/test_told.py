@@ -1,0 +1,246 @@
+"""What is told of strips whose numbers are known: findings, tables, cards side by side, noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.data.curves import LoadCurve
+from bubblefit.data.load_polynomials import fit_load_polynomial
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.base import CardRun, Output
+from bubblefit.experiments.strips import simulated
+from bubblefit.experiments.strips.findings import findings_of
+from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import FittedStrip
+from bubblefit.experiments.strips.strip import BELOW, BEYOND, Strip
+from bubblefit.experiments.strips.tables import load_table, misfit_table, residual_table
+from bubblefit.models.uniaxial import straight_strip
+from bubblefit.notes import NoteKind
+from bubblefit.solvers.base import History
+
+WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])
+CURVES = (
+    LoadCurve("warp", "1", WAY, 100 * WAY, Path("w.csv"), notes=("a note", "another")),
+    LoadCurve("warp", "2", WAY[:3], 120 * WAY[:3], None, notes=("a note",)),
+)
+LINE = fit_load_polynomial(np.linspace(0, 4, 9), 110 * np.linspace(0, 4, 9), 1)
+WARP = Strip("warp", 20.0, 24.0, LINE, CURVES, scatter=7.5)
+#: Two increments, to 2 and 4 mm.
+MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
+
+
+def history(*load: float, shear: float = 0.0) -> History:
+    strain = np.array([0.1, 0.02, shear])
+    return History(np.array(load), np.zeros((2, 4, 3)), -strain / 2, strain)
+
+
+def fitted(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
+    """2 and 4 mm matched at 200 and 400 N: off by 3 and -4 N, 3.54 N RMS."""
+    objective = LoadObjective([2.0, 4.0], [2.0, 4.0], [200.0, 400.0])
+    return FittedStrip(strip, MODEL, objective, history(*loads))
+
+
+BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
+
+
+def test_findings() -> None:
+    test: Any = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
+    found = findings_of(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
+    rms = np.sqrt(12.5), np.sqrt(50.0)
+    warp = {
+        "rms_N": pytest.approx(rms[0]), "scatter_N": 7.5, "weight": 1.0, "matched": 2,
+        "gauge_length_mm": 20.0, "final_length_mm": 24.0, "end_load_N": 396.0,
+    }  # fmt: skip
+    bias = warp | {
+        "rms_N": pytest.approx(rms[1]), "scatter_N": None, "weight": 2.5, "end_load_N": 410.0
+    }  # fmt: skip
+    assert found.numbers == {
+        "directions": {"warp": warp, "bias": bias},
+        "e_uniaxial_N": pytest.approx(sum(rms)),
+        "matched_by": "points",
+    }
+    assert found.lines == (
+        "RMS error, N: warp 3.54 (specimens scatter by 7.5), bias 7.07; sum 10.61",
+    )
+    assert found.quality == "RMS errors in N: warp 3.536, bias 7.071"
+    assert found.summary == "RMS errors in N: warp 3.54, bias 7.07, together 10.61"
+    left_out = "3 points beyond the final length (or before zero) were left out"
+    assert [(n.kind, str(n), n.of) for n in found.warnings] == [
+        (NoteKind.UNMATCHED, "no fill strip of s is matched: E2 rests on the other directions", ""),
+        (NoteKind.READING, "a note", ""),
+        (NoteKind.READING, "another", ""),
+        (NoteKind.LEFT_OUT, left_out, "warp"),
+    ]
+    test.match_by = "polynomial"
+    assert [n.kind for n in findings_of(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
+
+
+def test_tables() -> None:
+    both = [fitted(), fitted(BIAS, (200.0, 410.0))]
+    table = misfit_table(both)
+    assert table.header == [
+        "strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial", "its RMSE, N",
+        "points matched", "load at the end, N",
+    ]  # fmt: skip
+    assert [row[0] for row in table.rows] == ["warp", "bias"]
+    assert table.rows[0][1:] == pytest.approx([np.sqrt(12.5), 7.5, 1.0, 0.0, 2, 396.0], abs=1e-9)
+    assert table.rows[1][1:] == [pytest.approx(np.sqrt(50.0)), None, None, None, 2, 410.0]
+    loads = load_table(both)
+    assert list(loads.columns) == [
+        "direction", "elongation_mm", "engineering_strain", "model_N", "polynomial_N"
+    ]  # fmt: skip
+    assert loads["direction"].tolist() == ["warp"] * 2 + ["bias"] * 2
+    assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
+    assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
+    rest = residual_table(both)
+    assert list(rest.columns) == [
+        "part", "elongation_mm", "quantity", "measured", "modelled", "difference"
+    ]  # fmt: skip
+    assert rest.iloc[1].tolist() == ["warp", 4.0, "load_N", 400.0, pytest.approx(396.0),
+                                     pytest.approx(-4.0)]  # fmt: skip
+
+
+def test_points_of_a_strip_and_those_left_out() -> None:
+    elongation, load = WARP.points
+    assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
+    assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
+    assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.beyond == 3
+    (file,) = WARP.data_files(points=True)
+    assert (file.path, file.used, file.dropped) == (Path("w.csv"), 4, {BELOW: 1, BEYOND: 1})
+    (file,) = WARP.data_files(points=False)
+    assert (file.used, file.dropped) == (6, {})
+    # The last point may lie at the end by rounding.
+    just = replace(WARP, final_length=20.0 + 4.0 * (1 - 1e-10))
+    assert just.beyond == 3 and just.data_files(True)[0].dropped[BEYOND] == 1
+    short = replace(WARP, final_length=20.0 + 4.0 * (1 - 1e-8))
+    assert short.beyond == 4 and short.data_files(True)[0].dropped[BEYOND] == 2
+    assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.beyond == 0
+
+
+def test_lengths_and_noise_of_a_strip() -> None:
+    assert WARP.elongation == 4.0 and WARP.strain == pytest.approx(np.log(1.2))
+    some = np.array([True, True, True, True, True, False])
+    assert WARP.strain_by(some) == WARP.strain
+    opened = replace(WARP, open_end=True)
+    assert opened.strain_by(some) == pytest.approx(np.log(1.1))
+    assert opened.strain_by(None) == pytest.approx(np.log(1.2))
+    assert replace(BIAS, open_end=True).strain_by(some) == pytest.approx(np.log(1.2))
+    assert WARP.noise(1000.0) == (7.5, "specimens' scatter")
+    assert WARP.noise(1000.0, 0.0) == (0.0, "given")
+    assert BIAS.noise(1000.0) == (5.0, "assumed")
+    assert BIAS.break_shares() is None
+
+
+def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
+    """A load that bends at a quarter and at two thirds of the strain, and one that is cut there."""
+    strain = np.log1p(np.linspace(0, 4, 400) / 20.0)
+    end = strain[-1]
+    load = 900 * strain - 800 * np.maximum(strain - end / 4, 0) + 500 * np.maximum(
+        strain - end * 2 / 3, 0)  # fmt: skip
+    polynomial = fit_load_polynomial(np.linspace(0, 4, 400), load, 12)
+    shares = replace(WARP, polynomial=polynomial).break_shares()
+    assert shares == pytest.approx((0.25, 0.667), abs=0.05)
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
+    calls: dict[str, list[Any]] = {"plot_loads": [], "draw_bias": []}
+    for name, found in calls.items():
+        monkeypatch.setattr(simulated, name, lambda *what, found=found: found.append(what))
+    return calls
+
+
+def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = False) -> Any:
+    strips = {"warp": WARP, "bias": BIAS}
+    test: Any = SimpleNamespace(strips={d: strips[d] for _, d in outcomes})
+    law = SimpleNamespace(strain_range=np.array([0.1, 0.1, 0.1]))
+    cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
+    runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
+    return simulated.simulate(test, cards, runs, Output(folder), within)
+
+
+def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
+    """The polynomial says 220 and 440 N at 2 and 4 mm."""
+    broken = SolverFailure("no equilibrium", "membrane")
+    said = told(tmp_path, {
+        ("soft", "warp"): history(223.0, 436.0), ("soft", "bias"): history(10.0, 20.0, shear=0.3),
+        ("hard", "warp"): broken, ("hard", "bias"): history(11.0, 21.5),
+    })  # fmt: skip
+    rms = float(np.sqrt(12.5))
+    warp = {
+        "rms_N": pytest.approx(rms), "end_load_N": 436.0, "shown_to_mm": 4.0,
+        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.0},
+    }  # fmt: skip
+    bias = {
+        "rms_N": None, "end_load_N": 20.0, "shown_to_mm": 4.0,
+        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.3},
+    }  # fmt: skip
+    cards = said.numbers["cards"]
+    assert cards["soft"] == {"e_uniaxial_N": None, "directions": {"warp": warp, "bias": bias}}
+    assert cards["hard"]["directions"]["warp"] == {"failed": "no equilibrium"}
+    assert said.lines == [
+        "soft: RMS warp 3.536 N to 4 mm, bias 20 N at the end",
+        "hard: RMS warp failed, bias 21.5 N at the end",
+    ]
+    assert said.figures == [("loads.png", "Load over gauge elongation")]
+    table = pd.read_csv(tmp_path / "loads.csv")
+    assert list(table.columns) == ["card", "direction", "elongation_mm", "load_N"]
+    assert table.to_numpy().tolist() == [
+        ["soft", "warp", 2.0, 223.0], ["soft", "warp", 4.0, 436.0],
+        ["soft", "bias", 2.0, 10.0], ["soft", "bias", 4.0, 20.0],
+        ["hard", "bias", 2.0, 11.0], ["hard", "bias", 4.0, 21.5],
+    ]  # fmt: skip
+    ((path, (first, second)),) = drawn["plot_loads"]
+    assert path == tmp_path / "loads.png"
+    assert [(name, load.tolist()) for name, _, load in first.models] == [("soft", [223.0, 436.0])]
+    assert list(first.rms) == pytest.approx([rms]) and list(second.rms) == []
+    assert [name for name, *_ in second.models] == ["soft", "hard"]
+    assert [call[2].name for call in drawn["draw_bias"]] == ["bias-1.png", "bias-2.png"]
+    assert [call[3].name for call in drawn["draw_bias"]] == ["bias-1.vtu", "bias-2.vtu"]
+
+
+def test_one_card_has_a_sum_and_files_without_a_number(tmp_path: Path, drawn) -> None:
+    said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)})
+    assert said.numbers["cards"]["soft"]["e_uniaxial_N"] == pytest.approx(np.sqrt(12.5))
+    assert said.lines == ["soft: RMS warp 3.536 N to 4 mm; sum 3.536 N"]
+    told(tmp_path, {("soft", "bias"): history(10.0, 20.0)})
+    assert drawn["draw_bias"][0][2].name == "bias.png"
+
+
+@pytest.mark.parametrize(
+    ("strains", "shown"),
+    [
+        ((0.1, 0.1, 0.1), 2), ((0.101, 0.0, 0.0), 1), ((0.0, 0.101, 0.0), 1),
+        ((0.0, 0.0, -0.101), 1), ((-0.5, -0.5, 0.0), 2), ((0.1 * (1 + 1e-7), 0.0, 0.0), 2),
+    ],
+)  # fmt: skip
+def test_curves_end_where_the_range_of_the_card_does(
+    tmp_path: Path, drawn, monkeypatch: pytest.MonkeyPatch, strains, shown: int
+) -> None:
+    """At the first increment nothing is strained, at the second so much."""
+    strain = iter([np.zeros((1, 3)), np.array([strains])])
+    monkeypatch.setattr(simulated, "middle_strain", lambda *_: next(strain))
+    said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
+    (card,) = said.numbers["cards"].values()
+    warp = card["directions"]["warp"]
+    assert warp["shown_to_mm"] == 2.0 * shown and warp["end_load_N"] == 436.0
+    assert warp["rms_N"] == pytest.approx(3.0 if shown == 1 else np.sqrt(12.5))
+    assert (card["e_uniaxial_N"] is None) == (shown == 1)
+    ((_, (panel,)),) = drawn["plot_loads"]
+    assert len(panel.models[0][1]) == shown
+    assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
+
+
+def test_a_card_whose_range_ends_at_once(tmp_path: Path, drawn, monkeypatch) -> None:
+    monkeypatch.setattr(simulated, "middle_strain", lambda *_: np.ones((1, 3)))
+    said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
+    warp = said.numbers["cards"]["soft"]["directions"]["warp"]
+    assert (warp["shown_to_mm"], warp["rms_N"]) == (0.0, None)
+    ((_, (panel,)),) = drawn["plot_loads"]
+    assert not panel.models
