@@ -166,16 +166,44 @@ def test_ncorr_of_grids_that_do_not_agree(tmp_path: Path) -> None:
 def test_ncorr_takes_what_it_correlated(tmp_path: Path) -> None:
     """Places a grid point apart are 5 pixels of 0.1 mm; row 0 is the upper one."""
     path, planar = tmp_path / "a.mat", FrameOptions(planar=True)
-    u, v = np.array([[0.0, 0.2], [0.3, 0.0]]), np.array([[0.0, 0.0], [0.4, 0.0]])
+    u, v = np.array([[0.0, -0.2], [0.0, 0.0]]), np.array([[0.0, 0.0], [-0.4, 0.0]])
     (frame,) = read_frames([ncorr(path, u, v)], planar)
     np.testing.assert_allclose(frame.points, [[0.5, 0, 0], [0, -0.5, 0]])
-    np.testing.assert_allclose(frame.displacement, [[0.2, 0, 0], [0.3, -0.4, 0]])
+    np.testing.assert_allclose(frame.displacement, [[-0.2, 0, 0], [0, 0.4, 0]])
     # Its own coefficient says better where a point did not move.
     right = np.array([[0.0, 0.1], [0.0, 0.1]])
     (frame,) = read_frames([ncorr(path, u, v, coefficient=right)], planar)
     np.testing.assert_allclose(frame.points, [[0.5, 0, 0], [0.5, -0.5, 0]])
     (frame,) = read_frames([ncorr(path, u, v, (0.0, 1.0, "mm"), np.ones((3, 3)))], planar)
     np.testing.assert_allclose(frame.points, [[1, 0, 0], [0, -1, 0]])
+
+
+def test_istra4d_of_arrays_that_do_not_agree(tmp_path: Path) -> None:
+    import h5py
+
+    def written(mask: int = 4, dx: int = 4, **left: str) -> Path:
+        path = tmp_path / "a.hdf5"
+        with h5py.File(path, "w") as file:
+            for axis in "xyz":
+                file[f"coordinates/coordinate_{axis}"] = np.ones((2, 2))
+                file[f"displacements/displacement_{axis}"] = np.ones(dx if axis == "x" else 4)
+            if mask:
+                file["coordinates/mask"] = np.array([1, 0, 2, 1, 1])[:mask]
+            for name in left.values():
+                del file[name]
+        return path
+
+    for mask in (0, 4):
+        (frame,) = read_frames([written(mask)])
+        assert len(frame.points) == (3 if mask else 4)
+    sizes = "coordinates, displacements and mask are not of one size"
+    for path in (written(5), written(0, 3), written(3)):
+        assert complaint(read_frames, [path]) == f"{path}: {sizes}"
+    for name in ("coordinates/coordinate_x", "displacements/displacement_y"):
+        said = complaint(read_frames, [written(name=name)])
+        assert said.endswith(
+            "expected coordinates/coordinate_x and so on: export coordinates, displacements"
+        )
 
 
 def test_variables_in_turn(tmp_path: Path) -> None:
@@ -243,6 +271,11 @@ def test_matlab_7_3_by_class_and_by_depth(tmp_path: Path, monkeypatch: pytest.Mo
         for _ in range(15):
             deep = deep.create_group("g")
         deep["n"] = np.ones((1, 1))
+        # Cells within each other are as deep as structs are.
+        inner = file["grid"].ref
+        for k in range(17):
+            write(f"cell{k}", np.array([[inner]], dtype=h5py.ref_dtype), "cell")
+            inner = file[f"cell{k}"].ref
     names = ["grid", "text", "truth", "none", "blank", "object", "cells", "inner", "deep", "x"]
     found = variables_73(path, names)
     assert "x" not in found
@@ -256,6 +289,8 @@ def test_matlab_7_3_by_class_and_by_depth(tmp_path: Path, monkeypatch: pytest.Mo
     with h5py.File(path, "a") as file:
         file.move("deep", "top/deep")
     too_many = "has too many parts; is the file damaged?"
+    assert len(variables_73(path, ["cell15"])["cell15"]) == 1
+    assert complaint(variables_73, path, ["cell16"]) == f"{path}: cell16: {too_many}"
     assert complaint(variables_73, path, ["top"]).endswith(too_many)
     monkeypatch.setattr(mat_version_73, "MOST_PARTS", 3)
     assert len(variables_73(path, ["cells"])["cells"]) == 2

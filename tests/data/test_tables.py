@@ -20,7 +20,11 @@ def table(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("text", "where", "what"),
     [
-        ("a,b\n1,2\n\n# x\n3,4,5\n", "line 5", "expected 2 cells as in the header, found 3"),
+        (
+            "a,b\n1,2\n\n# x\n3,4,5\n6,7\n8,9\n",
+            "line 5:",
+            "expected 2 cells as in the header, found 3",
+        ),
         ('a,b\n1,2\n3,"4\n5,6\n', "", "a quotation mark that is opened and not closed"),
         ("# only\na,b\n", "", "found only a header line"),
         ("\n", "", "found nothing"),

@@ -1,0 +1,312 @@
+"""Tables of points in text files: where the numbers stand, the quick way to them and the slow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.data.decimal_marks import decimal_mark, is_number
+from bubblefit.data.frame_headings import columns_of, heading_of
+from bubblefit.data.frames import FrameOptions, read_frames
+from bubblefit.data.text_cells import _quick, _slow, read_numbers
+from bubblefit.data.text_columns import quantity_columns
+from bubblefit.data.text_layouts import TOP, cells_of, find_layout
+
+from ..complaints import complaint
+
+WANTED = ("x", "y", "dx", "dy", "dz")
+PLAIN = FrameOptions(WANTED)
+
+
+def layout(folder: Path, text: str, comment: str = "#", **named: str):
+    path = folder / "a.txt"
+    path.write_text(text)
+    return find_layout(path, WANTED, named, comment)
+
+
+# --- cells and marks -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "separator", "cells"),
+    [
+        ("1 ;  2;", ";", ["1", "2", ""]),
+        (" 1   2\t3 ", None, ["1", "2", "3"]),
+        ('"a;b"; "c" ;3', ";", ["a;b", "c", "3"]),
+        ('"a b"  2 ', None, ["a b", "2"]),
+        ('"a";;"c"', ";", ["a", "", "c"]),
+        ('"a;2', ";", None),
+    ],
+)
+def test_cells_of_a_line(text, separator, cells) -> None:
+    assert cells_of(text, separator) == cells
+
+
+def test_what_a_number_is() -> None:
+    for cell in ("1", "-1.5", "+.5", ",5", "1,", "1e5", "1.5E-07"):
+        assert is_number(cell), cell
+    for cell in ("", ".", "1.2.3", "1e", "e5", "1 2", "nan", "--1"):
+        assert not is_number(cell), cell
+
+
+@pytest.mark.parametrize(
+    ("cells", "mark"),
+    [
+        (["1", "2.5"], "."), (["1,5", "2"], ","), (["1,5", "2.5"], "."), (["1,234", "0,5"], ","),
+        (["0,234"], ","), (["1,2345"], ","), (["12", "x.y"], "."), ([",5"], ","),
+    ],
+)  # fmt: skip
+def test_the_decimal_mark(cells: list[str], mark: str) -> None:
+    assert decimal_mark(Path("a"), [(1, "x", cell) for cell in cells]) == mark
+
+
+def test_marks_of_thousands() -> None:
+    cells = [(4, "x", "12"), (5, "y", "1,234"), (6, "z", "12,345")]
+    assert complaint(decimal_mark, Path("a.csv"), cells) == (
+        "a.csv: line 5, column 'y': '1,234': is the comma a decimal mark, or does it mark "
+        "thousands? say decimal"
+    )
+
+
+# --- the layout ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "separator", "header", "lines", "decimal"),
+    [
+        ("x,y,dx,dy,dz\n1,2,3,4,5\n", ",", 1, [2], "."),
+        ("title\n\nx;y;dx;dy;dz\n1,5;2;3;4;5\n6;7;8;9;1\n", ";", 3, [4, 5], ","),
+        ("x\ty\tdx\tdy\tdz\n1\t2\t3\t4\t5\n", "\t", 1, [2], "."),
+        ("x y dx dy dz\n1 2 3 4 5\n", None, 1, [2], "."),
+        ("# m\n# x,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
+        # The row that tells most, and the one above numbers, is the row of names.
+        ("x,y,1\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
+        ("x,y,dx,dy,dz\nw\nw\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 4, [5], "."),
+        ("X first,x,y,dx,dy,dz\n0,1,2,3,4,5\n", ",", 1, [2], "."),
+    ],
+)
+def test_where_the_numbers_stand(tmp_path, text, separator, header, lines, decimal) -> None:
+    found = layout(tmp_path, text)
+    assert (found.separator, found.header, found.decimal) == (separator, header, decimal)
+    assert [line for line, _ in found.body] == lines
+
+
+def test_a_row_of_units(tmp_path: Path) -> None:
+    text = "x,y,dx,dy,dz,v\n[mm],mm,(µm),um,,m/s\n1,2,3,4,5,6\n"
+    found = layout(tmp_path, text)
+    assert [h.unit for h in found.headings] == ["mm", "mm", "µm", "um", "", "m/s"]
+    assert [line for line, _ in found.body] == [3]
+    assert {name: where for name, where in found.columns.items()} == {
+        name: [i] for i, name in enumerate(WANTED)
+    }
+    # Texts without a length are no units, and a row with a number in it is a row.
+    for row in ("a,b,c,d,e,f", "mm,1,mm,mm,mm,mm"):
+        assert len(layout(tmp_path, text.replace("[mm],mm,(µm),um,,m/s", row)).body) == 2
+
+
+def test_no_row_of_names(tmp_path: Path) -> None:
+    at = tmp_path / "a.txt"
+    assert complaint(layout, tmp_path, "# a\n\n") == (
+        f"{at}: expected a header line and rows of numbers, found nothing"
+    )
+    assert complaint(layout, tmp_path, "x,y,dx,dy,dz,b,c\n") == (
+        f"{at}: line 1: expected a header line and rows of numbers, found only a header line"
+    )
+    assert complaint(layout, tmp_path, "some words\n") == (
+        f"{at}: expected a header line and rows of numbers, found only a header line"
+    )
+    nothing = (
+        "no row of names with places and displacements (x, y, dx, dy, dz and the like) was found; "
+        "name them with columns. Line 2 is: a,b"
+    )
+    assert complaint(layout, tmp_path, "# m\na,b\n1,2\n") == f"{at}: {nothing}"
+    # One quantity is no table of points; two are.
+    assert complaint(layout, tmp_path, "# m\na,x\n1,2\n").endswith("Line 2 is: a,x")
+    assert layout(tmp_path, "a,x,y\n1,2,3\n").header == 1
+
+
+def test_the_names_stand_within_the_first_lines(tmp_path: Path) -> None:
+    table = "x,y,dx,dy,dz\n1,2,3,4,5\n"
+    above = "word\n" * (TOP - 1)
+    assert layout(tmp_path, above + table).header == TOP == 300
+    assert "no row of names" in complaint(layout, tmp_path, "word\n" + above + table)
+
+
+def test_a_heading_with_blanks_makes_no_cells(tmp_path: Path) -> None:
+    found = layout(tmp_path, "x mm;y mm;dx mm;dy mm;dz mm\n1;2;3;4;5\n")
+    assert found.separator == ";" and [h.unit for h in found.headings] == ["mm"] * 5
+
+
+# --- headings ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "quantity", "state"),
+    [
+        ("X", "", "x", ""), ("dx", "", "dx", ""), ("u", "", "dx", ""), ("uz", "", "dz", ""),
+        ("x deformed", "", "x", "deformed"), ("x undeformed", "", "x", "reference"),
+        ("Vx", "mm", "dx", ""), ("Vx", "", "", ""), ("Vx", "m/s", "", ""),
+        ("displacement x", "", "dx", ""), ("Koordinate Y", "mm", "y", ""), ("x px", "", "x", ""),
+        ("x", "kPa", "", ""), ("xy", "", "", ""), ("x y", "", "", ""), ("strain x", "", "", ""),
+        ("sigma", "pixel", "sigma", ""), ("sigma x", "", "", ""), ("is valid", "", "valid", ""),
+        ("rejected", "", "invalid", ""), ("X_inch", "", "x", ""),
+    ],
+)  # fmt: skip
+def test_what_a_heading_means(name, unit, quantity, state) -> None:
+    found = heading_of(name, unit)
+    assert (found.name, found.quantity, found.state) == (name, quantity, state)
+
+
+def test_units_of_headings() -> None:
+    scales = {"mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "um": 1e-3, "in": 25.4, "INCH": 25.4}
+    for unit, scale in scales.items():
+        assert heading_of("x", unit).scale == scale
+        assert heading_of(f"x [{unit}]", "mm").scale == scale  # the name's own comes first
+    assert heading_of("x_inch").unit == "inch" and heading_of("x um").unit == "um"
+    assert heading_of("x", "px").scale is heading_of("x").scale is None
+
+
+def test_the_better_of_several_columns() -> None:
+    def best(*names: str, upper: bool = False, **named: str) -> dict[str, list[int]]:
+        return columns_of([heading_of(name) for name in names], named, upper)
+
+    assert best("X [px]", "X", "X [mm]") == {"x": [2]}
+    assert best("X [px]", "X", "U") == {"x": [1], "dx": [2]}
+    assert best("X [mm]", "x") == {"x": [1]}
+    assert best("x", "X", upper=True) == {"x": [1]} and best("x", upper=True) == {"x": [0]}
+    assert best("X", "Y1 mm", "X") == {"x": [0, 2]}
+    assert best("a", "X", "a [mm]", x="a") == {"x": [0]}
+    assert best("b [mm]", "X", x="b") == {"x": [0]} and best("X", x="q") == {"x": []}
+    assert best("x deformed", "x undeformed") == {"x deformed": [0], "x": [1]}
+
+
+def test_columns_that_cannot_be_told(tmp_path: Path) -> None:
+    def asked(text: str, options: FrameOptions = PLAIN, **named: str):
+        return quantity_columns(Path("a.csv"), layout(tmp_path, text, **named), named, options)
+
+    rest = ",dx,dy,dz\n1,2,3,4,5,6\n"
+    assert complaint(asked, f"X,Xpos,y{rest}".replace("Xpos", "X pos")) == (
+        "a.csv: line 1: the column of x may be 'X' or 'X pos'; name one with columns"
+    )
+    assert complaint(asked, f"X,X,y{rest}") == (
+        "a.csv: column 'X': this column appears twice; the file has: X, X, y, dx, dy, dz"
+    )
+    assert complaint(asked, f"X,X,y{rest}", x="q") == (
+        "a.csv: column 'q': this column is missing; the file has: X, X, y, dx, dy, dz"
+    )
+    assert complaint(asked, "x,dx,dy,dz\n1,2,3,4\n") == (
+        "a.csv: column 'y': this column is missing; the file has: x, dx, dy, dz"
+    )
+    after = "x deformed,y,dx,dy,dz\n1,2,3,4,5\n"
+    assert asked(after)["x deformed"] == 0
+    for text in (after.replace("dx", "q"), after.replace("x deformed", "y deformed")):
+        assert "this column is missing" in complaint(asked, text)
+    planar = FrameOptions(planar=True)
+    assert set(asked("x,y,dx,dy\n1,2,3,4\n", planar)) == {"x", "y", "dx", "dy"}
+    for one in ("z", "dz", "z deformed"):
+        assert "is missing" in complaint(asked, f"x,y,dx,dy,{one}\n1,2,3,4,5\n", planar)
+
+
+# --- numbers -------------------------------------------------------------------------------------
+
+ROWS = "x{0}y{0}dx{0}dy{0}dz{0}ok\n1{0}2{0}3{0}4{0}5{0}1\n6{0}7{0}{1}{0}9{0}10{0}0\n"
+COLUMNS = {"x": 0, "dx": 2}
+
+
+def numbers(way, found, flags=()):
+    done = way(found, COLUMNS, flags)
+    return done if done is None else ({k: v.tolist() for k, v in done[0].items()}, done[1].tolist())
+
+
+@pytest.mark.parametrize(
+    ("separator", "number"), [(",", "8.5"), (";", "8.5"), (";", "8,5"), ("\t", "8,5"), (" ", "8.5")]
+)
+def test_the_quick_way_reads_what_the_slow_one_does(tmp_path: Path, separator, number) -> None:
+    found = layout(tmp_path, ROWS.format(separator, number))
+    expected = {"x": [1.0, 6.0], "dx": [3.0, 8.5]}
+    assert numbers(_quick, found) == (expected, [True, True])
+    slow, _ = _slow(Path("a"), found, COLUMNS, [])
+    assert {key: value.tolist() for key, value in slow.items()} == expected
+    for values, good in ((None, [True, False]), ((0,), [False, True]), ((0, 1), [True, True])):
+        kept = {key: [v for v, g in zip(e, good, strict=True) if g] for key, e in expected.items()}
+        assert numbers(_quick, found, [(5, values)]) == (kept, good)
+        assert _slow(Path("a"), found, COLUMNS, [(5, values)])[1].tolist() == good
+
+
+@pytest.mark.parametrize(
+    "hole", ["", "nan", "NaN", "NAN", "-nan(ind)", "1.#QNAN", "n. def.", "---"]
+)
+def test_holes_are_found_by_either_way(tmp_path: Path, hole: str) -> None:
+    found = layout(tmp_path, ROWS.format(";", hole))
+    for read in (_quick(found, COLUMNS, []), _slow(Path("a"), found, COLUMNS, [])):
+        assert read is not None
+        np.testing.assert_array_equal(read[0]["dx"], [3.0, np.nan])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ROWS.format(",", "8,5"),  # a cell too many in one row
+        ROWS.format(" ", "8 8"),
+        ROWS.format(" ", ""),
+        ROWS.format(";", '"8"'),
+        ROWS.format(";", "x"),
+        ROWS.format(";", "1e999"),
+        ROWS.format(",", "8").replace("10,0", "10,0,7"),
+        ROWS.format(";", "8").replace("10;0", "10;"),  # a flag without a value
+    ],
+)
+def test_what_the_quick_way_leaves_to_the_slow_one(tmp_path: Path, text: str) -> None:
+    assert _quick(layout(tmp_path, text), COLUMNS, [(5, None)]) is None
+
+
+def test_a_separator_at_the_end_of_every_row(tmp_path: Path) -> None:
+    text = ROWS.format(";", "8").replace("5;1\n", "5;1;\n").replace("10;0\n", "10;0;\n")
+    found = layout(tmp_path, text)
+    assert numbers(_quick, found, [(5, None)]) == ({"x": [1.0], "dx": [3.0]}, [True, False])
+
+
+def test_rows_of_another_length_name_their_line(tmp_path: Path) -> None:
+    def read(text: str, flags=()):
+        return read_numbers(Path("a.csv"), layout(tmp_path, text), COLUMNS, flags)
+
+    decimals = "; decimal commas need another separator, or quotation marks"
+    assert complaint(read, ROWS.format(",", "8,5")) == (
+        f"a.csv: line 3: expected 6 cells as in the header, found 7{decimals}"
+    )
+    assert complaint(read, ROWS.format(";", "8;5")) == (
+        "a.csv: line 3: expected 6 cells as in the header, found 7"
+    )
+    assert complaint(read, ROWS.format(" ", "")) == (
+        "a.csv: line 3: expected 6 cells as in the header, found 5"
+    )
+    assert complaint(read, ROWS.format(";", '"8')) == (
+        "a.csv: line 3: a quotation mark that is opened and not closed"
+    )
+    # Empty cells at the end are none, and missing ones are empty, where there is a separator.
+    text = ROWS.format(";", "8").replace("5;1\n", '"5";1;;\n').replace(";10;0\n", "\n")
+    values, good = read(text)
+    assert values["dx"].tolist() == [3.0, 8.0] and good.tolist() == [True, True]
+    assert complaint(read, ROWS.format(";", "8").replace("10;0", "10;maybe"), [(5, None)]) == (
+        "a.csv: line 3, column 'ok': expected a number, found 'maybe'"
+    )
+
+
+def test_words_of_flags(tmp_path: Path) -> None:
+    words = ["true", "False", "YES", "no", "valid", "Invalid"]
+    rows = "".join(f"{k},2,3,4,5,{word}\n" for k, word in enumerate(words))
+    found = layout(tmp_path, "x,y,dx,dy,dz,ok\n" + rows)
+    values, good = read_numbers(Path("a"), found, COLUMNS, [(5, None)])
+    assert good.tolist() == [True, False] * 3 and values["x"].tolist() == [0.0, 2.0, 4.0]
+
+
+def test_columns_whose_meaning_is_unclear_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("x,y,z,dx,dy,dz,Mask,state\n1,2,3,4,5,6,0,1\n")
+    (frame,) = read_frames([path], FrameOptions(flag_column="Mask"))
+    assert frame.source.notes == (
+        "column 'state' is not used; flag_column or valid_column says what it means",
+    )
+    (frame,) = read_frames([path], FrameOptions(valid_column="state", flag_column="Mask"))
+    assert frame.source.notes == () and len(frame.points) == 1
