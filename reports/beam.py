@@ -81,7 +81,6 @@ def plot_beam(
         _supports(axes, bodies)
         _collar_from_the_side(axes, bodies)
         axes.set_aspect("equal")
-        axes.grid(False)
     ring = bodies.collar_radius + WALL
     feet = [y - bodies.support_radius for _, y in bodies.supports]
     low = min(float(now[:, 1].min()), bodies.collar_height - ring, *feet)

@@ -79,8 +79,9 @@ def plot_bending(path: Path | str, panel: BendPanel) -> Path:
     """
     rows = 2 if panel.measured is not None else 1
     figure = new_figure(7.6, 4.9 if rows == 1 else 6.4)
-    ratios = [2.3, 1.0][:rows]
-    panels = figure.subplots(rows, 1, squeeze=False, sharex=True, height_ratios=ratios)[:, 0]
+    panels = figure.subplots(rows, 1, squeeze=False, sharex=True, height_ratios=[2.3, 1.0][:rows])[
+        :, 0
+    ]
     _loads(panels[0], panel)
     along = "deflection of the collar, mm"
     quiet(panels[0], along if rows == 1 else "", "load, N", panel.title)

@@ -17,9 +17,9 @@ def plot_curves(
     path: Path | str, curves: Mapping[str, Sequence[tuple[str, ArrayLike, ArrayLike]]]
 ) -> Path:
     """A panel a direction; each curve is a specimen's name, elongations in mm and loads in N."""
-    figure = new_figure(4.2 * max(len(curves), 1), 3.8)
-    panels = figure.subplots(1, max(len(curves), 1), squeeze=False)[0]
-    for panel, (direction, specimens) in zip(panels, curves.items(), strict=False):
+    figure = new_figure(4.2 * len(curves), 3.8)
+    panels = figure.subplots(1, len(curves), squeeze=False)[0]
+    for panel, (direction, specimens) in zip(panels, curves.items(), strict=True):
         for rank, (name, elongation, load) in enumerate(specimens):
             label = name if rank < NAMED else None
             panel.plot(elongation, load, linewidth=1.1, label=label, **named_look(rank))

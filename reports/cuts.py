@@ -52,7 +52,7 @@ def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
 
 
 def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
-    size = float(np.abs(xy).max()) if len(xy) else 0.0
+    size = float(np.abs(xy).max(initial=0.0))
     return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
 
 

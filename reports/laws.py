@@ -68,8 +68,7 @@ def plot_laws(
     """
     if not rows:
         raise ValueError("plot_laws: no laws to draw")
-    width = max(5.5, 1.5 + 1.5 * len(rows))
-    figure = new_figure(width, 4.2)
+    figure = new_figure(max(5.5, 1.5 + 1.5 * len(rows)), 4.2)
     axes = figure.subplots()
     place = np.arange(len(rows), dtype=float)
     handles = {}
@@ -109,9 +108,8 @@ def plot_laws(
     axes.set_xticks(place, [_label(row, values) for row, values in zip(rows, folds, strict=True)])
     axes.grid(False, axis="x")
     order = [*(name for name, *_ in dots), "single folds", "scatter of specimens"]
-    legend_above(
-        figure, {name: handles[name] for name in order if name in handles}, int(width / 1.9)
-    )
+    entries = {name: handles[name] for name in order if name in handles}
+    legend_above(figure, entries, int(figure.get_figwidth() / 1.9))
     return save(figure, path)
 
 

@@ -75,8 +75,7 @@ def plot_loads(path: Path | str, curves: Sequence[StripCurves]) -> Path:
     if not curves:
         raise ValueError("plot_loads: no strips to draw")
     rows = 2 if any(c.polynomial or c.points for c in curves) else 1
-    width = 1.0 + 3.6 * max(len(curves), 1.4)
-    figure = new_figure(width, 3.8 if rows == 1 else 5.8)
+    figure = new_figure(1.0 + 3.6 * max(len(curves), 1.4), 3.8 if rows == 1 else 5.8)
     panels = figure.subplots(
         rows, len(curves), squeeze=False, sharex="col", height_ratios=[1.8, 1.0][:rows]
     )
@@ -97,7 +96,7 @@ def plot_loads(path: Path | str, curves: Sequence[StripCurves]) -> Path:
             _differences(panels[1, column], strip, looks)
             beside = "difference, N" if first else ""
             quiet(panels[1, column], along, beside)
-    legend_above(figure, _entries(curves, names), max(2, int(width / 2.3)))
+    legend_above(figure, _entries(curves, names), max(2, int(figure.get_figwidth() / 2.3)))
     return save(figure, path)
 
 

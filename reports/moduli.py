@@ -61,8 +61,7 @@ def plot_moduli(
         raise ValueError("plot_moduli: beside a known solution all fits need the same strains")
     rows = 1 if truth is None else 2
     figure = new_figure(10.5, 3.6 if rows == 1 else 5.6)
-    heights = [1.0] if rows == 1 else [1.6, 1.0]
-    axes = figure.subplots(rows, 3, squeeze=False, height_ratios=heights, sharex="col")
+    axes = figure.subplots(rows, 3, squeeze=False, height_ratios=[1.6, 1.0][:rows], sharex="col")
     looks = _looks(len(fits), names)
     for m, (name, strain) in enumerate(PANELS):
         top = axes[0, m]

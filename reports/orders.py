@@ -58,8 +58,7 @@ def plot_orders(path: Path | str, directions: Sequence[OrderErrors]) -> Path:
     """
     if not directions:
         raise ValueError("plot_orders: no directions to draw")
-    width = 1.0 + 3.2 * max(len(directions), 1.5)
-    figure = new_figure(width, 3.8)
+    figure = new_figure(1.0 + 3.2 * max(len(directions), 1.5), 3.8)
     panels = figure.subplots(1, len(directions), squeeze=False)[0]
     for column, (axes, row) in enumerate(zip(panels, directions, strict=True)):
         errors = [np.asarray(values, dtype=float) for values in (row.rmse, row.left_out)]

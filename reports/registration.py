@@ -26,10 +26,12 @@ def plot_registration(
     every = slice(None, None, -(-len(points) // MOST))
     figure = new_figure(5.2 * len(maps), 4.6)
     panels = figure.subplots(1, len(maps), squeeze=False)[0]
-    size = float(np.clip(15_000 / len(points), 3.0, 30.0))
     arrow = 0.5 * float(np.hypot(*edge.T).min())
     for axes, (title, values) in zip(panels, maps, strict=True):
-        drawn = axes.scatter(*points[every].T, c=values[every], s=size, linewidths=0)
+        drawn = axes.scatter(
+            *points[every].T, c=values[every],
+            s=float(np.clip(15_000 / len(points), 3.0, 30.0)), linewidths=0,
+        )  # fmt: skip
         figure.colorbar(drawn, ax=axes, shrink=0.8)
         axes.plot(*edge.T, color=BLACK, linewidth=1)
         for name, (x, y) in (("warp", (1.0, 0.0)), ("fill", (0.0, 1.0))):

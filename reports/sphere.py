@@ -34,10 +34,9 @@ def plot_spheres(path: Path, frames: Sequence[Drawn]) -> Path:
         every = slice(None, None, -(-len(points) // MOST))
         x, y = points[every, :2].T
         inside = used[every]
-        size = float(np.clip(15_000 / len(points), 3.0, 30.0))
         drawn = axes.scatter(
-            x[inside], y[inside], s=size, c=off[every][inside], cmap="RdBu_r", vmin=-most,
-            vmax=most, linewidths=0,
+            x[inside], y[inside], c=off[every][inside], cmap="RdBu_r", vmin=-most, vmax=most,
+            s=float(np.clip(15_000 / len(points), 3.0, 30.0)), linewidths=0,
         )  # fmt: skip
         # However far off they are, the picture stays that of the ball.
         for place, limits in ((points[used, 0], axes.set_xlim), (points[used, 1], axes.set_ylim)):

@@ -53,6 +53,7 @@ def plot_strip(
     size = np.ptp(np.vstack([rest, now]), axis=0)
     # As tall as the strip asks for, with room for the colour bar beside and the legend beneath.
     figure = new_figure(3.8, float(np.clip(1.6 + 2.3 * size[1] / size[0], 4.0, 8.5)))
+    figure.set_layout_engine("compressed")  # true to scale: the axes are narrower than their room
     axes = figure.subplots()
     colours, norm = strain_colours(gamma)
     faces = PolyCollection(now[cells], array=gamma, cmap=colours, norm=norm, edgecolor="face")

@@ -97,11 +97,11 @@ def pressure_colours(count: int) -> list[Any]:
 def strain_colours(strain: ArrayLike) -> tuple[str, Normalize]:
     """Dark is large; zero is in the middle where both signs matter, else at one end."""
     low, high = float(np.nanmin(strain)), float(np.nanmax(strain))
-    most = max(abs(low), abs(high)) or 1.0
+    most = max(abs(low), abs(high))
     if min(-low, high) > ONE_SIGN * most:
         return "PuOr", Normalize(-most, most)
-    if high > -low or most == 1.0:
-        return "viridis_r", Normalize(min(low, 0.0), max(high, 0.0) or 1.0)
+    if high >= -low:
+        return "viridis_r", Normalize(min(low, 0.0), high or 1.0)
     return "viridis", Normalize(low, max(high, 0.0))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 
 from . import needs
 from .bars import BarKind, BarSolver
+from .figure_checks import check_figure
 
 # The first call of a kernel compiles it, or reads it from the cache.
 settings.register_profile("bubblefit", deadline=None)
@@ -34,17 +36,20 @@ def ccx() -> Executable:
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """Every figure saved by the test, in turn; each is still written."""
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
+    """Every figure saved by the test, in turn; each is still written, and looked at in the end."""
     figures: list[Figure] = []
     write = Figure.savefig
 
     def keep(self: Figure, *args: Any, **kwargs: Any) -> None:
-        write(self, *args, **kwargs)
+        # At its own resolution, for which all sizes in it are then known.
+        write(self, *args, **{**kwargs, "dpi": "figure"})
         figures.append(self)
 
     monkeypatch.setattr(Figure, "savefig", keep)
-    return figures
+    yield figures
+    for figure in figures:
+        check_figure(figure)
 
 
 @pytest.fixture

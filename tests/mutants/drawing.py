@@ -13,14 +13,18 @@ from cosmic_ray.mutating import mutate_code
 
 from .operators import operators
 
-#: How a figure looks, which is judged by eye: arguments of matplotlib.
+#: How a figure looks, which is judged by eye: arguments of matplotlib, also those kept in a dict.
 LOOKS = {
-    "alpha", "capsize", "clip_on", "dpi", "figsize", "fontsize", "frameon", "handlelength",
-    "hspace", "labelpad", "labelsize", "linestyle", "linewidth", "linewidths", "markeredgewidth",
-    "markerscale", "markersize", "ncol", "ncols", "pad", "rotation", "wspace", "zorder",
+    "alpha", "capsize", "clip_on", "dpi", "figsize", "fontsize", "framealpha", "frameon",
+    "handlelength", "height_ratios", "hspace", "labelpad", "labelsize", "linestyle", "linewidth",
+    "linewidths", "markeredgewidth", "markerscale", "markersize", "markevery", "ncol", "ncols",
+    "numticks", "pad", "rotation", "s", "shrink", "title_fontsize", "width_ratios", "wspace",
+    "zorder",
 }  # fmt: skip
 
 
+#: Constants that hold dash patterns.
+PATTERNS = {"DASHES"}
 #: Functions whose numbers are nothing but size and layout.
 LAYOUTS = {"new_figure", "legend_above", "add_gridspec"}
 #: Arguments that forbid what correct code does not do anyway.
@@ -120,6 +124,11 @@ def _apart(tree: ast.AST) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
         parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]
         if isinstance(node, ast.keyword) and node.arg in LOOKS | PROMISES:
             parts.append(node.value)
+        if isinstance(node, ast.AnnAssign) and getattr(node.target, "id", "") in PATTERNS:
+            parts.append(node.value)
+        if isinstance(node, ast.Dict):
+            pairs = zip(node.keys, node.values, strict=True)
+            parts += [value for key, value in pairs if getattr(key, "value", None) in LOOKS]
         if isinstance(node, ast.Call):
             called = getattr(node.func, "attr", getattr(node.func, "id", ""))
             parts += [*node.args, *(k.value for k in node.keywords)] if called in LAYOUTS else []

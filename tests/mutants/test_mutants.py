@@ -27,7 +27,7 @@ def shown(value: float | None, **given):
     """Text of MPa, kPa."""
     if value >= 2.5:
         return f"{1e3 * value:g} kPa"
-    return plot(value, new_figure(9.6, 4.3), linewidth=3, strict=True, **given)
+    return plot(value, new_figure(9.6, 4.3), linewidth=3, strict=True, **{"zorder": 4}, **given)
 '''
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
+
+from ..figure_checks import check_figure
 
 
 @contextmanager
@@ -16,9 +19,16 @@ def _no_file(path: Path) -> Iterator[Path]:
 
 
 @pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """Every figure that would have been written, in turn."""
+def figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
+    """Every figure that would have been written, in turn, and looked at in the end."""
     drawn: list[Figure] = []
-    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
+
+    def keep(self: Figure, *_: Any, **__: Any) -> None:
+        self.draw_without_rendering()
+        drawn.append(self)
+
+    monkeypatch.setattr(Figure, "savefig", keep)
     monkeypatch.setattr("bubblefit.reports.style.replacing", _no_file)
-    return drawn
+    yield drawn
+    for figure in drawn:
+        check_figure(figure)

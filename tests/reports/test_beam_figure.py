@@ -69,6 +69,7 @@ def test_supports_and_collar_are_true_to_scale(figure: Figure) -> None:
     ]
     (ring,) = (p for p in cut.patches if isinstance(p, Circle))
     assert (*ring.center, ring.radius) == (0.0, 10.0, 100.0 + 0.5 * WALL)
+    assert not ring.get_fill()
 
 
 def test_the_cut_is_the_ring_before_and_now(figure: Figure) -> None:
@@ -78,6 +79,49 @@ def test_the_cut_is_the_ring_before_and_now(figure: Figure) -> None:
         assert line.get_label() == name
     assert cut.get_aspect() == 1.0
     assert (cut.get_xlabel(), cut.get_ylabel()) == ("x, mm", "y, mm")
+    # The legend stands beside the panel's upper right corner.
+    (box, panel) = cut.get_legend().get_window_extent(), cut.get_window_extent()
+    assert 0 <= box.x0 - panel.x1 < 20 and 0 <= panel.y1 - box.y1 < 20
+    assert not any(axes.xaxis.get_gridlines()[0].get_visible() for axes in figure.axes[:3])
+
+
+def test_the_whole_beam_stands_above_the_others(figure: Figure) -> None:
+    whole, close, cut, _ = (axes.get_position() for axes in figure.axes)
+    assert whole.y0 > max(close.y1, cut.y1) and close.x1 < cut.x0
+    assert whole.width > 1.3 * close.width
+
+
+def test_what_is_nearer_hides_what_is_behind(figures: list[Figure]) -> None:
+    """Quads on the half that is seen, its middle included, from the far to the near."""
+    x = np.array([40.0, -40.0, 0.0, 80.0])
+    side = np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]])  # z, y
+    points = np.array([[at, y, z + at] for at in x for z, y in side])
+    quads, strain = np.arange(16).reshape(4, 4), np.array([0.1, 0.2, 0.3, 0.4])
+    plot_beam("b", points, quads, strain, 0.1 * OUTLINE, RING, BODIES)
+    for axes in figures[0].axes[:2]:
+        (faces,) = (c for c in axes.collections if isinstance(c, PolyCollection))
+        assert faces.get_array().tolist() == [0.3, 0.1, 0.4]
+        middles = [path.vertices[:4, 0].mean() for path in faces.get_paths()]
+        assert middles == pytest.approx([0.0, 40.0, 80.0])
+
+
+@pytest.mark.parametrize(
+    ("supports", "collar", "rises", "ends"),
+    [
+        (-150.0, 0.0, 0.0, (-200.0, 112.0)),  # feet, collar
+        (0.0, 10.0, 0.0, (-102.0, 122.0)),  # collar
+        (0.0, -10.0, 95.0, (-122.0, 170.0)),  # collar, inflated beam
+        (0.0, 60.0, -80.0, (-155.0, 172.0)),  # beam, collar
+    ],
+)
+def test_the_lowest_and_the_highest(figures: list[Figure], supports, collar, rises, ends) -> None:
+    """Of the beam now and before, of collar and supports, with 20 mm of room."""
+    bodies = BeamBodies(((-500.0, supports), (500.0, supports)), 50.0, collar, 100.0, 80.0)
+    now, before = POINTS + np.array([0.0, min(rises, 0.0), 0.0]), OUTLINE.copy()
+    before[:, 1] += max(rises, 0.0)
+    plot_beam("b", now, QUADS, STRAIN, before, RING, bodies)
+    low, high = ends
+    assert figures[0].axes[0].get_ylim() == pytest.approx((low - 20.0, high + 20.0))
 
 
 @pytest.mark.parametrize(
@@ -86,6 +130,8 @@ def test_the_cut_is_the_ring_before_and_now(figure: Figure) -> None:
         ([0.01, 0.02, 0.03, -0.4, 0.0, 0.0], (-0.03, 0.03), "min"),
         ([0.01, 0.02, 0.03, 0.0, 0.0, 0.0], (0.0, 0.03), "neither"),
         ([0.01, 0.02, 0.03, -0.02, 0.0, 0.0], (-0.03, 0.03), "neither"),
+        ([-0.4, -0.1, 0.0, 0.0, 0.0, 0.0], (-1e-6, 0.0), "min"),
+        ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (0.0, 1.0), "neither"),
     ],
 )
 def test_colours_of_wrinkles(figures: list[Figure], strain, ends, beyond) -> None:

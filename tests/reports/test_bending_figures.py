@@ -14,7 +14,7 @@ from bubblefit.reports import (
     plot_bending_cases,
     plot_gas,
 )
-from bubblefit.reports.style import GREY, NAMED
+from bubblefit.reports.style import BLACK, GREY, NAMED
 from matplotlib.figure import Figure
 
 from ..drawings import data, legend, lines, titles
@@ -47,6 +47,12 @@ def test_loads_and_what_the_cards_miss(tmp_path: Path, drawn: list[Figure]) -> N
     (off,), (other,) = lines(low, NAMED[0]), lines(low, NAMED[1])
     assert off == pytest.approx(np.array([GRID, -GRID]))
     assert other == pytest.approx(np.array([GRID, GRID]))
+    assert top.get_xlim() == pytest.approx((0.0, 1.03 * 40.0))
+    assert top.get_ylim() == pytest.approx((0.0, 1.06 * 200.0))
+    (below,) = low.collections
+    ends = below.get_paths()[0].vertices[:, 1]
+    assert (ends.min(), ends.max()) == pytest.approx((-3.0, 3.0))
+    assert lines(low, BLACK)[0][1].tolist() == [0.0, 0.0]
     box = top.get_legend()
     assert [text.get_text() for text in box.get_texts()] == ["3.11 N"]
     assert legend(drawn[0]) == [
@@ -63,6 +69,44 @@ def test_all_cases_with_the_same_loads_in_a_row(tmp_path: Path, drawn: list[Figu
     np.testing.assert_array_equal(lines(one, NAMED[0])[0], [WAY, 3 * WAY])
     np.testing.assert_array_equal(lines(two, NAMED[1])[0], [WAY, 5 * WAY])
     assert not any(axes.axison for axes in free)
+
+
+def test_a_free_place_and_who_names_the_axis(figures: list[Figure]) -> None:
+    """The lowest panel of a column does, and one above a free place."""
+    names = ["a", "b", "c", "d", "", "f"]
+    plot_bending_cases("a", [BendPanel(n, [SOFT] if n else []) for n in names], 2)
+    panels = figures[0].axes
+    wanted = {"b": False, "c": True, "d": False, "f": True, "a": False}
+    for name, axes in zip(names, panels, strict=True):
+        assert axes.axison == bool(name)
+        if name:
+            assert axes.get_xlabel() == ("deflection, mm" if wanted[name] else "")
+            assert axes.xaxis.get_tick_params()["labelbottom"] == wanted[name]
+            assert axes.get_ylabel() == ("load, N" if name == "a" or name == "c" else "")
+
+
+def test_nothing_to_draw(figures: list[Figure]) -> None:
+    plot_bending("a", BendPanel("none"))
+    plot_bending_cases("b", [BendPanel("none")], 1)
+    for figure in figures:
+        (axes,) = figure.axes
+        assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 1.0), (0.0, 1.0))
+        assert not figure.legends
+    with pytest.raises(ValueError, match="no cases to draw"):
+        plot_bending_cases("b", [], 1)
+
+
+def test_readings_beyond_the_cards_are_seen(figures: list[Figure]) -> None:
+    """Load and deflection go as far as what was measured where that is more."""
+    short = BendLine("short", 0, WAY[:3], WAY[:3])
+    long = BendReadings([(WAY[:7], 4.1 * WAY[:7])], GRID, 4 * GRID, 0.1 * GRID)
+    plot_bending("a", BendPanel("one", [short], long))
+    top, low = figures[0].axes
+    assert top.get_xlim() == pytest.approx((0.0, 1.03 * 30.0))
+    assert top.get_ylim() == pytest.approx((0.0, 1.06 * 4.1 * 30.0))
+    # Where the card does not go nothing is known of it.
+    off = lines(low, NAMED[0])[0][1]
+    assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
 
 
 def test_gas_in_kilopascal_and_litres(tmp_path: Path, drawn: list[Figure]) -> None:

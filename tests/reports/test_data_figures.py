@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports import plot_clock, plot_spheres
-from bubblefit.reports.style import VERMILION
+from bubblefit.reports import plot_clock, plot_curves, plot_spheres
+from bubblefit.reports.style import BLUE, NAMED, VERMILION
 from matplotlib.figure import Figure
 
 
@@ -35,9 +35,31 @@ def test_pressures_and_heights_by_one_clock(figures: list[Figure]) -> None:
     np.testing.assert_array_equal(left.lines[0].get_data(), [times, 1e3 * pressures])
     np.testing.assert_array_equal(beside.lines[0].get_data(), [times, heights])
     np.testing.assert_array_equal(right.lines[0].get_data(), [1e3 * pressures, heights])
+    known, other = left.get_legend().legend_handles
+    assert (known.get_color(), other.get_color()) == (BLUE, VERMILION)
+    boxes = [[t.get_text() for t in axes.get_legend().get_texts()] for axes in (left, right)]
+    assert boxes == [["pressure of the log", "height"], ["all frames", "taken"]]
+    assert right.lines[1].get_fillstyle() == "none"
+    assert not beside.xaxis.get_gridlines()[0].get_visible()
     (taken,) = (line for line in right.lines if line.get_color() == VERMILION)
     np.testing.assert_array_equal(taken.get_data(), [[20.0], [4.0]])
     height = "height of the apex, mm"
     assert (left.get_xlabel(), left.get_ylabel()) == ("time by the log's clock, s", "pressure, kPa")
     assert beside.get_ylabel() == height
     assert (right.get_xlabel(), right.get_ylabel()) == ("pressure, kPa", height)
+
+
+def test_six_specimens_of_a_direction_are_named(figures: list[Figure]) -> None:
+    x = np.array([0.0, 1.0, 2.0])
+    warp = [(f"specimen {i}", x, (i + 1) * x) for i in range(8)]
+    plot_curves("c", {"warp": warp, "fill": [("", x, 5 * x)]})
+    left, right = figures[0].axes
+    for i, line in enumerate(left.lines):
+        np.testing.assert_array_equal(line.get_data(), [x, (i + 1) * x])
+    assert [line.get_color() for line in left.lines] == [*NAMED, *NAMED[:2]]
+    names = [text.get_text() for text in left.get_legend().get_texts()]
+    assert names == [f"specimen {i}" for i in range(6)]
+    assert right.get_legend() is None and len(right.lines) == 1
+    words = ("elongation of the gauge, mm", "load, N")
+    assert [(a.get_xlabel(), a.get_ylabel()) for a in (left, right)] == [words] * 2
+    assert [a.get_title("left") for a in (left, right)] == ["warp", "fill"]

@@ -25,6 +25,7 @@ from bubblefit.reports import (
 )
 from bubblefit.reports.cuts import node_cut, point_cut
 from bubblefit.reports.html import number, percent
+from bubblefit.reports.scatter import _below_one
 from bubblefit.reports.style import BLACK, SKY, VERMILION
 from bubblefit.writing import replacing
 from matplotlib.figure import Figure
@@ -33,6 +34,7 @@ from ..drawings import data, legend, lines
 
 #: Best, median and worst of 50 starts (docs/references.md, its Fig. 4.8).
 PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
+STRAIN_SYMBOLS = (r"\varepsilon_1", r"\varepsilon_2", r"\gamma_{12}")
 PRESSURES = np.array([0.022, 0.186, 0.3])
 
 
@@ -70,13 +72,42 @@ def test_optima(tmp_path: Path, drawn: list[Figure], values: list[float]):
         assert all(low <= y <= high for y in (*optima[1], *references.values()))
         # Room for every start, the failed ones too, half a place to either side.
         assert axes.get_xlim() == (0.5, max(len(values), 2) + 0.5)
-        said = axes.get_title("left")
-        assert said.startswith(f"Optima of {len(values)} start")
         failed = len(values) - len(ended)
-        assert (f", {failed} without a result" in said) == bool(failed)
+        said = f"Optima of {len(values)} start" + ("s" if len(values) > 1 else "")
+        said += f", {failed} without a result" if failed else ""
         if ended:
             best, median, worst = ended[-1], np.median(ended), ended[0]
-            assert f"best {best:.3g}, median {median:.3g}, worst {worst:.3g}" in said
+            said += f": best {best:.3g}, median {median:.3g}, worst {worst:.3g}"
+        assert axes.get_title("left") == said
+
+
+@pytest.mark.parametrize(
+    ("values", "references", "scale", "ends"),
+    [
+        ([1.0, 10.0], {}, "linear", (0.0, 11.5)),
+        ([1.0, 10.01], {}, "log", (10**-0.3, 10**1.3004)),
+        ([1e-9, 10.0], {}, "log", (10**-9.6, 10**1.6)),
+        ([1.0], {"worst": 1e3}, "log", (10**-0.3, 10**3.3)),
+        ([np.nan], {}, "linear", (0.0, 1.15)),
+    ],
+)
+def test_scale_of_the_optima(figures: list[Figure], values, references, scale, ends) -> None:
+    """Logarithmic from a decade on, with room below and above."""
+    plot_optima("o", values, "RMS, mm", references)
+    (axes,) = figures[0].axes
+    assert axes.get_yscale() == scale and axes.get_ylim() == pytest.approx(ends, rel=1e-3)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("start, sorted from worst to best", "RMS, mm")
+
+
+def test_published_values_are_named_at_their_lines(figures: list[Figure]) -> None:
+    """At the right end; the best below its line, the others above."""
+    plot_optima("o", [0.1, 3.0, 1.0], references=PUBLISHED)
+    (axes,) = figures[0].axes
+    right = axes.get_window_extent().x1
+    for text, (name, value) in zip(axes.texts, PUBLISHED.items(), strict=True):
+        box, line = text.get_window_extent(), axes.transData.transform((1.0, value))[1]
+        assert 0 < right - box.x1 < 6
+        assert 0 < (line - box.y1 if name == "best" else box.y0 - line) < 6
 
 
 @pytest.mark.parametrize("fits, known", [(5, True), (5, False), (1, True), (1, False)])
@@ -99,6 +130,43 @@ def test_moduli(tmp_path: Path, drawn: list[Figure], fits: int, known: bool):
         assert [y[0] for y in off[:-1]] == pytest.approx([1e-4 * i for i in range(fits - 1, 0, -1)])
         assert below.texts[0].get_text() == "best: at most 1e-10 %", m
     assert ("known" in legend(figure)) == known
+    top, strain = "tangent modulus, MPa", [f"${s}$" for s in STRAIN_SYMBOLS]
+    words = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    along = [f"{n} strain {s}" for n, s in zip(("warp", "fill", "shear"), strain, strict=True)]
+    upper = ["", "", ""] if known else along
+    assert words[:3] == [(upper[0], top), (upper[1], ""), (upper[2], "")]
+    if known:
+        below = "deviation from known, %"
+        assert words[3:] == [(along[0], below), (along[1], ""), (along[2], "")]
+
+
+@pytest.mark.parametrize(
+    ("off", "ends"),
+    [
+        ([3.0, 4.0], (1.0, 100.0)),
+        ([2e-5, 0.3], (1e-5, 10.0)),
+        ([1e-9, 0.3], (1e-6, 10.0)),
+    ],
+)
+def test_decades_of_the_deviation(figures: list[Figure], off: list[float], ends) -> None:
+    """Whole ones with room for words above; of more than seven the lowest are not seen."""
+    strains = np.tile([0.0, 0.1], (3, 1))
+    truth = np.full((3, 2), 1000.0)
+    plot_moduli("m", strains, [truth * (1 + 0.01 * np.array(off))], truth)
+    for axes in figures[0].axes[3:]:
+        assert axes.get_ylim() == pytest.approx(ends)
+        (text,), panel = axes.texts, axes.get_window_extent()
+        box = text.get_window_extent()
+        assert 0 < panel.x1 - box.x1 < 0.05 * panel.width
+        assert 0 < panel.y1 - box.y1 < 0.1 * panel.height
+
+
+@pytest.mark.parametrize("known", [1200.0, 900.0, -100.0])
+def test_fit_and_known_modulus_are_seen(figures: list[Figure], known: float) -> None:
+    strains, fit = np.tile([0.0, 0.1], (3, 1)), np.full((1, 3, 2), 1000.0)
+    plot_moduli("m", strains, fit, np.full((3, 2), known))
+    ends = (min(0.0, known), 1.08 * max(1000.0, known))
+    assert [axes.get_ylim() for axes in figures[0].axes[:3]] == [pytest.approx(ends)] * 3
 
 
 @pytest.mark.parametrize("points", [QUARTER, FULL], ids=["quarter", "full"])
@@ -122,8 +190,23 @@ def test_profiles_and_heights(tmp_path: Path, drawn: list[Figure], points: np.nd
             assert best[1].max() == pytest.approx(height)
             assert next_best[1].max() == pytest.approx(1.01 * height)
             assert dots[1].max() == pytest.approx(height + 1)
+        best, other, dots = both.axes[axis].lines[:3]
+        assert best.get_alpha() == 1.0 > other.get_alpha() > 0.2
+        assert best.get_linewidth() > other.get_linewidth()
+        assert dots.get_markerfacecolor() == "white" and dots.get_markeredgewidth() > 0.3
+        assert panel.get_title("left") == ("cut along x (warp)", "cut along y (fill)")[axis]
+        assert panel.get_xlabel() == ("x, mm", "y, mm")[axis]
+        assert panel.get_ylabel() == ("height z, mm", "")[axis]
     assert legend(one) == ["300 kPa", "186 kPa", "22 kPa", "model"]
     assert legend(both)[3:] == ["model (2 best)", "measured"]
+
+
+@pytest.mark.parametrize(("lift", "bottom"), [(5.0, 0.0), (-50.0, -52.0)])
+def test_profiles_stand_on_the_sheet(figures: list[Figure], lift: float, bottom: float) -> None:
+    """The axis begins with height zero, or below where a frame hangs lower."""
+    plot_profiles("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
+    for axes in figures[0].axes:
+        assert axes.get_ylim()[0] == pytest.approx(bottom)
 
 
 def height_at(position: np.ndarray, height: float) -> np.ndarray:
@@ -141,6 +224,8 @@ def test_heights_are_drawn_against_each_other(tmp_path: Path, drawn: list[Figure
     for shown, off, z, model in zip(data(left)[1:], data(right)[1:], seen, modelled, strict=True):
         np.testing.assert_array_equal(shown, [z, model])
         np.testing.assert_array_equal(off, [z, model - z])
+    for axes, rule in ((left, left.get_xlim()), (right, (0.0, 0.0))):
+        assert axes.lines[0].get_ydata() == pytest.approx(rule) and axes.lines[0].get_zorder() == 3
     rms = np.sqrt(np.mean([0.0, 0.01, 0.04]))
     assert right.get_title("left") == f"RMS {rms:.2g} mm"
     every, spread = np.concatenate(seen), np.concatenate(modelled) - np.concatenate(seen)
@@ -148,6 +233,17 @@ def test_heights_are_drawn_against_each_other(tmp_path: Path, drawn: list[Figure
     assert left.get_title("left") == f"$R^2$ = 1 $-$ {1 - said:.1e}"
     assert legend(drawn[0]) == ["300 kPa", "186 kPa", "22 kPa"]
     assert drawn[1].axes[1].get_title("left") == "RMS 0 mm"
+    assert drawn[1].axes[0].get_title("left") == "$R^2$ = 1 $-$ 0.0e+00"
+
+
+def test_fit_that_explains_nothing(figures: list[Figure]) -> None:
+    """Of equal heights no share is explained; below the mean's error it is negative."""
+    plot_heights("h", [0.022], [[3.0, 3.0]], [[3.0, 4.0]], "known")
+    plot_heights("h", [0.022], [[3.0, 5.0]], [[5.0, 3.0]], "known")
+    titles = [figure.axes[0].get_title("left") for figure in figures]
+    assert titles == ["$R^2$ = nan", "$R^2$ = -3.000"]
+    assert figures[0].axes[1].get_ylabel() == "modelled $-$ known, mm"
+    assert [_below_one(r) for r in (0.999, 0.9991)] == ["0.999", "1 $-$ 9.0e-04"]
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -256,7 +352,11 @@ def test_numbers():
     assert [number(v) for v in (None, float("nan"), 3, "x", 0.123456)] == [
         "–", "–", "3", "x", "0.1235",
     ]  # fmt: skip
-    assert percent(0.01234) == "1.2 %"
+    assert [number(v) for v in (float("inf"), 12345.6, True)] == ["–", "1.235e+04", "True"]
+    shares = (0.01234, 0.9949, 0.995, 0.996, 1.234, 12.0, 0.1, 0.0)
+    assert [percent(share) for share in shares] == [
+        "1.2 %", "99 %", "100 %", "100 %", "123 %", "1200 %", "10 %", "0 %",
+    ]  # fmt: skip
 
 
 def test_replacing_keeps_the_old_file_when_the_block_fails(tmp_path: Path):

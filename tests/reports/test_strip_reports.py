@@ -70,6 +70,10 @@ def test_loads(tmp_path: Path, drawn: list[Figure]) -> None:
     assert lines(low, GREY)[0][1] == pytest.approx([0, -10.0, 30.0, np.nan], nan_ok=True)
     band = low.patches[0].get_extents().transformed(low.transData.inverted())
     assert (band.y0, band.y1) == pytest.approx((-21.7, 21.7))
+    assert lines(low, BLACK)[0][1].tolist() == [0.0, 0.0]
+    box = top.get_legend()
+    assert [handle.get_color() for handle in box.legend_handles] == [*NAMED[:2]]
+    assert box.get_title().get_text() == "RMS error, warp"
     assert legend(drawn[0]) == [
         "measured", "polynomial", "Table 3.2", "bubble", "scatter of specimens (±)",
     ]  # fmt: skip
@@ -104,6 +108,7 @@ def test_loads_of_models_alone(tmp_path: Path, drawn: list[Figure]) -> None:
     assert len(drawn[0].axes) == 1
     assert legend(drawn[0]) == ["Table 3.2", "bubble"]
     assert drawn[0].axes[0].get_xlabel() == "gauge elongation, mm"
+    assert drawn[0].axes[0].xaxis.get_tick_params()["labelbottom"]
     plot_loads(tmp_path / "l.png", [strip(), strip(polynomial=None, points=None)])
     assert [axes.axison for axes in drawn[1].axes] == [True, True, True, False]
 
@@ -206,7 +211,17 @@ def test_the_three_moduli_together(tmp_path: Path, drawn: list[Figure]) -> None:
     plot_moduli_together(tmp_path / "m.png", STRAINS, MODULI - 30.0)
     log, linear = (figure.axes[0] for figure in drawn)
     assert (log.get_yscale(), linear.get_yscale()) == ("log", "linear")
-    assert linear.get_ylim()[0] < -9.9
+    assert log.get_ylim() == pytest.approx((MODULI.min() / 1.5, MODULI.max() * 1.5))
+    least, most = MODULI.min() - 30.0, MODULI.max() - 30.0
+    assert linear.get_ylim() == pytest.approx((least, 1.08 * most))
+    assert log.get_xlim()[0] == linear.get_xlim()[0] == 0.0
+    words = [(axes.get_xlabel(), axes.get_ylabel()) for axes in (log, linear)]
+    assert words == [("logarithmic strain", "tangent modulus, MPa")] * 2
+    for m, band in enumerate(log.collections):
+        ends = band.get_paths()[0].vertices[:, 1]
+        assert (ends.min(), ends.max()) == pytest.approx(
+            (0.9 * MODULI[m].min(), 1.1 * MODULI[m].max())
+        )
     curves = [np.array(line.get_data()) for line in log.lines]
     for m in range(3):
         assert curves[2 * m] == pytest.approx(np.array([STRAINS[m], MODULI[m]]))
@@ -305,7 +320,22 @@ def test_laws(tmp_path: Path, drawn: list[Figure]) -> None:
     assert any(np.array_equal(y, [210.0, 48.0, np.nan], equal_nan=True) for y in data)
     assert any(np.array_equal(y, [200.0, 300.0]) for y in data)
     assert any(np.array_equal(y, [45.0, 45.0]) for y in data)
-    assert axes.get_yscale() == "linear" and axes.get_ylim()[0] == 0
+    # The dots of a law stand beside its place, its folds to their right, joined by a bar.
+    dots = {line.get_label(): np.asarray(line.get_xdata()) for line in axes.lines}
+    places = sorted(tuple(np.round(x, 9)) for x in dots.values())
+    assert places == [
+        (-0.14, 0.86, 1.86), (0.0, 1.0), (0.14, 0.14), (0.14, 1.14, 2.14), (0.24, 0.24),
+        (1.14, 1.14), (1.24,),
+    ]  # fmt: skip
+    assert axes.get_xlim() == pytest.approx((-0.6, 2.6))
+    assert axes.get_ylim() == pytest.approx((0.0, 1.1 * 300.0))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "form of the moduli (number of coefficients)", "RMS error, N"
+    )  # fmt: skip
+    for text in axes.texts:  # beside its dot, at its left
+        box, dot = text.get_window_extent(), axes.transData.transform(text.xy)
+        assert 3 < dot[0] - box.x1 < 16 and box.y0 < dot[1] < box.y1
+    assert axes.get_yscale() == "linear"
     assert legend(drawn[0]) == [
         "error of the fit", "cross-validated error", "single folds", "scatter of specimens",
     ]  # fmt: skip
@@ -315,6 +345,12 @@ def test_laws(tmp_path: Path, drawn: list[Figure]) -> None:
 def test_laws_over_decades(tmp_path: Path, drawn: list[Figure]) -> None:
     plot_laws(tmp_path / "l.png", [LawRow("constant", 3, 500.0), LawRow("cubic", 12, 5.0)])
     assert drawn[0].axes[0].get_yscale() == "log"
+    assert drawn[0].axes[0].get_xlim() == pytest.approx((-0.6, 1.6))
+    lost = LawRow("spline", 6, 500.0, 510.0, [np.nan, 505.0, np.inf])
+    plot_laws(tmp_path / "m.png", [lost], scatter=1500.0)
+    axes = drawn[1].axes[0]
+    assert axes.get_xticklabels()[0].get_text() == "spline (6)\n2 folds without a result"
+    assert axes.get_ylim() == pytest.approx((0.0, 1650.0))
     assert legend(drawn[0]) == ["error of the fit", "cross-validated error"]
     with pytest.raises(ValueError, match="no laws"):
         plot_laws(tmp_path / "l.png", [])
@@ -330,6 +366,18 @@ def test_what_is_not_determined_is_marked(tmp_path: Path, drawn: list[Figure]) -
     assert np.isnan(mark[1, :10]).all() and (mark[1, 10:] > NOT_DETERMINED).all()
     assert (mark[1, 10:] < shear.get_ylim()[1]).all()
     assert [t.get_text() for t in shear.texts] == ["not determined (over 1000 %)"]
+    assert mark[1, 10:] == pytest.approx(10 ** (3 + 0.14 * 0.8))
+    (band,) = shear.patches
+    end = shear.get_ylim()[1]
+    low, high = band.get_extents().transformed(shear.transData.inverted()).intervaly
+    assert (low, high) == pytest.approx((NOT_DETERMINED, end))
+    assert [f"{tick:g}" for tick in shear.get_yticks()] == ["1", "10", "100", "1000"]
+    labels = [label.get_text() for label in warp.get_yticklabels()]
+    assert labels == ["1", "10", "100", "1000"]
+    (words,) = shear.texts
+    box, panel = words.get_window_extent(), shear.get_window_extent()
+    marks = shear.transData.transform((0, 10 ** (3 + 0.14 * 2.6)))[1]
+    assert 0 < panel.x1 - box.x1 < 0.05 * panel.width and box.y0 > marks - 2
     assert np.isnan(lines(warp, NAMED[0])[1][1]).all() and not warp.texts
     assert lines(shear, NAMED[1])[0][1] == pytest.approx(1.0)
     assert shear.get_yscale() == "log" and legend(drawn[0]) == ["bubble", "both"]
@@ -353,7 +401,11 @@ def test_pinned_at_the_ends(tmp_path: Path, drawn: list[Figure], value: float) -
     plot_pinned(tmp_path / "p.png", STRAINS, {"both": np.full((3, 20), value)})
     low, high = drawn[0].axes[0].get_ylim()
     assert 0 < low < high
-    line, mark = (np.isfinite(data[1]).all() for data in lines(drawn[0].axes[0], NAMED[0]))
+    shown, lost = lines(drawn[0].axes[0], NAMED[0])
+    assert lost[1] == pytest.approx(10 ** (3 + 0.14 * 0.8), nan_ok=True) or value <= NOT_DETERMINED
+    assert value > NOT_DETERMINED or shown[1] == pytest.approx(max(value, 1e-3))
+    assert low == pytest.approx({0.0: 1e-3, 0.4: 0.1, 1000.0: 1e3}.get(value, 1.0))
+    line, mark = (np.isfinite(data[1]).all() for data in (shown, lost))
     assert (line, mark) == (value <= NOT_DETERMINED, value > NOT_DETERMINED)
 
 
@@ -368,7 +420,9 @@ def test_orders(tmp_path: Path, drawn: list[Figure]) -> None:
     assert left.lines[0].get_ydata() == pytest.approx(rmse)
     assert left.lines[1].get_ydata()[-1] == 800.0
     bar = left.patches[0]
-    assert bar.get_x() + 0.5 * bar.get_width() == pytest.approx(4)
+    assert (bar.get_x(), bar.get_width()) == pytest.approx((3.7, 0.6))
+    assert left.get_xlim() == right.get_xlim() == (0.5, 5.5)
+    assert all(tick == round(tick) for tick in right.get_xticks())
     assert legend(drawn[0]) == ["RMSE of the fit", "leave-one-out error", "chosen order"]
     # Leaving out the one point that an order hangs on has no finite error.
     lost = [np.nan] * 5
