@@ -25,6 +25,8 @@ FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
 #: Readings that the straight line of zero = "line" goes through.
 FIRST_READINGS = 4
+#: Of the largest load among them: what the line must rise by, to be more than rounding.
+RISES = 1e-6
 #: Why readings are left out.
 UNLOADING = "after the largest deflection"
 
@@ -108,8 +110,8 @@ def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
     start = float(curve.deflection[0])
     if zero == "line":
         x, y = curve.deflection[:FIRST_READINGS], curve.load[:FIRST_READINGS]
-        slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else (0.0, 0.0)
-        if not slope > 0:
+        slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
+        if not slope * np.ptp(x) > RISES * np.abs(y).max():
             problem = f"the first readings of {curve.repetition!r} do not rise: no zero to be found"
             raise InputError(curve.path, at, problem)
         start = float(-intercept / slope)

@@ -64,7 +64,6 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
         ]
     )
     curvature = -float(np.trace(np.linalg.solve(metric, second)))
-    force = field.pressure / curvature if curvature > 0 else float("inf")
     variance = float(left @ left) / max(len(left) - len(POWERS), 1)
     inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
     both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
@@ -73,5 +72,8 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
     centre = shape.at_centre()
     height = float(centre[2] - centre[5])
-    relative = spread / curvature if curvature > 0 else float("inf")
-    return Apex(field.pressure, height, curvature, force, force * relative, strain)
+    force = doubt = float("inf")
+    if curvature > 0:
+        force = field.pressure / curvature
+        doubt = force * spread / curvature
+    return Apex(field.pressure, height, curvature, force, doubt, strain)

@@ -46,7 +46,7 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
         with path.open("rb") as file:
             head = file.read(520)
     except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
     if head[512:520] == SIGNATURE:

@@ -46,7 +46,7 @@ def offset_misfits(
     coarse = _offsets(t, log_times)
     h = h ** straightest(h, [log_at(s, t, log_times, pressures) for s in coarse])
     misfits = np.array([misfit(s) for s in coarse])
-    step = coarse[1] - coarse[0] if len(coarse) > 1 else 0.0
+    step = coarse[1] - coarse[0]
     fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
     fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
     offsets = np.concatenate([coarse, fine])

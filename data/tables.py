@@ -149,7 +149,7 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         problem = "is not text in UTF-8; save it as a comma-separated table"
         raise InputError(path, "", problem) from None

@@ -47,8 +47,10 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
         problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
         raise InputError(path, "", problem)
     status = ("STATUS_FLAG", SUCCESSFUL)
+    # Without a stereo model, of columns that the user names, the model's are not asked for.
+    names = {key: name for key, name in NAMES.items() if name in top}
     rows = read_text_rows(
-        path, options, comment="***", names=NAMES, status=status, camera_axes=True
+        path, options, comment="***", names=names, status=status, camera_axes=True
     )
     return [frame_of(rows, options, path, "dice")]
 

@@ -43,7 +43,7 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
         with path.open("rb") as file:
             head = file.read(128)
     except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     if not head.startswith(SIGNATURE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
         rows = read_text_rows(path, deformed, camera_axes=True)

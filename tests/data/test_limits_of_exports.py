@@ -311,6 +311,8 @@ ZONE = "VARIABLES = x y z dx dy dz\nZONE {keys}\n1 2 3 4 5 6\n7 8 9 10 11 12\n"
         ("{keys}", "I=1", "line 2: the zone says 1 points, its numbers are 2"),
         ("{keys}", "I=2 J=2 K=3", "line 2: the zone says 2 x 2 x 3 points, its numbers are 2"),
         ("12", "", "line 2: expected 6 numbers a point, found 11 numbers in the zone"),
+        ("1 2 3 4 5 6\n7 8 9 10 11 12", "", "line 2: expected 6 numbers a point, found 0 "
+         "numbers in the zone"),
         ("{keys}", "F=FEBLOCK", "line 2: a zone of points as POINT or BLOCK is needed, this is "
          "'FEBLOCK'"),
         ("{keys}", "ZONETYPE=FEQUAD", "line 2: a zone of points as POINT or BLOCK is needed, this "

@@ -96,3 +96,23 @@ def test_points_that_tell_no_sphere():
     for noise in (1e-2, 1e-4, 1e-7):
         nearly = flat + np.random.default_rng(1).normal(size=(50, 1)) * [0, 0, noise]
         assert "in a plane" in complaint(fit_sphere, nearly)
+
+
+def test_points_that_are_kept_are_those_near_the_sphere_through_them():
+    """Within four robust standard deviations, of noise with long tails: it takes some rounds."""
+    for seed in range(1, 6):
+        points, ways, draw = cap(count=300, seed=seed)
+        points += 0.05 * draw.standard_t(2, size=(300, 1)) * ways
+        found = fit_sphere(points)
+        off = np.abs(found.deviation)
+        np.testing.assert_array_equal(found.kept, off <= 4 * np.median(off) / 0.6744897501960817)
+        assert 3 < found.left_out < 20
+        np.testing.assert_allclose(
+            found.deviation, np.linalg.norm(points - found.centre, axis=1) - found.radius
+        )
+        # Least squares: the deviations of what is kept have no mean, and no way to lean.
+        kept = points[found.kept] - found.centre
+        arms = kept / np.linalg.norm(kept, axis=1)[:, None]
+        assert found.deviation[found.kept].sum() == pytest.approx(0.0, abs=1e-8)
+        np.testing.assert_allclose(arms.T @ found.deviation[found.kept], 0.0, atol=1e-8)
+        assert found.rms == pytest.approx(np.sqrt(np.mean(off[found.kept] ** 2)))

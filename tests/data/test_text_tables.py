@@ -80,6 +80,8 @@ def test_marks_of_thousands() -> None:
         ("x\ty\tdx\tdy\tdz\n1\t2\t3\t4\t5\n", "\t", 1, [2], "."),
         ("x y dx dy dz\n1 2 3 4 5\n", None, 1, [2], "."),
         ("# m\n# x,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
+        # A comment is asked only where no row is.
+        ("# x,y,dx,dy,dz\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
         # The row that tells most, and the one above numbers, is the row of names.
         ("x,y,1\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
         ("x,y,dx,dy,dz\nw\nw\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 4, [5], "."),
