@@ -68,3 +68,32 @@ def test_long_values_are_cut_and_the_table_named() -> None:
     assert "strips.needed.length" in text
     assert text.endswith("got '" + "y" * 56 + "...")
     assert said({"needed": {"length": "y" * 58}}).endswith("got '" + "y" * 58 + "'")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({}, "needed: this section is missing; add it"),
+        ({"needed": {}}, "needed.length: this key is missing; add it"),
+        ({"needed": RIGHT, "nam": "x"}, "nam: unknown key; did you mean 'name'? allowed here: "
+         "name, inner, many, needed"),
+        ({"needed": RIGHT, "inner": {"lngth": 1.0, "length": 1.0}}, "inner.lngth: unknown key; did "
+         "you mean 'length'? allowed here: length, pair"),
+        ({"needed": RIGHT, "many": [RIGHT, {"length": 1.0, "pairs": 1}]}, "many[1].pairs: unknown "
+         "key; did you mean 'pair'? allowed here: length, pair"),
+        # Half of the letters in their order are near, fewer are not.
+        ({"needed": {**RIGHT, "pxyz": 1}}, "needed.pxyz: unknown key; allowed here: length, pair"),
+        ({"needed": {**RIGHT, "paxy": 1}}, "needed.paxy: unknown key; did you mean 'pair'? allowed "
+         "here: length, pair"),
+        ({"needed": {**RIGHT, "pair": []}}, "needed.pair: expected at least 2 items, got 0"),
+        ({"needed": {**RIGHT, "pair": "x" * 58}}, "needed.pair: expected a valid list, got '"
+         + "x" * 58 + "'"),
+        ({"needed": {**RIGHT, "pair": "x" * 59}}, "needed.pair: expected a valid list, got '"
+         + "x" * 56 + "..."),
+        ({"needed": {"length": "x"}, "name": 3}, "name: expected a valid string, got 3 (1 more)"),
+    ],
+)  # fmt: skip
+def test_the_whole_line(content: dict[str, Any], words: str) -> None:
+    assert said(content) == f"p.toml: {words}"
+    field, rest = words.split(": ", 1)
+    assert said(content, "a.b") == f"p.toml: a.b.{field}: {rest}"

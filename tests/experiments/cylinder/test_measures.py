@@ -179,3 +179,78 @@ def test_a_smaller_cylinder_is_read_at_its_own_scale() -> None:
     small = knee_point(0.1 * WAY, load, 40.0, 0.1 * OVER)
     assert large is not None and small is not None
     assert small == pytest.approx((0.1 * large[0], large[1]))
+
+
+# Just within a limit and beyond it
+
+
+@pytest.mark.parametrize(("low", "there"), [(99.5, False), (99.49, True), (-1.0, True)])
+def test_a_load_that_falls_by_half_a_percent(low: float, there: bool) -> None:
+    """The largest load counts, whether the fall is the last frame or not."""
+    way = np.array([0.0, 5.0, 10.0, 15.0])
+    for load in ([0.0, 100.0, low, 99.9], [0.0, 50.0, 100.0, low]):
+        found = limit_point(way, np.array(load))
+        assert found == ((float(way[np.argmax(load)]), 100.0) if there else None)
+
+
+def test_a_hundredth_of_the_surface_is_no_wrinkle() -> None:
+    way = np.array([0.0, 5.0, 10.0])
+    run = BendingRun(way, 3 * way, NONE, NONE, NONE, NONE, np.array([0.25, 0.26, 0.2601]))
+    assert wrinkle_onset(run) == (10.0, 30.0)
+
+
+def test_stiffness_of_three_frames_at_least() -> None:
+    way, load = np.array([0.0, 30.0, 60.0, 90.0]), np.array([0.0, 60.0, 180.0, 900.0])
+    assert initial_stiffness(way, load, OVER) == pytest.approx(3.0)  # the line through three
+    assert initial_stiffness(way[:2], load[:2], OVER) == pytest.approx(2.0)
+    assert initial_stiffness(way[:1], load[:1], OVER) is None
+
+
+def test_where_a_knee_can_be() -> None:
+    """4 N/mm to `kink` mm, then 1: the slope over 20 mm is 2 where a third lies before it."""
+
+    def found(kink: float, end: float, stiffness: float | None = 4.0):
+        way = np.linspace(0.0, end, 401)
+        return knee_point(way, np.minimum(4 * way, 3 * kink + way), stiffness, OVER)
+
+    place, load = found(30.0, 100.0)
+    assert (place, load) == pytest.approx((30 + 10 / 3, 120 + 10 / 3), abs=0.02)
+    assert found(20.0, 40.0) == pytest.approx((20 + 10 / 3, 80 + 10 / 3), abs=0.02)
+    assert found(20.0, 39.9) is None
+    # From the first place on, the slope is too small already.
+    assert found(2.0, 60.0) == pytest.approx((10.0, 16.0))
+    for stiffness in (None, 0.0, -1.0):
+        assert found(30.0, 100.0, stiffness) is None
+    # Where it is just the half it has fallen to it.
+    assert found(0.0, 60.0, 2.0) == pytest.approx((10.0, 10.0))
+    assert found(0.0, 60.0, 1.99) is None
+
+
+def test_straightness_of_four_frames_at_least() -> None:
+    """Up to half of the load at the knee."""
+    way, load = np.arange(5.0), np.array([0.0, 1.0, 5.0, 6.0, 7.0])
+    r2, off = straightness(way, load, 12.0)
+    fit = 2.2 * way[:4] - 0.3
+    missed = load[:4] - fit
+    assert r2 == pytest.approx(1 - (missed**2).sum() / ((load[:4] - 3) ** 2).sum())
+    assert off == pytest.approx(np.abs(missed).max() / 6)
+    assert straightness(way, load, 11.9) is None
+    # All five: 1.9 mm a step misses by 1.2 at most, and leaves 2.7 of 38.8.
+    assert straightness(way, load, 1e9) == pytest.approx((1 - 2.7 / 38.8, 1.2 / 7))
+    assert straightness(way, 0 * load, 12.0) is None
+
+
+def test_largest_strains_of_body_and_tube_by_hand() -> None:
+    """Quads without a seam are the body; where all of them touch the caps, the body is all."""
+    mesh = cylinder_mesh(900.0, 150.0, 25.0, 40.0)
+    u = mesh.points * [0.1, 0.1, 0.03]
+    both = (pytest.approx(np.log(1.03)), pytest.approx(np.log(1.1)))
+    assert inflation_strain(mesh, u) == (both, both)
+    seam = np.unique(mesh.quads[mesh.element_sets["seam"]])
+    u[seam] *= 2.0
+    body, anywhere = inflation_strain(mesh, u)
+    assert body == both and anywhere[0] == pytest.approx(np.log(1.06))
+    whole = replace(mesh, element_sets={**mesh.element_sets, "caps": mesh.element_sets["body"]})
+    assert inflation_strain(whole, u)[0][0] > np.log(1.04)
+    alone = {k: v for k, v in mesh.element_sets.items() if k != "seam"}
+    assert inflation_strain(replace(mesh, element_sets=alone), u)[1][0] < np.log(1.06)
