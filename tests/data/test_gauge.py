@@ -179,3 +179,96 @@ def test_loads_are_paired_by_time(caplog):
 def test_loads_that_do_not_pair(options, words):
     asked = {"loads": [1, 2, 3], "direction": "warp", "specimen": "1"} | options
     assert words in complaint(gauge_load_curve, three_frames(), **asked)
+
+
+# Just within a limit and beyond it, and what is said to the last word
+
+
+def square(spacing: float = 1.0, without: tuple[float, float] | None = None) -> Frame:
+    """A grid of 11 x 11 points that does not move."""
+    x, y = (part.ravel() for part in np.meshgrid(*2 * [spacing * np.arange(11.0)]))
+    points = np.column_stack([x, y, 0 * x])
+    if without is not None:
+        points = points[np.hypot(x - without[0], y - without[1]) > 0.1]
+    return Frame(points, np.zeros_like(points))
+
+
+def test_a_gauge_spans_several_points() -> None:
+    """The usual triangle of a square grid of 1 mm is 1.41 mm wide."""
+    for apart, good in ((1.42, True), (1.41, False)):
+        asked = [square()], (3.1, 3.0), (3.1, 3.0 + apart)
+        if good:
+            assert virtual_strain_gauge(*asked).reference_length == pytest.approx(apart)
+        else:
+            assert complaint(virtual_strain_gauge, *asked) == (
+                "gauge: the ends are 1.41 mm apart, the points 1.414 mm: a gauge must span several "
+                "points; is the length unit right?"
+            )
+
+
+def test_a_hole_and_how_wide_it_is() -> None:
+    """Where one point is missing the triangles are 2 mm wide: 1.414 times the usual ones."""
+    ends, hole = ((5.0, 1.2), (5.1, 5.2)), square(without=(5.0, 5.0))
+    assert virtual_strain_gauge([square(), hole], *ends, 1.42).lost == ()
+    found = virtual_strain_gauge([square(), hole, square(), hole], *ends, 1.41)
+    assert found.lost == (1, 3) and [str(w) for w in found.warnings] == [
+        "upper end of the gauge at (5.1, 5.2) mm: correlation lost in 2 of 4 frames (1, 3): the "
+        "points around it are 2 mm apart, allowed 1.99; these give no length. Move the gauge to "
+        "keep them"
+    ]
+    assert complaint(virtual_strain_gauge, [hole], *ends, 1.41) == (
+        "upper end of the gauge at (5.1, 5.2) mm: lost in every frame (the points around it are 2 "
+        "mm apart, allowed 1.99); move it onto the correlated surface"
+    )
+    assert complaint(virtual_strain_gauge, [square()], *ends, np.nan) == (
+        "max_gap: expected a finite number, got nan"
+    )
+
+
+def test_the_edge_of_the_points_is_still_on_them() -> None:
+    for y, lost in ((10.0, False), (10.001, True)):
+        asked = [square()], (2.3, 0.0), (2.3, y)
+        if lost:
+            assert "lost in every frame (outside the correlated points)" in complaint(
+                virtual_strain_gauge, *asked
+            )
+        else:
+            assert virtual_strain_gauge(*asked).length == pytest.approx([10.0])
+    two = Frame(np.array([[0.0, 0, 0], [4, 0, 0]]), np.zeros((2, 3)))
+    assert complaint(virtual_strain_gauge, [two], (0.0, 0.0), (4.0, 0.0)) == (
+        "lower end of the gauge at (0, 0) mm: lost in every frame (no three correlated points that "
+        "span a surface); move it onto the correlated surface"
+    )
+
+
+def test_two_ends_that_meet() -> None:
+    still = square()
+    together = Frame(still.points, np.array([5.0, 5.0, 0.0]) - still.points)
+    assert complaint(virtual_strain_gauge, [still, together], (2.0, 2.0), (8.0, 8.0)) == (
+        "gauge: the two ends meet in a frame; are the columns right?"
+    )
+
+
+def test_loads_at_the_ends_of_the_record_count() -> None:
+    record = virtual_strain_gauge([square()] * 4, (2.0, 2.0), (2.0, 8.0))
+    how = {"direction": "warp", "specimen": "1"}
+    curve = gauge_load_curve(
+        record, [0, 10], **how, frame_times=[1, 2, 3, 3.001], load_times=[1, 3]
+    )
+    assert curve.load.tolist() == [0.0, 5.0, 10.0] and curve.frame is not None
+    assert curve.frame.tolist() == [0, 1, 2]
+    two = gauge_load_curve(record, [0, 10], **how, frame_times=[0, 2, 3, 9], load_times=[1, 3])
+    assert two.load.tolist() == [5.0, 10.0]
+    for times, words in (
+        ([1, 1], "load_times: expected two or more, each later than the one before"),
+        ([1], "load_times: expected 2 finite numbers, got 1"),
+        ([1, np.nan], "load_times: expected 2 finite numbers, got 2"),
+    ):
+        said = complaint(
+            gauge_load_curve, record, [0, 10], **how, frame_times=[1, 2, 3, 4], load_times=times
+        )
+        assert said == words
+    said = complaint(
+        gauge_load_curve, record, [0, 1], **how, frame_times=[0, 2, 4, 9], load_times=[1, 3]
+    )
+    assert said == "specimen '1': only 1 of 4 frames have both length and load; expected two"

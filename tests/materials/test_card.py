@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,58 @@ def test_another_thickness_is_said() -> None:
     assert thick is not None and thin is not None
     assert "0.81 mm" in thick and "0.9 mm" in thick and "11 % stiffer" in thick
     assert "11 % softer" in thin
+
+
+@pytest.mark.parametrize(("share", "words"), [(9e-7, None), (-9e-7, None), (1.1e-6, "stiffer")])
+def test_a_millionth_of_the_thickness_is_none(share: float, words: str | None) -> None:
+    card = MaterialCard(HypoelasticLaw.linear(300, 200, 5), 0.8)
+    found = thickness_difference(card, 0.8 * (1 + share))
+    assert (found is None) if words is None else (found or "").endswith(words)
+    assert thickness_difference(card, 1.0) == (
+        "the card was fitted for a thickness of 0.8 mm, this is 1 mm: with the card's moduli the "
+        "fabric is 25 % stiffer"
+    )
+
+
+def test_what_a_card_file_says(tmp_path: Path) -> None:
+    law = HypoelasticLaw.linear(300.0, 200.0, 5.0, 0.2)
+    MaterialCard(law, 0.81, "a fabric", "a test").write(tmp_path / "m.toml", "MPa")
+    content = tomllib.loads((tmp_path / "m.toml").read_text())
+    assert content == {
+        "format": 2, "name": "a fabric", "source": "a test", "law": "hypoelastic orthotropic",
+        "form": law.form.name, "unit": "MPa", "beta": law.beta.tolist(), "nu12": 0.2,
+        "thickness_mm": 0.81, "thickness_change": "constant", "valid_strain": {},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"beta": [*GOOD["beta"], 1.0]}, "beta: expected 12 coefficients, got 13"),
+        ({"beta": "x"}, "beta: expected a list of finite numbers, got 'x'"),
+        ({"beta": [*GOOD["beta"][:11], 1e308]}, "beta: 1e+308 GPa is too large a coefficient"),
+        ({"thickness_mm": 0.0}, "thickness_mm: expected a number > 0, got 0.0"),
+        ({"thickness_mm": True}, "thickness_mm: expected a number > 0, got True"),
+        ({"valid_strain": {"warp": [0.0, 0.0]}}, "valid_strain.warp: expected [0, end], got [0.0, "
+         "0.0]"),
+        ({"valid_strain": {"warp": [0.0, 0.1, 0.2]}}, "valid_strain.warp: expected [0, end], got "
+         "[0.0, 0.1, 0.2]"),
+        ({"unit": "psi"}, "unit: expected 'GPa', 'MPa' or 'Pa', got 'psi'"),
+        ({"format": 1, "form": "cubic"}, "format: this key is missing; a card that names its form "
+         "is of format = 2"),
+        ({"format": 2}, "form: this key is missing; add it"),
+        ({"format": 2, "form": "cubic", "law": "x"}, "law: expected 'hypoelastic orthotropic', got "
+         "'x'"),
+        ({"format": 2, "form": 3}, "form: expected the name of a form, got 3"),
+        ({"law": "tri-linear"}, "breaks: this key is missing; `law` says tri-linear"),
+    ],
+)  # fmt: skip
+def test_the_whole_line_about_a_card(tmp_path: Path, change: dict[str, Any], words: str) -> None:
+    path = tmp_path / "material.toml"
+    path.write_text(tomli_w.dumps({**GOOD, **change}))
+    with pytest.raises(InputError) as caught:
+        read_card(path)
+    assert str(caught.value) == f"{path}: {words}"
 
 
 def test_units_name_the_same_material(tmp_path: Path) -> None:
