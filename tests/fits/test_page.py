@@ -331,3 +331,9 @@ def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Pa
     np.testing.assert_array_equal(known, curves[0])
     assert drawn == {"sigma": None}
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
+
+
+def test_a_modulus_known_no_better_than_before_is_unknown() -> None:
+    """Before the tests each is known to 1000 %, less a thousandth for rounding."""
+    said = [page.sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]
+    assert said == ["1.2 %", "100 %", "998 %", "unknown", "unknown"]

@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.identification.assessment import certainty, moduli_error, pinned_by
+from bubblefit.identification.assessment import (
+    Certainty,
+    Misfit,
+    _on_bounds,
+    certainty,
+    moduli_error,
+    notes_of_misfits,
+    pinned_by,
+)
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.methods.descent import descend
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
@@ -16,6 +24,7 @@ from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
+from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CONSTANT, CUBIC, LAW, MODEL, PRESSURES, problem, single, targets
@@ -117,3 +126,39 @@ def test_words_name_what_lies_on_its_bound() -> None:
     words = certainty(fit, evaluated(fit), FLAT_LAW, REACHED).undetermined
     assert "E1 touches its upper bound: the data ask for more stiffness" in words
     assert "E2 touches its positivity margin: the data ask for less stiffness" in words
+
+
+def test_more_than_the_given_noise_is_said() -> None:
+    """From one and a half times on; not of noise that is only assumed."""
+    found = {
+        "warp": Misfit(4.54, 3.0, "given", "N"),
+        "fill": Misfit(4.5, 3.0, "given", "N"),
+        "bias": Misfit(90.0, 3.0, "assumed", "N"),
+    }
+    (note,) = notes_of_misfits(found)
+    assert (note.kind, note.of) == (NoteKind.ABOVE_NOISE, "warp")
+    assert str(note) == (
+        "the fit leaves 4.54 N RMS, 1.51 times the noise given (3 N): model or data are off by "
+        "more than noise, and the uncertainty reckons with what is left as if it were"
+    )
+    assert found["fill"].ratio == 1.5 and Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf
+
+
+def test_noise_and_mesh_together() -> None:
+    sigma = {"E1": np.array([0.3, 0.5]), "E2": np.array([0.1, 0.1])}
+    mesh = {"E1": np.array([-0.4, 1.2]), "E2": np.array([0.0, 0.0])}
+    alone = Certainty({}, {}, sigma, ())
+    assert alone.total == sigma
+    together = replace(alone, mesh=mesh).total
+    assert together["E1"].tolist() == pytest.approx([0.5, 1.3])
+    assert together["E2"].tolist() == pytest.approx([0.1, 0.1])
+
+
+def test_bounds_are_touched_within_a_millionth_of_their_width() -> None:
+    values = np.array([2.0 + 1e-6, 2.0 + 3e-6, 4.0 - 1e-6, 4.0 - 3e-6, 3.0])
+    notes = _on_bounds("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
+    assert [str(note) for note in notes] == [
+        "a lies on its lower bound",
+        "c lies on its upper bound",
+    ]
+    assert {note.kind for note in notes} == {NoteKind.BOUND}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
 from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.feasibility import allowed, draw, feasible_start
+from bubblefit.identification.feasibility import _between, allowed, draw, feasible_start
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -114,3 +114,41 @@ def test_splines_of_many_knots_have_starts_too(knots: int) -> None:
     assert allowed(p, draws).mean() > 0.02
     spread = np.log(draws[:, :knots]).std(axis=0) / np.log(200.0 / 0.5)
     assert spread.min() > 0.15  # a uniform share has 0.29
+
+
+def test_a_modulus_of_many_values_is_drawn_at_four_of_them() -> None:
+    """Evenly placed from the first to the last, straight between; few values are their own."""
+    between = _between(["E1"] * 7 + ["E2"] * 2 + ["G12"])
+    assert between.shape == (10, 4 + 2 + 1)
+    assert between[:7, :4] == pytest.approx(
+        np.array(
+            [[1, 0, 0, 0], [0.5, 0.5, 0, 0], [0, 1, 0, 0], [0, 0.5, 0.5, 0], [0, 0, 1, 0],
+             [0, 0, 0.5, 0.5], [0, 0, 0, 1]]
+        )
+    )  # fmt: skip
+    assert between[7:, 4:].tolist() == np.eye(3).tolist()
+    assert not between[:7, 4:].any() and not between[7:, :4].any()
+
+
+def test_what_is_drawn_lies_between_the_ends_of_its_modulus() -> None:
+    """Even in the logarithm: as much below the geometric mean of the ends as above."""
+    ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
+    form = form_named("spline", {"knots": 3}, RANGE)
+    p = Unknowns.of(form, 0.24, RANGE, LawBounds.of_moduli(ranges))
+    values = draw(p, np.random.default_rng(1), 4000) @ np.linalg.inv(p.from_values).T
+    for column, name in zip(values.T, form.modulus_of, strict=True):
+        low, high = ranges[name]
+        assert low * (1 - 1e-9) <= column.min() < 1.05 * low
+        assert 0.95 * high < column.max() <= high * (1 + 1e-9)
+        assert (column < np.sqrt(low * high)).mean() == pytest.approx(0.5, abs=0.04)
+
+
+def test_both_ends_of_the_bounds_are_allowed() -> None:
+    """A modulus as small as its least, or as large as its largest; none beyond."""
+    ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
+    form = form_named("constant", {}, RANGE)
+    p = Unknowns.of(form, 0.24, RANGE, LawBounds.of_moduli(ranges))
+    order = [list(ranges).index(name) for name in form.modulus_of]
+    ends = np.array(list(ranges.values()))[order].T
+    rows = [*ends, ends[0] - [1e-6, 0.0, 0.0], ends[1] + [0.0, 1e-6, 0.0]]
+    assert allowed(p, np.array(rows) @ p.from_values.T).tolist() == [True, True, False, False]

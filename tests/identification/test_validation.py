@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from bubblefit.identification.validation import folds_of
+
+
+@pytest.mark.parametrize(
+    ("specimens", "count"), [({"warp": [3, 3, 8]}, 2), ({"warp": [5, 5, 5, 5, 5]}, 3), ({}, 2)]
+)
+def test_every_fold_has_its_share(specimens: dict[str, list[int]], count: int) -> None:
+    """Two specimens are left out one by one; of five points of one specimen two, two and one."""
+    folds = folds_of(specimens, count, 7)
+    assert len(folds) == count and all(list(fold) == list(specimens) for fold in folds)
+    lost = sorted(int((~fold[name]).sum()) for fold in folds for name in specimens)
+    assert lost == ([1, 2] if len(specimens.get("warp", [])) == 3 else [1, 2, 2][: 3 * len(lost)])
 
 
 def test_folds_leave_out_whole_specimens_or_single_points_once() -> None:

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.studies.convergence import HIGHEST, convergence, observed_order, richardson
+from bubblefit.studies.convergence import (
+    HIGHEST,
+    Convergence,
+    convergence,
+    observed_order,
+    richardson,
+)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -74,6 +80,74 @@ def test_a_second_term_makes_the_order_move_and_is_said() -> None:
     assert settled.remark == ""
     moving = convergence(h.tolist(), (40.0 + 0.3 * h + 0.02 * h**4).tolist())
     assert "still moves" in moving.remark
+
+
+@pytest.mark.parametrize(
+    ("limit", "error"), [(2.0, -0.25), (-2.0, -1.75), (0.0, None), (None, None)]
+)
+def test_error_beside_the_limit(limit: float | None, error: float | None) -> None:
+    assert Convergence(limit=limit).error(1.5) == error
+
+
+@pytest.mark.parametrize(
+    ("values", "noise", "found"),
+    [
+        # Order 1 exactly, then twice: the order one level coarser is known.
+        ([8.0, 4.0, 2.0, 1.0], 0.0, Convergence(1.0, 0.0, 1.0, "")),
+        # It moved by less than a half, and by more.
+        ([1.0 + 2**1.4 + 2, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, 1.4, "")),
+        (
+            [1.0 + 2**1.6 + 2, 3.0, 2.0, 1.5], 0.0,
+            (1.0, 1.0, 1.6, "the order still moves (from 1.6): the limit is a guess"),
+        ),
+        # What the coarser levels change is the solver's: only one order is known.
+        (
+            [3.0, 3.0, 2.0, 1.5], 0.0,
+            (1.0, 1.0, None,
+             "one order only, a level coarser there is none: one more level would tell"),
+        ),
+        (
+            [7.0, 3.0, 2.0, 1.5], 0.08,
+            (None, None, None, "the two finest levels agree to the accuracy of the solver"),
+        ),
+        (
+            [3.0, 2.0, 1.5], 0.0,
+            (1.0, 1.0, None, "one order only: one more level would tell whether it holds"),
+        ),
+    ],
+)  # fmt: skip
+def test_everything_of_a_sequence(values: list[float], noise: float, found) -> None:
+    seen = convergence([2.0**-k for k in range(len(values))], values, noise)
+    wanted = found if isinstance(found, Convergence) else Convergence(*found)
+    for name in ("order", "limit", "previous"):
+        assert getattr(seen, name) == pytest.approx(getattr(wanted, name), abs=1e-8), name
+    assert seen.remark == wanted.remark
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (0.49, "changes that fall so slowly (order 0.49) show no limit: refine further"),
+        (0.51, "one order only: one more level would tell whether it holds"),
+    ],
+)
+def test_below_an_order_of_a_half_there_is_no_limit(order: float, words: str) -> None:
+    """Sizes halved: it would lie further off than the coarsest of three levels does."""
+    found = convergence([4.0, 2.0, 1.0], [0.0, 2**order, 2**order + 1.0])
+    assert found.remark == words and (found.limit is None) == (order < 0.5)
+
+
+@pytest.mark.parametrize("noise, settled", [(0.0125, True), (0.0124, False)])
+def test_noise_is_a_share_of_the_largest_value(noise: float, settled: bool) -> None:
+    """Of 40 here, at the coarsest level: 0.5 are changed by the last step; in any unit."""
+    for unit in (1.0, 1e-3):
+        values = (unit * np.array([-40.0, 1.0, 1.5])).tolist()
+        found = convergence([4.0, 2.0, 1.0], values, noise * (1 + 1e-9))
+        assert ("accuracy of the solver" in found.remark) == settled
+
+
+def test_without_noise_only_the_same_value_has_settled() -> None:
+    assert "accuracy of the solver" in convergence([4.0, 2.0, 1.0], [1.0, 2.0, 2.0]).remark
 
 
 @pytest.mark.parametrize(
