@@ -95,7 +95,7 @@ def _numbers(
         flat = _flat([text for _, text in lines], width)
     except ValueError:
         raise InputError(path, *_first_bad(lines)) from None
-    if flat.size == 0 or flat.size % width:
+    if not flat.size or flat.size % width:
         problem = f"expected {width} numbers a point, found {flat.size} numbers in the zone"
         raise InputError(path, f"line {line}", problem)
     given = [int(keys[key][:9]) for key in "IJK" if keys.get(key, "").isdecimal()]

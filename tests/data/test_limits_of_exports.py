@@ -15,6 +15,7 @@ from bubblefit.data.mat_version_5 import names_5, variables_5
 from bubblefit.data.mat_version_73 import variables_73
 from bubblefit.data.npz_files import array_names, read_arrays
 
+from .. import dic_exports
 from ..complaints import complaint
 from .test_hostile_frames import mat, npy, part, variable
 
@@ -135,6 +136,17 @@ def test_multidic_of_other_shapes(tmp_path: Path, places, moved) -> None:
     savemat(tmp_path / "a.mat", {"DIC3DPPresults": results})
     said = complaint(read_frames, [tmp_path / "a.mat"])
     assert said.endswith(f"a.mat: Points3D and DispVec are {places} and {moved}")
+
+
+def test_columns_of_multidic(tmp_path: Path) -> None:
+    (path,) = dic_exports.multidic(tmp_path, [(PLACES, MOVED)])
+    _, frame = read_frames([path])
+    assert frame.source.columns == {
+        "x deformed": "Points3D", "y deformed": "Points3D", "z deformed": "Points3D",
+        "dx": "DispVec", "dy": "DispVec", "dz": "DispVec",
+    }  # fmt: skip
+    assert frame.source.units == {}
+    np.testing.assert_allclose(frame.points[:4], PLACES, atol=1e-12)
 
 
 def ncorr(path: Path, u, v, about=(4.0, 0.1, "mm"), coefficient=None) -> Path:

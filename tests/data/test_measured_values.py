@@ -294,6 +294,9 @@ def test_a_zero_by_the_first_four_readings(tmp_path: Path) -> None:
     path.write_text(head + "6,2\n8,6\n10,10\n12,14\n14,99\n")
     (curve,) = read_bending_curves(path, zero="line")
     assert curve.deflection.tolist() == pytest.approx([1.0, 3.0, 5.0, 7.0, 9.0])
+    path.write_text(head + "0.1,1\n0.2,2\n0.3,3\n0.4,4\n")
+    (curve,) = read_bending_curves(path, zero="line")
+    assert curve.deflection.tolist() == pytest.approx([0.1, 0.2, 0.3, 0.4])
     for rows in ("6,2\n6,3\n6,4\n6,5\n7,9\n", "6,2\n7,2\n8,2\n9,2\n10,9\n"):
         path.write_text(head + rows)
         assert complaint(read_bending_curves, path, zero="line") == (

@@ -69,6 +69,12 @@ def test_rules_that_can_say_no_find_the_order():
     assert exact.by_bic == 1
 
 
+def test_orders_one_to_eight_unless_told():
+    u = np.linspace(0, 1, 30)
+    found = compare_orders(u, np.sin(u))
+    assert [score.order for score in found.scores] == [1, 2, 3, 4, 5, 6, 7, 8]
+
+
 def test_orders_that_cannot_be_compared():
     u = np.array([1.0, 2.0, 3.0])
     assert "orders: expected at least one" in complaint(compare_orders, u, u**2, [])
