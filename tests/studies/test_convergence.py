@@ -155,6 +155,7 @@ def test_without_noise_only_the_same_value_has_settled() -> None:
     [
         ([1.0, 0.5], "three levels"),
         ([1.0], "three levels"),
+        ([1.0, 1.0], "accuracy of the solver"),
         ([1.0, 0.5, 0.375], "one order only"),
         ([9.0, 1.0, 0.5, 0.75], "up and down"),
         ([9.0, 1.0, 0.5, 0.0], "do not get smaller"),

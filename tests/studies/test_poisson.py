@@ -13,8 +13,9 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import straight_strip
+from bubblefit.notes import Note, NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.poisson import vary_nu12
+from bubblefit.studies.poisson import Nu12Study, PartRatios, vary_nu12
 from bubblefit.studies.ratios import by_response, ratios
 from matplotlib.figure import Figure
 
@@ -82,3 +83,49 @@ def test_a_straight_strip_in_closed_form() -> None:
     found = ratios([0.0, 0.4], [load(0.0), load(0.4)], load(0.24))
     eps = np.log(1.1)
     assert found.to_base == pytest.approx(np.exp(-(found.nu12 - 0.24) * eps), rel=1e-6)
+
+
+def test_all_that_is_told_of_the_responses() -> None:
+    """Two responses of one part, one value of which failed."""
+    nu12 = [0.05, 0.45]
+    responses = {
+        "a, N": ratios(nu12, [4.4, 3.6], 4.0),
+        "long, N": ratios(nu12, [9.0, np.nan], 10.0),
+    }
+    note = Note(NoteKind.FAILED, "breaks", "nu12 = 0.45")
+    part = PartRatios("load", responses, {"0.45": "breaks"}, [note])
+    study = Nu12Study(Path("a.toml"), "soft", "bars", 0.24, {"bar": part})
+    assert study.lines() == [
+        "load, relative to that at nu12 = 0.24",
+        "                 0.05     0.45   spread",
+        "bar, a, N      1.1000   0.9000   -10.0 to +10.0 %",
+        "bar, long, N   0.9000      nan   -10.0 to -10.0 %",
+        "note: bar, nu12 = 0.45: breaks",
+    ]
+    table = study.table()
+    assert list(table.columns) == ["model", "response", "nu12", "value", "to_base", "to_mean"]
+    assert table["response"].tolist() == ["a, N", "a, N", "long, N", "long, N"]
+    numbers = table[["nu12", "value", "to_base", "to_mean"]].to_numpy().ravel()
+    assert numbers == pytest.approx(
+        [0.05, 4.4, 1.1, 1.1, 0.45, 3.6, 0.9, 0.9, 0.05, 9.0, 0.9, 1.0, 0.45, *[np.nan] * 3],
+        nan_ok=True,
+    )
+    result = study.result
+    assert result["models"]["bar"]["failed"] == {"0.45": "breaks"}
+    assert result["models"]["bar"]["responses"]["long, N"]["value"] == [9.0, None]
+    assert (result["command"], result["base_nu12"], result["response"]) == (
+        "study nu12", 0.24, "load"
+    )  # fmt: skip
+    other = Nu12Study(
+        Path("a"), "soft", "bars", 0.24, {"x": part, "y": replace(part, response="rise")}
+    )
+    assert other.response == "load or rise"
+
+
+@pytest.mark.parametrize("value", [0.0, 0.999])
+def test_all_of_the_range_of_nu12_can_be_asked_for(bars: BarSolver, value: float) -> None:
+    study = vary_nu12(project_of(BarTest("a bar")), CARD, [value])
+    assert study.parts["a bar"].responses[END].nu12.tolist() == [value]
+    for wrong in (-1e-9, 1.0):
+        with pytest.raises(InputError, match="--nu12"):
+            vary_nu12(project_of(BarTest("a bar")), CARD, [wrong])
