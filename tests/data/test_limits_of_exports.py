@@ -325,6 +325,8 @@ ZONE = "VARIABLES = x y z dx dy dz\nZONE {keys}\n1 2 3 4 5 6\n7 8 9 10 11 12\n"
         ("12", "", "line 2: expected 6 numbers a point, found 11 numbers in the zone"),
         ("1 2 3 4 5 6\n7 8 9 10 11 12", "", "line 2: expected 6 numbers a point, found 0 "
          "numbers in the zone"),
+        ("1 2 3", "x" * 41 + " 2 3", "line 3: expected numbers, found '" + "x" * 40 + "'"),
+        ("1 2 3", "1.2.3" + "4" * 40, "line 3: expected a number, found '1.2.3" + "4" * 35 + "'"),
         ("{keys}", "F=FEBLOCK", "line 2: a zone of points as POINT or BLOCK is needed, this is "
          "'FEBLOCK'"),
         ("{keys}", "ZONETYPE=FEQUAD", "line 2: a zone of points as POINT or BLOCK is needed, this "

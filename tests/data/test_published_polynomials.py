@@ -107,3 +107,26 @@ def test_one_fill_point_was_not_digitised(shared_data):
     off = np.abs(completed.coefficients - published.coefficients)[1:]
     assert (off < [0.01, 0.01, 0.005, 0.0005]).all()
     assert completed.r_squared == pytest.approx(0.959, abs=5e-4)
+
+
+def test_a_straight_line_has_one_coefficient(tmp_path):
+    path = tmp_path / "p.csv"
+    head = "direction,gauge_length_mm,final_length_mm"
+    path.write_text(f"{head},c1\nweft,20,25,7.5\n")
+    (fill,) = read_published_polynomials(path).values()
+    assert (fill.direction, fill.gauge_length, fill.final_length) == ("fill", 20.0, 25.0)
+    assert fill.polynomial.coefficients.tolist() == [0.0, 7.5]
+    assert (fill.polynomial.end, fill.polynomial.points) == (5.0, 0) and np.isnan(fill.scatter)
+    path.write_text(f"{head},c0,c1,c2,data_scatter_N\nwarp,20,25,1,2,3,4\n")
+    (warp,) = read_published_polynomials(path).values()
+    assert warp.polynomial.coefficients.tolist() == [1.0, 2.0, 3.0] and warp.scatter == 4.0
+    for row, words in (
+        ("warp,0,25,1", "line 2: expected 0 < gauge length < final length, got 0 and 25"),
+        ("warp,25,25,1", "line 2: expected 0 < gauge length < final length, got 25 and 25"),
+        ("warp,20,25,1\nwarp,20,25,1", "line 3, column 'direction': warp is given twice; expected "
+         "once"),
+    ):  # fmt: skip
+        path.write_text(f"{head},c1\n{row}\n")
+        assert complaint(read_published_polynomials, path) == f"{path}: {words}"
+    path.write_text(f"{head},c2\nwarp,20,25,1\n")
+    assert "column 'c1': this column is missing" in complaint(read_published_polynomials, path)

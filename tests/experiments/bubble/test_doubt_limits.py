@@ -248,7 +248,7 @@ def test_a_rise_that_is_not_along_z(tilt: float, doubt: int) -> None:
     points = np.vstack([POINTS, [[95.0, 0.0]]])
     last = np.vstack([np.tile(moved + 7.0, (5, 1)), [[500.0, 0, 0]]])
     first = np.vstack([np.tile([7.0, 7.0, 7.0], (5, 1)), [[-500.0, 0, 0]]])
-    fields = (field(0.1, first, points), field(0.2, last, points))
+    fields = (field(0.1, first[::-1], points[::-1]), field(0.2, last, points))
     assert said(place.tilted, fields=fields) == expected
     assert said(place.tilted, fields=(field(0.2, moved),)) == expected
     assert said(place.tilted, fields=(field(0.2, -moved),)) == expected
