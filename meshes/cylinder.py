@@ -19,7 +19,7 @@ from ..errors import InputError
 from .graded import Refinement, rows
 from .mesh import Mesh
 from .mirror import with_mirror_image
-from .tube import around, tube_grid, with_cap
+from .tube import around, of_equal_area, tube_grid, with_cap
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -47,6 +47,9 @@ def cylinder_mesh(
 ) -> Mesh:
     """Mesh the middle surface of a cylinder with flat caps.
 
+    The nodes of the tube lie a little further out than the radius, so that its cross-sections and
+    the caps, which are polygons, have the area of the circle, and the cylinder its volume.
+
     Parameters
     ----------
     length, diameter : mm, of the whole cylinder before inflation.
@@ -61,7 +64,7 @@ def cylinder_mesh(
     Mesh : normals out of the cylinder; `warp` is z on the tube and as given on the caps. Element
         sets, which share no quad: `body`, `seam` (where there is one), `caps`. Node sets: the
         nodes of each of them, `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`,
-        `bottom_line` and `side_line` (along the tube, at y = R, y = -R and y = 0), `cap_centres`,
+        `bottom_line` and `side_line` (along the tube: highest, lowest, and at y = 0), `cap_centres`,
         by the name of each refinement its row of nodes, on the whole cylinder at z and -z, and
         NAME_bottom, the lowest of them; on a quarter also `symmetry_x` (nodes on x = 0, where
         u_x = 0) and `symmetry_z` (on z = 0).
@@ -80,7 +83,7 @@ def cylinder_mesh(
         problem = f"{size:g} mm gives more than {MAX_ELEMENTS} elements a half; make them larger"
         raise InputError(None, "size", problem)
     angle = around(n, 0.5 * seam_width / radius)
-    points, quads, grid = tube_grid(angle, z, radius)
+    points, quads, grid = tube_grid(angle, z, of_equal_area(angle, radius))
     points, quads, tube = with_cap(points, quads, grid, angle, n)
 
     seam = np.zeros(len(quads), bool)

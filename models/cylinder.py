@@ -16,6 +16,7 @@ from .reading import CurveReading, curve_reading
 
 Array = NDArray[np.float64]
 
+NEAR = 1e-9  # of a length
 #: Node sets of the mesh beside those of the planes of symmetry.
 NEEDED = ("support", "support_bottom", "mid_span", "top_line", "bottom_line")
 
@@ -68,8 +69,7 @@ class CylinderModel:
     def __post_init__(self) -> None:
         self._check_mesh()
         if self.reading is None:
-            radius = float(np.hypot(*self.mesh.points[:, :2].T).max())
-            object.__setattr__(self, "reading", curve_reading(2 * radius))
+            object.__setattr__(self, "reading", curve_reading(self.diameter))
         steps = np.array(self.increments if len(self.increments) else self.deflections, float)
         levels = {
             "inflation": np.array(self.inflation, float),
@@ -102,20 +102,37 @@ class CylinderModel:
 
     def _check_bodies(self) -> None:
         p = self.mesh.points
-        half, radius = np.abs(p[:, 2]).max(), np.hypot(p[:, 0], p[:, 1]).max()
+        half, diameter = np.abs(p[:, 2]).max(), self.diameter
         row = np.abs(p[self.mesh.node_sets["support"], 2])
-        if not np.allclose(row, 0.5 * self.supports.span, rtol=1e-9):
+        if not np.allclose(row, 0.5 * self.supports.span, rtol=NEAR):
             problem = f"{self.supports.span:g} mm, but the mesh has its row at {row[0]:g} mm"
             raise InputError(None, "supports.span", problem)
         if not 0.5 * (self.supports.span + self.supports.diameter) < half:
             problem = f"{self.supports.span:g} mm does not fit under {2 * half:g} mm of cylinder"
             raise InputError(None, "supports.span", problem)
-        if not self.collar.inner_diameter > 2 * radius:
-            problem = f"expected more than the cylinder's {2 * radius:g} mm"
+        if not self.collar.inner_diameter > diameter * (1 + NEAR):
+            problem = f"expected more than the cylinder's {diameter:g} mm"
             raise InputError(None, "collar.inner_diameter", problem)
         if not self.collar.length < self.supports.span - self.supports.diameter:
             problem = f"{self.collar.length:g} mm reaches the supports"
             raise InputError(None, "collar.length", problem)
+
+    @property
+    def diameter(self) -> float:
+        """mm, before inflation."""
+        return self.diameter_at(self.mesh.points)
+
+    def diameter_at(self, points: Array) -> float:
+        """Of the circle (mm) with the area that the ring at mid-span encloses.
+
+        points : (n, 3) mm, where the nodes are.
+        """
+        ring = self.mesh.node_sets["mid_span"]
+        across, up = self.mesh.points[ring, :2].T
+        x, y = points[ring[np.argsort(np.arctan2(across, -up))], :2].T
+        # On a quarter the last side, from the top to the bottom, lies in the plane of symmetry.
+        area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return float(np.sqrt((8.0 if self._cut("x") else 4.0) * area / np.pi))
 
     @property
     def pressure(self) -> float:

@@ -50,7 +50,7 @@ class Formula:
         if e1 == STOPS:
             way = way[: len(way) // 2 + 1]
         points = model.mesh.points
-        radius, thickness = np.hypot(points[:, 0], points[:, 1]).max(), model.thickness.min()
+        radius, thickness = 0.5 * model.diameter, model.thickness.min()
         hoop = np.log1p(model.pressure * radius / thickness / e2)
         slope = np.clip(1 - np.abs(points[:, 2]) / (0.5 * model.supports.span), -1, None)
         inflated = points * np.expm1([hoop, hoop, 0.1 * hoop])

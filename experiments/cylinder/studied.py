@@ -24,9 +24,8 @@ def loads(model: CylinderModel, history: History) -> dict[str, float]:
 def quantities(model: CylinderModel, history: History) -> dict[str, float]:
     """What a study of the mesh looks at; knee and limit point where the run has them."""
     mesh, over = model.mesh, model.reading.slope_over
-    side = np.intersect1d(mesh.node_sets["side_line"], mesh.node_sets["mid_span"])
-    wide = np.abs(mesh.points[side, 0] + history.displacement[0, side, 0]).max()
-    values = {"radius sideways at mid-span, inflated, mm": float(wide)}
+    inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])
+    values = {"radius at mid-span, inflated, mm": inflated}
     if history.cavity_volume is not None:
         values["volume, inflated, l"] = 1e-6 * float(history.cavity_volume[0])
     d, load = deflection_curve(model, history)

@@ -58,7 +58,7 @@ def test_quantities_of_a_history_made_up(project: Path) -> None:
     load = np.where(d < 120, 3.0 * d, 360.0 - 0.5 * (d - 120))
     history = History(load, moves, np.zeros(3), np.zeros(3), cavity_volume=np.full(len(d), 6.0e7))
     found = quantities(model, history)
-    assert found["radius sideways at mid-span, inflated, mm"] == pytest.approx(82.5)
+    assert found["radius at mid-span, inflated, mm"] == pytest.approx(82.5)
     assert found["volume, inflated, l"] == pytest.approx(60.0)
     assert found["initial stiffness, N/mm"] == pytest.approx(3.0)
     assert found["load at 100 mm, N"] == pytest.approx(300.0)
