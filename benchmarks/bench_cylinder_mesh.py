@@ -28,7 +28,7 @@ def main() -> None:
     what = sys.argv[1] if len(sys.argv) > 1 else "elements"
     levels = int(sys.argv[2]) if len(sys.argv) > 2 else 2
     project = bf.read_project(EXAMPLE)
-    project = project.with_solver("membrane", {}, ["wrinkle_stiffness=0.001"])
+    project = project.with_solver("membrane", {}, ["wall=tension field"])
     deflections = tuple(map(float, np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:]))
     cylinder: Any = replace(project.tests[NAME], size=SIZE, deflections=deflections)  # type: ignore[call-arg]
     tests: Mapping[str, Any] = {NAME: cylinder}

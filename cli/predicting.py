@@ -96,8 +96,8 @@ def tell(predictions: Predictions, folder: Path, fail_above: float | None, as_js
     failed = predictions.failed()
     if failed:
         run = predictions.each[failed[0]]
-        words = f"{len(failed)} of {len(predictions.each)} runs failed ({run.test.name} with "
-        words += f"{run.card}: {run.record.failure}); --resume tries again"
+        words = f"{len(failed)} of {len(predictions.each)} runs failed ({run.title}: "
+        words += f"{run.record.failure}); --resume tries again"
         click.echo(f"bubblefit: {words}", err=True)
     if fail_above is not None:
         _compare(predictions, fail_above)
@@ -112,7 +112,7 @@ def _compare(predictions: Predictions, fail_above: float) -> None:
         words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
     elif silent:
         run = predictions.each[silent[0]]
-        words = f"{run.test.name} with {run.card} gave nothing to compare"
+        words = f"{run.title} gave nothing to compare"
     if words:
         click.echo(f"bubblefit: {words} (--fail-above)", err=True)
         sys.exit(WORSE)

@@ -144,7 +144,7 @@ class RunsProgress(CountProgress):
             run, record = event.run, event.run.record
             how = "ended early" if record.early else "finished"
             how = f"failed ({record.failure})" if record.failure else how
-            words = f"{run.test.name} with {run.card}: {how} in {record.seconds:.0f} s"
+            words = f"{run.title}: {how} in {record.seconds:.0f} s"
             self.last = f"last: {words}; "
         self.show()
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # a module of types: whoever reads a project need not wait fo
     from ..materials.card import MaterialCard
     from ..materials.law import HypoelasticLaw, ThicknessChange
     from ..reports import Table
-    from ..solvers.base import History, Solver
+    from ..solvers.base import BandEnd, History, Solver
 
 Array = NDArray[np.float64]
 #: Makes a solver of its own for a model, so that what it prepares for the model is not shared:
@@ -320,7 +320,10 @@ class RunRecord:
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """One test with one card: what was run, how it ended, what a reader should know of it."""
+    """One test with one card: what was run, how it ended, what a reader should know of it.
+
+    end : of the band that the solver gives for the model, None where it has one answer.
+    """
 
     test: Any
     card: str
@@ -328,6 +331,23 @@ class PredictedRun:
     model: Any
     record: RunRecord
     notes: Sequence[Note] = ()
+    end: BandEnd | None = None
+
+    @property
+    def wall(self) -> str:
+        """Name of the wall that was run, "" where the solver has one answer."""
+        return "" if self.end is None else self.end.name
+
+    @property
+    def predicted(self) -> bool:
+        """Whether it is what the solver predicts, not only the other end of its band."""
+        return self.end is None or self.end.predicted
+
+    @property
+    def title(self) -> str:
+        """Test and card; and the wall where it is the other end of a band."""
+        of = f"{self.test.name} with {self.card}"
+        return of if self.predicted else f"{of}, {self.wall}"
 
 
 class Predicted(Protocol):

@@ -62,7 +62,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
         warnings=[
-            f"{run.test.name} with {run.card}: {how}"
+            f"{run.title}: {how}"
             for run, how in zip(each, ended, strict=True)
             if run.record.failure or run.record.early
         ],
@@ -84,12 +84,14 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 
 
 def _notes(predictions: Predictions) -> list[Table]:
+    walls = ["wall"] if any(run.wall for run in predictions.each) else []
     rows: list[list[object]] = [
-        [run.test.name, run.card, as_note(note).kind.value, str(note)]
+        [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind.value, str(note)]
         for run in predictions.each
         for note in run.notes
     ]
     if not rows:
         return []
     what = "What a reader of the numbers above should know of each run."
-    return [Table("Notes", ["test", "card", "kind", "note"], rows, what, text=(1, 2, 3))]
+    header = ["test", "card", *walls, "kind", "note"]
+    return [Table("Notes", header, rows, what, text=tuple(range(1, len(header))))]

@@ -20,6 +20,7 @@ from .store import PROVENANCE
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..solvers.base import BandEnd
     from .project import Project
 
 
@@ -69,6 +70,10 @@ class Predictions:
             "solver": self.project.fit.solver,
             "tests": tests,
             "cards": list(dict.fromkeys(run.card for run in self.each)),
+            "walls": [
+                {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
+                for end in self.band
+            ],
             "runs": [self._numbers(i) for i in range(len(self.each))],
             "notes": note_rows(self.notes),
             "worst_relative_error": self.worst,
@@ -79,17 +84,22 @@ class Predictions:
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader of each run should know, of "TEST with CARD"."""
-        return [
-            as_note(note).about(f"{run.test.name} with {run.card}")
-            for run in self.each
-            for note in run.notes
-        ]
+        """What a reader of each run should know, of "TEST with CARD", or "TEST with CARD, WALL"."""
+        return [as_note(note).about(run.title) for run in self.each for note in run.notes]
+
+    @property
+    def band(self) -> list[BandEnd]:
+        """The ends of the solver's band, first what is predicted; empty where there is none."""
+        ends = [run.end for run in self.each if run.end is not None]
+        return list({end.name: end for end in ends}.values())
 
     @property
     def worst(self) -> float | None:
-        """Largest RMS error over the largest value measured; None where nothing is compared."""
-        errors = [self.error(i) for i in range(len(self.each))]
+        """Largest RMS error over the largest value measured; None where nothing is compared.
+
+        Of what is predicted: the other end of a band is no prediction.
+        """
+        errors = [self.error(i) for i, run in enumerate(self.each) if run.predicted]
         return max((e for e in errors if e is not None), default=None)
 
     def ended(self, number: int) -> str:
@@ -109,12 +119,14 @@ class Predictions:
     def silent(self) -> list[int]:
         """Numbers of the runs of measured tests that gave nothing to compare."""
         measured = [
-            i for i, run in enumerate(self.each) if predicted_kind(run.test.kind).measured(run.test)
+            i
+            for i, run in enumerate(self.each)
+            if run.predicted and predicted_kind(run.test.kind).measured(run.test)
         ]
         return [i for i in measured if self.error(i) is None]
 
     def runs(self) -> pd.DataFrame:
-        """A row a run: test, card, numbers with units, how it ended, marks, notes, seconds."""
+        """A row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
         import pandas as pd
 
         rows = []
@@ -126,19 +138,21 @@ class Predictions:
                 "notes": "; ".join(run.notes),
                 "seconds": run.record.seconds,
             }
-            rows.append({"test": run.test.name, "card": run.card, **outcome.columns(own), **tail})
+            head = {"test": run.test.name, "card": run.card, "wall": run.wall}
+            rows.append({**head, **outcome.columns(own), **tail})
         columns = list(dict.fromkeys(name for row in rows for name in row))
         last = [name for name in columns if name not in tail]
         return pd.DataFrame(rows, columns=[*last, *tail])
 
     def curves(self) -> pd.DataFrame:
-        """Every run frame by frame, with its test and card."""
+        """Every run frame by frame, with its test, card and wall."""
         import pandas as pd
 
         curves = []
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             curve = outcome.curve(own)
+            curve.insert(0, "wall", run.wall)
             curve.insert(0, "card", run.card)
             curve.insert(0, "test", run.test.name)
             curves.append(curve)
@@ -171,6 +185,8 @@ class Predictions:
         head: dict[str, Any] = {
             "test": run.test.name,
             "card": run.card,
+            "wall": run.wall,
+            "predicted": run.predicted,
             "ended": self.ended(number),
             "marks": marks(run.notes),
             "seconds": run.record.seconds,

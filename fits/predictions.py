@@ -16,7 +16,7 @@ from ..experiments.records import record_of
 from ..experiments.registry import kind_named
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import Solver
+from ..solvers.base import BandedSolver, BandEnd, Solver
 from ..solvers.registry import solver_named, usable_solver
 from .cards import Cards, card_sources, chosen_cards
 from .content import digest_of
@@ -61,6 +61,8 @@ def predict(
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
+    Where the solver's answer is a band, both its ends are run (`PredictedRun.end`).
+
     Parameters
     ----------
     tests : names of tests, or a kind of test; every test that is not fitted unless given.
@@ -86,8 +88,8 @@ def predict(
     """
     begun = time.perf_counter()
     chosen = predicted_tests(project, tests)
-    pairs = _pairs(project, chosen, chosen_cards(project, cards))
     solver = _usable(project)
+    pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
     record = _record(project, chosen, card_sources(project, cards), solver, command_line)
     records = None
     if out is not None:
@@ -97,9 +99,9 @@ def predict(
             record = record.after(Path(out))
         record.write(Path(out))
     with failure_page(None if out is None else Path(out), project.title) as said:
-        runs = _run(project, pairs, solver, records, jobs, progress or _nobody)
+        runs = _run(project, pairs, records, jobs, progress or _nobody)
         if all(run.record.failure for run in runs):
-            said += [f"{r.test.name} with {r.card}: failed: {r.record.failure}" for r in runs]
+            said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
             failure = f"no run ended well: {runs[0].record.failure}"
             raise SolverFailure(failure, project.fit.solver)
     return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
@@ -163,9 +165,9 @@ def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) ->
 
 
 def _pairs(
-    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard]
+    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
-    """Test by test, card by card, nothing run yet."""
+    """Test by test, card by card, end by end of the solver's band, nothing run yet."""
     pairs = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
@@ -177,8 +179,15 @@ def _pairs(
                 where = f"{test.name!r} with card {name!r}, {error.field}"
                 raise InputError(project.path, where, error.problem) from None
             (model,) = models[card.thickness].values()
-            pairs.append(PredictedRun(test, name, card, model, RunRecord(0.0, "was not run")))
+            waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
+            pairs += [replace(waiting, end=end) for end in _ends(solver, model)]
     return pairs
+
+
+def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
+    """The ends of the band that the solver gives for a model; one None where it gives none."""
+    band = solver.band(model) if isinstance(solver, BandedSolver) else ()
+    return tuple(band) or (None,)
 
 
 def _usable(project: Project) -> Solver:
@@ -190,14 +199,17 @@ def _usable(project: Project) -> Solver:
 def _run(
     project: Project,
     pairs: Sequence[PredictedRun],
-    solver: Solver,
     records: RunRecords | None,
     jobs: int | None,
     progress: Progress,
 ) -> list[PredictedRun]:
     """Every pair with its record: those that the folder holds, and the others side by side."""
     kinds = [predicted_kind(pair.test.kind) for pair in pairs]
-    marks = [mark_of(k, p.model, p.material.law, solver) for k, p in zip(kinds, pairs, strict=True)]
+    solver_of = _solvers(project)
+    marks = [
+        mark_of(kind, pair.model, pair.material.law, solver_of(pair.end))
+        for kind, pair in zip(kinds, pairs, strict=True)
+    ]
     ended: dict[int, PredictedRun] = {}
 
     def end(number: int, record: RunRecord, again: bool) -> None:
@@ -229,14 +241,29 @@ def _run(
 
 
 def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
-    name = project.fit.solver
-    solver = solver_named(name, **project.solver_options.get(name, {}))
+    solver_of = _solvers(project)
 
     def run(number: int, tell: Callable[[Any], None]) -> tuple[int, RunRecord]:
         pair = pairs[number]
-        return number, run_card(predicted_kind(pair.test.kind), solver, pair.model, pair.material)
+        kind, solver = predicted_kind(pair.test.kind), solver_of(pair.end)
+        return number, run_card(kind, solver, pair.model, pair.material)
 
     return run
+
+
+def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
+    """The project's solver for each end of its band, made once."""
+    name = project.fit.solver
+    options = project.solver_options.get(name, {})
+    made: dict[str, Solver] = {}
+
+    def solver_of(end: BandEnd | None) -> Solver:
+        key = "" if end is None else end.name
+        if key not in made:
+            made[key] = solver_named(name, **{**options, **({} if end is None else end.options)})
+        return made[key]
+
+    return solver_of
 
 
 def _nobody(event: RunEvent | None) -> None:

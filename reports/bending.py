@@ -25,6 +25,8 @@ BAND = "#E0E0E0"
 MEAN: dict[str, Any] = {"color": "#777777", "linewidth": 4.0, "alpha": 0.45}
 KNEE: dict[str, Any] = {"marker": "D", "markersize": 5.5, "markerfacecolor": "white"}
 LIMIT: dict[str, Any] = {"marker": "^", "markersize": 7.0, "markerfacecolor": "white"}
+#: How much of its card's colour a band has.
+BETWEEN = 0.22
 MM3_PER_LITRE = 1e6
 
 
@@ -38,6 +40,7 @@ class BendLine:
     deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3.
     knee, limit : where they are, mm and N.
     rms : N, against what was measured.
+    other : deflection (mm) and load (N) of the other end of a band that begins at the curve.
     """
 
     name: str
@@ -49,6 +52,7 @@ class BendLine:
     knee: Point | None = None
     limit: Point | None = None
     rms: float | None = None
+    other: tuple[ArrayLike, ArrayLike] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +67,12 @@ class BendReadings:
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: what it is called, a curve a card, and what was measured."""
+    """One case: what it is called, a curve a card, what was measured, what a band goes between."""
 
     title: str
     lines: Sequence[BendLine] = ()
     measured: BendReadings | None = None
+    band: str = ""
 
 
 def plot_bending(path: Path | str, panel: BendPanel) -> Path:
@@ -167,6 +172,7 @@ def _loads(axes: Axes, panel: BendPanel) -> None:
     drawn = []
     for line in panel.lines:
         look = named_look(line.rank)
+        _to_other_end(axes, line)
         drawn.append(axes.plot(line.deflection, line.load, linewidth=1.6, **look)[0])
         for point, marker in ((line.knee, KNEE), (line.limit, LIMIT)):
             if point is not None:
@@ -181,9 +187,24 @@ def _loads(axes: Axes, panel: BendPanel) -> None:
         )  # fmt: skip
 
 
+def _to_other_end(axes: Axes, line: BendLine) -> None:
+    """The band between a curve and its other end, as far as both go."""
+    if line.other is None:
+        return
+    color = named_look(line.rank)["color"]
+    way, load = (np.asarray(values, dtype=float) for values in line.other)
+    axes.plot(way, load, color=color, linewidth=0.6, alpha=0.6, zorder=1)
+    x, y = np.asarray(line.deflection, dtype=float), np.asarray(line.load, dtype=float)
+    grid = np.union1d(x, way)
+    grid = grid[grid <= min(x[-1], way[-1])]
+    both = np.interp(grid, x, y), np.interp(grid, way, load)
+    axes.fill_between(grid, *both, color=color, alpha=BETWEEN, linewidth=0, zorder=1)
+
+
 def _highest(panel: BendPanel) -> float:
     """The largest load drawn, N."""
     loads = [np.asarray(x.load, dtype=float) for x in panel.lines]
+    loads += [np.asarray(x.other[1], dtype=float) for x in panel.lines if x.other is not None]
     if panel.measured is not None:
         loads += [np.asarray(y, dtype=float) for _, y in panel.measured.readings]
     return max((float(y.max()) for y in loads), default=0.0)
@@ -192,6 +213,7 @@ def _highest(panel: BendPanel) -> float:
 def _longest(panel: BendPanel) -> float:
     """The largest deflection drawn, mm."""
     ways = [np.asarray(x.deflection, dtype=float) for x in panel.lines]
+    ways += [np.asarray(x.other[0], dtype=float) for x in panel.lines if x.other is not None]
     if panel.measured is not None:
         ways += [np.asarray(x, dtype=float) for x, _ in panel.measured.readings]
     return max((float(x.max()) for x in ways), default=0.0)
@@ -214,6 +236,9 @@ def _entries(panels: Sequence[BendPanel]) -> dict[str, Any]:
     entries: dict[str, Any] = {}
     for line in sorted((x for p in panels for x in p.lines), key=lambda x: x.rank):
         entries[line.name] = Line2D([], [], linewidth=1.6, **named_look(line.rank))
+    banded = [(p.band, x.rank) for p in panels for x in p.lines if x.other is not None]
+    for words, rank in reversed(banded):  # of the first card's colour
+        entries[words] = Patch(color=named_look(rank)["color"], alpha=BETWEEN)
     if any(p.measured for p in panels):
         entries["measured"] = Line2D([], [], **DOTS)
         entries["mean"] = Line2D([], [], **MEAN)

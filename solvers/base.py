@@ -81,6 +81,21 @@ class History:
 
 
 @dataclass(frozen=True)
+class BandEnd:
+    """One of the walls between which a solver's answer to a model lies.
+
+    name : in tables and figures. meaning : what the wall does, for who reads them. options : what
+    the solver is made with to take this wall, beside its own. predicted : whether it is what the
+    solver predicts, or only the other end of the band.
+    """
+
+    name: str
+    meaning: str
+    options: Mapping[str, Any]
+    predicted: bool = True
+
+
+@dataclass(frozen=True)
 class SolverCheck:
     """Whether a solver is there and carries the law: what `check` found."""
 
@@ -157,6 +172,15 @@ class Solver(Protocol):
 
     def check(self) -> SolverCheck:
         """Is it installed, which version, does it carry the law?"""
+        ...
+
+
+@runtime_checkable
+class BandedSolver(Solver, Protocol):
+    """A solver whose answer to some models is a band."""
+
+    def band(self, model: Any) -> Sequence[BandEnd]:
+        """Its ends, first what is predicted; none where the model has one answer."""
         ...
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.volume import enclosed_volume
 from bubblefit.models.cylinder import CylinderModel
-from bubblefit.solvers.base import History, Solver, SolverCheck
+from bubblefit.solvers.base import BandEnd, History, Solver, SolverCheck
 
 #: Warp moduli (MPa) with which `Formula` fails, and stops half-way.
 FAILS, STOPS = 13.0, 17.0
@@ -76,6 +77,29 @@ class Formula:
             remarks=("made up",),
             early="the run stopped early: so asked" if e1 == STOPS else "",
         )
+
+
+#: Ends of a band, as a solver gives them.
+ENDS = (
+    BandEnd("slack", "it wrinkles", {"factor": 1.0}),
+    BandEnd("rigid wall", "it does not", {"factor": 1.5}, predicted=False),
+)
+
+
+class Banded(Formula):
+    """With a band, unless the `factor` is given that its loads are multiplied by."""
+
+    def __init__(self, factor: float | None = None) -> None:
+        super().__init__(factor=factor)
+        self.factor = factor
+
+    def band(self, model: CylinderModel) -> tuple[BandEnd, ...]:
+        return ENDS if self.factor is None else ()
+
+    def run(self, *arguments: Any, **named: Any) -> History:
+        history = super().run(*arguments, **named)
+        assert self.factor is not None, "a band is run end by end"
+        return replace(history, load=self.factor * history.load)
 
 
 PROJECT = """

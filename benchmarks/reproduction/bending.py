@@ -319,7 +319,8 @@ def read_study(folder: Path) -> Study:
         Cylinder(name, test["diameter_mm"], 1e-3 * test["pressure_kPa"])
         for name, test in result["tests"].items()
     )
-    ended = [run for run in result["runs"] if "load_N" in run]
+    # The other end of a band is no prediction.
+    ended = [run for run in result["runs"] if "load_N" in run and run.get("predicted", True)]
     runs = {(run["test"], run["card"]): _run(run) for run in ended}
     return Study(cylinders, tuple(result["cards"]), runs)
 

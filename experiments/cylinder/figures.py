@@ -36,6 +36,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     panels, figures = {}, []
     for test in tests:
         ended = [i for i in outcome.bent if outcome.runs[i].test is test]
+        ended = [i for i in ended if outcome.runs[i].predicted]
         panels[test.name] = _panel(test, outcome, ended, ranks)
         if not ended:
             continue
@@ -46,7 +47,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
         draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
         figures += [
-            (out.name(f"{stem}-load.png"), f"{test.name}: load over deflection"),
+            (out.name(f"{stem}-load.png"), f"{test.name}: load over deflection{_walls(outcome)}"),
             (out.name(f"{stem}-beam.png"), f"{test.name}: the bent beam, card {first.card}"),
             (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
         ]
@@ -55,7 +56,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         columns = max(map(len, rows))
         laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
         plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
-        caption = "Load over deflection, all tests"
+        caption = f"Load over deflection, all tests{_walls(outcome)}"
         figures.insert(0, (out.name(f"{FIGURES}/all-loads.png"), caption))
     return figures
 
@@ -67,9 +68,11 @@ def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     files = []
     for i, bent in outcome.bent.items():
         run = outcome.runs[i]
-        name = f"{BEAMS}/{tests[run.test.name]}-{cards[run.card]}.vtu"
+        wall = "" if run.predicted else f"-{file_names([run.wall])[run.wall]}"
+        name = f"{BEAMS}/{tests[run.test.name]}-{cards[run.card]}{wall}.vtu"
         write_beam(run.model, bent, out.path(name))
-        files.append((out.name(name), f"the beam at {bent.deflection[-1]:g} mm, for ParaView"))
+        what = f"the beam at {bent.deflection[-1]:g} mm, for ParaView"
+        files.append((out.name(name), what if run.predicted else f"{what} ({run.wall})"))
     return files
 
 
@@ -86,6 +89,14 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
         taken = plain.casefold() in (other.casefold() for other in files.values())
         files[name] = f"{plain}-{number}" if taken else plain
     return files
+
+
+def _walls(outcome: CylinderOutcome) -> str:
+    """For a caption: what lines and bands are."""
+    if len(outcome.band) < 2:
+        return ""
+    predicted, *others = (end.name for end in outcome.band)
+    return f"; line: {predicted}, band: to {', '.join(others)}"
 
 
 def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
@@ -111,7 +122,9 @@ def _panel(
         run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
         rms = None if m.error is None else m.error.rms
         curves = run.deflection, run.load, run.pressure, run.volume
-        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms))
+        other = outcome.other_end(i)
+        band = None if other is None else (other.deflection, other.load)
+        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms, band))
     measured = None
     if test.measured:
         s = scatter(test.measured)
@@ -124,4 +137,5 @@ def _panel(
             np.where(whole, s.mean, np.nan),
             np.where(whole, s.deviation, np.nan),
         )
-    return BendPanel(test.name, lines, measured)
+    names = [end.name for end in outcome.band]
+    return BendPanel(test.name, lines, measured, f"from {' to '.join(names)}" if names else "")

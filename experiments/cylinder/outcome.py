@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from ...solvers.base import BandEnd
 from ..base import Exhibit, Output, PredictedRun
 from .measures import BendingMeasures, Point, bending_measures
 from .record import BendingRun, run_of
@@ -37,6 +38,20 @@ class CylinderOutcome:
             i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
             for i, run in self.bent.items()
         }
+
+    @cached_property
+    def band(self) -> Sequence[BandEnd]:
+        """The ends of the band that the solver gives, first what is predicted; or none."""
+        ends = [run.end for run in self.runs if run.end is not None]
+        return list({end.name: end for end in ends}.values())
+
+    def other_end(self, number: int) -> BendingRun | None:
+        """Of the band of a run: with the same card in the same test, where it did not fail."""
+        own = self.runs[number]
+        for i, run in enumerate(self.runs):
+            if run.test is own.test and run.card == own.card and not run.predicted:
+                return self.bent.get(i)
+        return None
 
     def ended(self, number: int) -> str:
         """How a run ended: "finished", how far it came, or why it failed."""

@@ -38,6 +38,7 @@ def _write_tables(
 ) -> list[Shown]:
     curves = [outcome.curve(i) for i in range(len(outcome.runs))]
     for run, curve in zip(outcome.runs, curves, strict=True):
+        curve.insert(0, "wall", run.wall)
         curve.insert(0, "card", run.card)
         curve.insert(0, "test", run.test.name)
     _write(pd.concat(curves, ignore_index=True), out, CURVES)
@@ -80,9 +81,10 @@ def _slopes(tests: Sequence[CylinderTest]) -> str:
 
 def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
     places, rows = place_names(tests), []
+    walls = ["wall"] if outcome.band else []
     for i, run in enumerate(outcome.runs):
         m = outcome.measures.get(i)
-        head: list[object] = [run.test.name, run.card]
+        head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
         tail: list[object] = [outcome.ended(i), ", ".join(marks(run.notes)) or None]
         tail += [len(run.notes), round(run.record.seconds, 1)]
         if m is None:
@@ -98,7 +100,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         listed = [None if load is None else f"{load:.0f}" for load in loads]
         rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
     header = [
-        "test", "card", "stiffness, N/mm", "buckles", "wrinkles from",
+        "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
         *(f"load at {place}, N" for place in places),
         "inflation strain", "pressure, kPa", "ended", "marked", "notes", "s",
     ]  # fmt: skip
@@ -110,14 +112,18 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
         " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
     )
-    text = (1, header.index("ended"), header.index("marked"))
+    note += "".join(f" {end.name.capitalize()}: {end.meaning}." for end in outcome.band)
+    named = range(1, header.index("stiffness, N/mm"))
+    text = (*named, header.index("ended"), header.index("marked"))
     return Table("Runs", header, [_unbroken(row) for row in rows], note, text=text)
 
 
 def _errors(outcome: CylinderOutcome) -> list[Table]:
+    walls = ["wall"] if outcome.band else []
     rows: list[list[object]] = [
         [
-            outcome.runs[i].test.name, outcome.runs[i].card, m.error.rms,
+            outcome.runs[i].test.name, outcome.runs[i].card,
+            *(walls and [outcome.runs[i].wall]), m.error.rms,
             percent(m.error.relative), f"{m.error.mean:+.1f}", m.error.compared, m.error.beyond,
         ]
         for i, m in outcome.measures.items()
@@ -125,10 +131,12 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     ]  # fmt: skip
     if not rows:
         return []
-    header = ["test", "card", "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
+    shared = ["RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
+    header = ["test", "card", *walls, *shared]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
     text = [_unbroken(row) for row in rows]
-    return [Table("Against measured loads", header, text, note, text=(1,))]
+    named = tuple(range(1, header.index("RMS, N")))
+    return [Table("Against measured loads", header, text, note, text=named)]
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:

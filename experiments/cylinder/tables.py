@@ -71,13 +71,16 @@ def terminal_table(
     places = place_names([run.test for run in runs])
     widths = [max(len(p), 7) + 2 for p in places]
     compared = any(m.error is not None for m in measures.values())
-    wide = max(len(run.test.name) for run in runs), max(len(run.card) for run in runs)
-    head = f"{'test':<{wide[0]}}  {'card':<{wide[1]}}   N/mm   buckles at"
+    count = 3 if any(run.wall for run in runs) else 2
+    rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
+    names = [row[:count] for row in rows]
+    wide = [max(map(len, column)) for column in zip(*names, strict=True)]
+    starts = ["  ".join(f"{n:<{w}}" for n, w in zip(row, wide, strict=True)) for row in names]
+    head = f"{starts.pop(0)}   N/mm   buckles at"
     head += "".join(f"{p:>{w}}" for p, w in zip(places, widths, strict=True))
     lines = [head + ("   error" if compared else "")]
     for i, run in enumerate(runs):
-        start = f"{run.test.name:<{wide[0]}}  {run.card:<{wide[1]}}"
-        m = measures.get(i)
+        start, m = starts[i], measures.get(i)
         if m is None:
             lines.append(f"{start}  {ended[i]}")
             continue

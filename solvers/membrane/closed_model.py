@@ -15,14 +15,14 @@ from .closed import ClosedMembrane
 from .element import reference_elements
 from .factorisation import tangent_for
 from .flexure import flexure_of
-from .wall import Wall
+from .wall import STIFF, Wall
 
 
 def prepare(
-    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """What does not change from one law to the next."""
-    return closed_membrane(model, law, tolerance, model.fixed(), wall)
+    """What does not change from one law to the next; a stiff wall unless asked otherwise."""
+    return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
 
 
 def closed_membrane(

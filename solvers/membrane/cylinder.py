@@ -12,16 +12,16 @@ from ..base import History
 from . import closed_model, inflated
 from .closed import ClosedMembrane
 from .march import Asked
-from .wall import Wall
+from .wall import TENSION_FIELD, Wall
 
 Array = NDArray[np.float64]
 
 
 def prepare(
-    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall
+    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """What does not change from one law to the next."""
-    return closed_model.prepare(closed_membrane_of(model), law, tolerance, wall)
+    """What does not change from one law to the next; a tension field unless asked otherwise."""
+    return closed_model.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
 
 
 def analyse(membrane: ClosedMembrane, model: CylinderModel, asked: Asked) -> tuple[History, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -11,10 +11,14 @@ from ..settings import SolverSettings
 
 
 class MembraneSettings(SolverSettings):
-    """What a closed membrane's wall does where it is pressed together; for bendings."""
+    """What a closed membrane's wall does where it is pressed together; for bendings.
 
+    Both ends of a band unless `wall` names one, or a share of a stiffness is given.
+    """
+
+    wall: Literal["band", "tension field", "stiff"] = "band"
     wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None
-    bending_stiffness: Annotated[float, Field(ge=0)] = 1.0
+    bending_stiffness: Annotated[float, Field(ge=0)] | None = None
 
 
 OFFER = Offer("membrane", __package__, "MembraneSolver", MembraneSettings)

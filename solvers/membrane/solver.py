@@ -18,18 +18,21 @@ from ...models.cylinder import CylinderModel
 from ...models.inflated import InflatedModel
 from ...models.uniaxial import UniaxialModel
 from ..analyses import analysis_of
-from ..base import History, Progress, SolverCheck, parameters_of
+from ..base import BandEnd, History, Progress, SolverCheck, parameters_of
 from ..identity import in_words
 from . import bubble, closed_model, cylinder, inflated, strip
 from .march import Asked
 from .newton import Membrane
-from .wall import Wall
+from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
 
 Array = NDArray[np.float64]
 
 
 class Analysis(NamedTuple):
-    """How a model is run: (model, law, tolerance, wall) -> membrane; (membrane, model, asked)."""
+    """How a model is run: (model, law, tolerance, wall) -> membrane; (membrane, model, asked).
+
+    The wall is None where none was asked for.
+    """
 
     prepare: Callable[..., Membrane]
     analyse: Callable[..., tuple[History, Array]]
@@ -60,10 +63,12 @@ class MembraneSolver:
         tension, as bubbles and strips do.
     bending_stiffness : share of the wall's own that counts where rigid bodies bend a closed
         membrane (solvers/membrane/flexure.py).
+    wall : of a bent cylinder: "tension field" or "stiff". Unless it, or one of the shares, is
+        given, `band` names both, and `run` takes the tension field.
 
     Raises
     ------
-    InputError : as `Wall`.
+    InputError : as `chosen_wall`.
     """
 
     name = "membrane"
@@ -73,16 +78,23 @@ class MembraneSolver:
         self,
         tolerance: float = 1e-8,
         wrinkle_stiffness: float | None = None,
-        bending_stiffness: float = 1.0,
+        bending_stiffness: float | None = None,
+        wall: Walls = "band",
     ) -> None:
-        self.tolerance, self.wall = tolerance, Wall(wrinkle_stiffness, bending_stiffness)
+        self.tolerance = tolerance
+        self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
         self._prepared: tuple[Any, Membrane] | None = None
 
     @property
     def identity(self) -> str:
         """The tolerance, and what the wall of a closed membrane does."""
-        return in_words(self.name, __version__, tolerance=self.tolerance, wall=self.wall)
+        wall = self.wall or TENSION_FIELD
+        return in_words(self.name, __version__, tolerance=self.tolerance, wall=wall)
+
+    def band(self, model: Any) -> Sequence[BandEnd]:
+        """Both walls of a bent cylinder, where none was asked for."""
+        return BAND if self.wall is None and isinstance(model, CylinderModel) else ()
 
     def check(self) -> SolverCheck:
         """Always there; the law is its own."""

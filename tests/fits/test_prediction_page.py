@@ -117,6 +117,7 @@ def test_result_json(tmp_path: Path) -> None:
         "title": "Tubes",
         "solver": "formula",
         "cards": ["soft", "stiff"],
+        "walls": [],
         "worst_relative_error": done.worst,
         "wall_s": 30.0,
         "versions": versions(),
@@ -124,6 +125,8 @@ def test_result_json(tmp_path: Path) -> None:
     assert runs[0] == {
         "test": "150 mm, 90 kPa",
         "card": "soft",
+        "wall": "",
+        "predicted": True,
         "ended": "failed: made to fail",
         "marks": [],
         "seconds": 2.0,

@@ -57,7 +57,9 @@ def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
     assert list(zip(runs["test"], runs["card"], strict=True)) == keys
     assert list(runs.columns[-4:]) == ["ended", "marks", "notes", "seconds"]
     assert set(runs["ended"]) == {"finished"} and set(runs["notes"]) == {"made up"}
-    assert len(curves) == 4 * 25 and list(curves.columns[:3]) == ["test", "card", "deflection_mm"]
+    names = ["test", "card", "wall", "deflection_mm"]
+    assert len(curves) == 4 * 25 and list(curves.columns[:4]) == names
+    assert set(runs["wall"]) == {""} and done.result["walls"] == []
     stiff = curves[(curves["test"] == "high") & (curves["card"] == "stiff")]
     own = runs[(runs["test"] == "high") & (runs["card"] == "stiff")].iloc[0]
     at = np.interp(100.0, stiff["deflection_mm"], stiff["load_N"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from bubblefit.reports import (
     plot_gas,
 )
 from bubblefit.reports.style import BLACK, GREY, NAMED
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from ..drawings import data, legend, lines, titles
@@ -58,6 +60,24 @@ def test_loads_and_what_the_cards_miss(tmp_path: Path, drawn: list[Figure]) -> N
     assert legend(drawn[0]) == [
         "soft", "stiff", "measured", "mean", "scatter of repetitions (±)", "knee", "limit point",
     ]  # fmt: skip
+
+
+def test_a_band_goes_from_the_curve_to_its_other_end(tmp_path: Path, drawn: list[Figure]) -> None:
+    """The other end stops before; the axes hold it."""
+    way = WAY[:7]
+    case = BendPanel("one", [replace(SOFT, other=(way, 4 * way)), STIFF], band="from soft to hard")
+    plot_bending(tmp_path / "b.png", case)
+    (axes,) = drawn[0].axes
+    (band,) = axes.collections
+    corners = {tuple(corner) for corner in band.get_paths()[0].vertices.tolist()}
+    assert {(30.0, 90.0), (30.0, 120.0)} <= corners and max(x for x, _ in corners) == 30.0
+    assert band.get_facecolor()[0][:3] == pytest.approx(to_rgb(NAMED[0]))
+    (own, other, _) = lines(axes, NAMED[0])
+    assert {len(own[0]), len(other[0])} == {7, 9}
+    assert legend(drawn[0]) == ["soft", "stiff", "from soft to hard", "knee", "limit point"]
+    high = BendPanel("two", [replace(SOFT, other=(WAY, 9 * WAY))], band="from soft to hard")
+    plot_bending_cases(tmp_path / "a.png", [high], 1)
+    assert drawn[1].axes[0].get_ylim()[1] == pytest.approx(1.06 * 360.0)
 
 
 def test_all_cases_with_the_same_loads_in_a_row(tmp_path: Path, drawn: list[Figure]) -> None:

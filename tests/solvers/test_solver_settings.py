@@ -28,7 +28,9 @@ PROJECT = Path("/somewhere/project.toml")
 def test_without_tables_every_solver_of_ours_has_its_defaults() -> None:
     found = solver_settings(PROJECT, {})
     assert set(found) == set(SOLVERS) == {"calculix", "marc", "membrane"}
-    assert found["membrane"] == {"wrinkle_stiffness": None, "bending_stiffness": 1.0}
+    assert found["membrane"] == {
+        "wall": "band", "wrinkle_stiffness": None, "bending_stiffness": None
+    }  # fmt: skip
     assert found["calculix"]["element"] == "S8R" and found["calculix"]["ccx"] is None
     assert all(isinstance(solver_named(name, **o), Solver) for name, o in found.items())
 
@@ -50,6 +52,7 @@ def test_paths_are_beside_the_project_and_bare_names_on_the_path() -> None:
         ({"calculix": {"element": "S3"}}, "solver.calculix.element: expected 'S8R' or 'S4'"),
         ({"calculix": 3}, "solver.calculix: expected"),
         ({"membrane": {"wrinkle_stiffness": 2.0}}, "solver.membrane.wrinkle_stiffness: expected"),
+        ({"membrane": {"wall": "soft"}}, "solver.membrane.wall: expected 'band', 'tension field'"),
         ({"marc": {"threads": "2"}}, "solver.marc.threads: expected"),
         ({"calculiks": {}}, "solver.calculiks: no solver of this name is installed; there are: "),
     ],

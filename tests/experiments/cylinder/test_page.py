@@ -17,6 +17,7 @@ from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.cylinder.record import BendingRun
 from bubblefit.notes import Note, NoteKind
 from bubblefit.reports import Table
+from bubblefit.solvers.base import BandEnd
 
 from .test_tables import MEASURES
 
@@ -38,11 +39,20 @@ def case(name: str, diameter: float = 150.0, **other: Any) -> SimpleNamespace:
     return SimpleNamespace(**(fields | other))
 
 
-def run(test: SimpleNamespace, card: str, seconds: float = 12.34, **record: Any) -> SimpleNamespace:
+def run(
+    test: SimpleNamespace,
+    card: str,
+    seconds: float = 12.34,
+    end: BandEnd | None = None,
+    **record: Any,
+) -> SimpleNamespace:
     said = SimpleNamespace(**({"failure": "", "early": "", "seconds": seconds} | record))
     kinds = (NoteKind.EARLY, NoteKind.SNAP) if said.early else (NoteKind.GAS, NoteKind.SOLVER)
     notes = tuple(Note(kind, "words") for kind in kinds)
-    return SimpleNamespace(test=test, card=card, notes=notes, record=said)
+    return SimpleNamespace(
+        test=test, card=card, notes=notes, record=said, end=end, wall=end.name if end else "",
+        predicted=end is None or end.predicted,
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -114,7 +124,7 @@ def test_every_cell(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> No
     )
     curves = pd.read_csv(tmp_path / "out" / "c" / "load_deflection.csv")
     assert list(curves.columns) == [
-        "test", "card", "deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3",
+        "test", "card", "wall", "deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3",
         "wrinkled_share",
     ]  # fmt: skip
     assert curves["test"].tolist() == ["150/90"] * 3 + ["the wide one"] * 3

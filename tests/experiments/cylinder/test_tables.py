@@ -40,7 +40,8 @@ def run(name: str, card: str, early: str = "", *kinds: NoteKind):
         name=name, reading=SimpleNamespace(places={"20 mm": 20.0, "a long way": 200.0})
     )
     notes = tuple(Note(kind, "words") for kind in kinds)
-    return SimpleNamespace(test=test, card=card, notes=notes, record=SimpleNamespace(early=early))
+    said = SimpleNamespace(early=early)
+    return SimpleNamespace(test=test, card=card, notes=notes, record=said, wall="")
 
 
 def test_numbers_for_result_json() -> None:

@@ -109,7 +109,9 @@ def test_patches_face_the_fabric(model, grown):
 
 def test_bodies_are_where_they_touch(model, grown):
     support, collar = contact_bodies(model, grown)
-    crown = 105.0
+    # Corners of a polygon of the circle's area are a little outside of the circle.
+    crown = 1.05 * np.hypot(*model.mesh.points[:, :2].T).max()
+    assert 105.0 < crown < 106.6
     points = np.reshape(support["patches"], (-1, 3))
     assert points[:, 1].max() == pytest.approx(-crown + 0.02, abs=1e-9)
     points = np.reshape(collar["patches"], (-1, 3))

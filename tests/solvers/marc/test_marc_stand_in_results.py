@@ -91,7 +91,8 @@ def test_strip(marc, model, settings):
 
 def test_cylinder(marc):
     model = inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(1.0, 2.5, 5.0))
-    expected = MembraneSolver().run(model, LAW)
+    # The stand-in's membrane carries compression.
+    expected = MembraneSolver(wall="stiff").run(model, LAW)
     found = marc.solver().run(model, LAW)
     assert len(marc.runs) == 2  # inflation alone, and bending
     np.testing.assert_allclose(

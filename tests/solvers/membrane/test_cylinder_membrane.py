@@ -32,7 +32,7 @@ def thesis_case(symmetry: str = "quarter") -> CylinderModel:
 
 
 def bend(model: CylinderModel | InflatedModel, law: HypoelasticLaw = LAW) -> History:
-    return MembraneSolver(1e-9).run(model, law)
+    return MembraneSolver(1e-9, wall="tension field").run(model, law)
 
 
 @pytest.fixture(scope="module")
@@ -182,8 +182,7 @@ def test_the_inflated_frame_is_the_closed_form_away_from_caps(law: HypoelasticLa
         model = replace(model, inflation=np.linspace(0.0, PRESSURE, 25)[1:])
         u = bend(model, law).displacement[0]
         at = model.mesh.points + u
-        ring = model.mesh.node_sets["mid_span"]
-        radius = 0.5 * float(np.ptp(at[ring, 1]))
+        radius = 0.5 * model.diameter_at(at)
         near = np.abs(model.mesh.points[:, 2] - 100.0) < size
         along = float(np.log1p(u[near, 2] / model.mesh.points[near, 2]).mean())
         errors.append(np.array([radius / 75.0, np.exp(along)]) / np.exp(strain[::-1]) - 1)
