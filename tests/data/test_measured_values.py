@@ -333,6 +333,12 @@ def test_surfaces_that_cannot_be(tmp_path: Path) -> None:
         (surfaces("0"), "expected a scale above 0 mm, got 0"),
         (surfaces("-1"), "expected a scale above 0 mm, got -1"),
         (surfaces("1", "0.5"), ", got 0.5"),
+        (
+            surfaces("1e300", "1", "1e300")
+            .replace("C0", "C0,C1,C2,C3")
+            .replace(",1e300\n", ",1e300,0,0,0\n"),
+            "coefficients too large for a scale of 1e+300 mm",
+        ),
     ):
         path.write_text(text)
         said = complaint(read_surfaces, path)

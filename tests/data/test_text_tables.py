@@ -255,6 +255,7 @@ def test_holes_are_found_by_either_way(tmp_path: Path, hole: str) -> None:
         ROWS.format(";", '"8"'),
         ROWS.format(";", "x"),
         ROWS.format(";", "1e999"),
+        ROWS.format(";", "NA"),  # no word for a hole here
         ROWS.format(",", "8").replace("10,0", "10,0,7"),
         ROWS.format(";", "8").replace("10;0", "10;"),  # a flag without a value
     ],

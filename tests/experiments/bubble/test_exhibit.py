@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble import figures
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.bubble.tables import misfit_table, surface_tables
+from bubblefit.experiments.bubble.tables import misfit_table, residual_table, surface_tables
 from bubblefit.solvers.base import History
 
 
@@ -53,6 +53,15 @@ def test_misfit_by_pressure(objective: str, scales: tuple[float, ...]) -> None:
     history = History(np.array([0.02, 0.2]), moved, np.zeros(3), np.zeros(3))
     fitted: Any = SimpleNamespace(comparisons=[comparison], histories=[history], nuisance={})
     prepared: Any = SimpleNamespace(test=SimpleNamespace(objective=objective))
+    comparison.model = SimpleNamespace(mesh=SimpleNamespace(points=np.array([[7.0, 8.0, 0.0]])))
+    each = residual_table(prepared, fitted)
+    assert each.index.tolist() == [0, 1, 2, 3, 4, 5]
+    assert list(each.columns) == [
+        "part", "pressure_kPa", "x_mm", "y_mm", "quantity", "measured_mm", "modelled_mm",
+        "difference_mm",
+    ]  # fmt: skip
+    assert each.iloc[5].tolist()[:5] == ["bubble", 200.0, 7.0, 8.0, "dz"]
+    assert each.iloc[5].tolist()[5:] == pytest.approx([-5.0, -4.7, 0.3])
     table = misfit_table(prepared, fitted)
     assert (table.title, table.header) == (
         "Misfit by pressure", ["pressure, kPa", "x", "y", "z"]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.data.fields import DisplacementField
-from bubblefit.experiments.bubble.places import folded, mirrored
+from bubblefit.experiments.bubble.places import at_nodes, folded, mirrored
+from bubblefit.meshes.disk import disk_mesh
 
 POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])
 MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])
@@ -64,3 +65,20 @@ def test_a_point_beside_the_axis_by_rounding_is_on_it():
     points = POINTS.copy()
     points[2, 0] = -1e-12
     assert len(mirrored(DisplacementField(0.1, points, MOVED)).points) == 1 + 2 + 2 + 4
+
+
+def test_computed_fields_at_the_nodes_of_a_model() -> None:
+    """Those of the same mesh as they are; of another one interpolated, and clamped at the rim."""
+    mesh, other = disk_mesh(1.0, 48), disk_mesh(1.0, 192, "quarter")
+
+    def field(points: np.ndarray) -> np.ndarray:
+        round_ = 1 - (points[:, :2] ** 2).sum(axis=1)
+        return np.column_stack([points[:, 0] * round_, -points[:, 1] * round_, round_])
+
+    noisy = field(mesh.points) + np.random.default_rng(1).normal(0, 0.1, mesh.points.shape)
+    same = DisplacementField(0.1, mesh.points[:, :2] + 1e-10, noisy)
+    between = DisplacementField(0.2, other.points[:, :2], field(other.points))
+    first, second = at_nodes([same, between], mesh)
+    assert (first.pressure, second.pressure) == (0.1, 0.2) and first.displacement is noisy
+    np.testing.assert_allclose(second.displacement, field(mesh.points), atol=0.01)
+    np.testing.assert_array_equal(second.displacement[mesh.node_sets["rim"]], 0.0)

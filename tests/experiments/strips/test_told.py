@@ -99,6 +99,7 @@ def test_tables() -> None:
     assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
     assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
     rest = residual_table(both)
+    assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
     assert list(rest.columns) == [
         "part", "elongation_mm", "quantity", "measured", "modelled", "difference"
     ]  # fmt: skip
