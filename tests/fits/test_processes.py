@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.processes import run_starts, run_tasks
+from bubblefit.fits.processes import _here, run_starts, run_tasks
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.comparison import Comparison
@@ -170,3 +170,13 @@ def test_processes_end_by_themselves_when_all_is_done(tmp_path: Path) -> None:
 
     assert sorted(filter(None, run_tasks(ending, [1, 2, 3, 4], 2))) == [1, 2, 3, 4]
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_without_other_processes_every_record_comes_in_turn() -> None:
+    """What a task tells comes before what it returns."""
+
+    def task(number: int, tell: Any) -> int:
+        tell(f"within {number}")
+        return 10 * number
+
+    assert list(_here(lambda: task, [3, 1])) == ["within 3", 30, "within 1", 10]

@@ -360,3 +360,39 @@ def test_the_record_on_the_page(tmp_path: Path) -> None:
     said = dict(map(tuple, none.rows))
     assert said["solver"] == "calculix 2.20; element = S8R"
     assert said["command"] == "none: called from Python" and "computed" in said["data files"]
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "words"),
+    [
+        # Of a list up to three values are named one by one.
+        ([1, 2, 3, 4], [0, 2, 0, 0],
+         ["a.k[0] = 1, now 0", "a.k[2] = 3, now 0", "a.k[3] = 4, now 0"]),
+        ([1, 2, 3, 4], [0, 0, 0, 0], ["a.k = [1, 2, 3, 4], now [0, 0, 0, 0]"]),
+        ([1, 2], [1, 2, 3], ["a.k = [1, 2], now [1, 2, 3]"]),
+        # Texts are cut after 60 letters, their quotation marks among them.
+        ("x" * 58, "y" * 59, [f'a.k = "{"x" * 58}", now "{"y" * 59}...']),
+        ("0" * 64, None, [f"a.k = sha256 {'0' * 12}, now not given"]),
+        ("0" * 63, "g" * 64, [f'a.k = "{"0" * 59}..., now "{"g" * 59}...']),
+        ({"b": 1, "c": 2}, {"b": 1, "d": 3},
+         ["a.k.c = 2, now not given", "a.k.d = not given, now 3"]),
+    ],
+)  # fmt: skip
+def test_values_that_differ(before: Any, now: Any, words: list[str]) -> None:
+    assert differences({"tests": {"a": {"k": before}}}, {"tests": {"a": {"k": now}}}) == words
+
+
+def test_files_that_differ() -> None:
+    def facts(*files: tuple[str, str]) -> dict[str, Any]:
+        rows = [{"name": name, "sha256": 64 * mark} for name, mark in files]
+        return {"tests": {"a": {}}, "files": {"a": rows}}
+
+    one, two, three = 12 * "1", 12 * "2", 12 * "3"
+    before, now = (
+        facts(("x", "1"), ("y", "2"), ("z", "3")),
+        facts(("x", "2"), ("w", "3"), ("v", "3")),
+    )
+    assert differences(before, now) == [
+        f"data file x of 'a' (sha256 {one}, now {two})",
+        f"data file of 'a', by sha256: y ({two}), now w ({three})",
+    ]
