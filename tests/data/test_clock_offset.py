@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from bubblefit.data.clock_offset import find_offset, given_offset
@@ -116,6 +118,19 @@ def test_frames_beyond_the_log_have_no_pressure():
 def test_what_cannot_be_told_is_refused(change, words):
     said = complaint(find_offset, *recorded(offset=12.0, noise=5e-4, **change))
     assert all(word in said for word in ["offset" if "log" not in words[0] else "", *words]), said
+
+
+def test_offsets_that_do_as_well_are_told_from_the_least_to_the_largest():
+    """A steady rise over the whole log and film: any offset within it does."""
+    times, log = np.arange(20.0), np.arange(0.0, 60.0, 0.5)
+    said = complaint(find_offset, times, times + 5.0, log, 0.3 * log / 60)
+    assert said.startswith("offset: cannot be found: offsets from ")
+    numbers = [float(n) for n in re.findall(r"-?\d+\.\d\d", said)[:2]]
+    assert numbers[0] < 0 < 30 < numbers[1]
+    assert said.endswith(
+        "kPa on average; give it in s. Where the pressure was held, released or began to rise "
+        "while frames were taken, it can be found"
+    )
 
 
 def test_heights_of_another_test_are_refused():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.data.frames import Frame
 from bubblefit.data.gauge import gauge_load_curve, virtual_strain_gauge
+from bubblefit.data.surface_points import place_of, triangulated, usual_edge
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -272,3 +273,22 @@ def test_loads_at_the_ends_of_the_record_count() -> None:
         gauge_load_curve, record, [0, 1], **how, frame_times=[0, 2, 4, 9], load_times=[1, 3]
     )
     assert said == "specimen '1': only 1 of 4 frames have both length and load; expected two"
+
+
+def test_places_in_a_single_triangle() -> None:
+    """Its corners' own weights; its edge is on it, what lies beyond is not."""
+    points = np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 2.0], [0.0, 4.0, 3.0]])
+    surface = triangulated(Frame(points, np.array([[0.0, 0, 0], [0, 0, 4], [8, 0, 0]])))
+    assert surface is not None and usual_edge(surface) == pytest.approx(np.sqrt(32))
+    for place, height, moved in (((1.0, 1.0), 1.75, [3, 1, 2.75]), ((2.0, 2.0), 2.5, [6, 2, 4.5])):
+        found = place_of(np.array(place), surface, 6.0)
+        np.testing.assert_allclose(found, [[*place, height], moved], atol=1e-12)
+    assert place_of(np.array([2.01, 2.0]), surface, 6.0) == "outside the correlated points"
+    assert place_of(np.array([1.0, 1.0]), surface, 5.0) == (
+        "the points around it are 5.66 mm apart, allowed 5"
+    )
+    nearly = Frame(points * [1, 0, 1], 0 * points)
+    assert triangulated(nearly) is None and triangulated(Frame(points[:2], 0 * points[:2])) is None
+    # The same places are triangulated once.
+    again = triangulated(Frame(points + np.array([0, 0, 5.0]), 0 * points), surface)
+    assert again is not None and again.mesh is surface.mesh
