@@ -119,6 +119,7 @@ def test_a_volt_may_be_a_unit(tmp_path):
         ("time,p (V)\n0,1\n1,2\n", LogOptions(Channel(unit="kPa")), ["'V'", "'kPa'"]),
         ("time,p (kPa)\n0,1\n1,2\n", LogOptions(Channel("p", "kPa", 100.0)), ["leave the scale"]),
         ("time,p (kPa)\n0,1\n2,2\n1,3\n", LogOptions(), ["line 4, column 'time'", "go back"]),
+        ("time,p (kPa)\n0,1\n2,2\n1,3\n0,3\n", LogOptions(), ["line 4, column 'time'"]),
         ("time,p (kPa)\n3,1\n3,2\n", LogOptions(), ["column 'time'", "two times"]),
         ("time (days),p (kPa)\n3,1\n4,2\n", LogOptions(), ["'days' is not one of s"]),
         ("time,p (kPa),Druck\n3,1,1\n4,2,2\n", LogOptions(), ["'p (kPa)' or 'Druck'", "columns"]),
