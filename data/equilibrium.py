@@ -64,7 +64,7 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
         ]
     )
     curvature = -float(np.trace(np.linalg.solve(metric, second)))
-    variance = float(left @ left) / max(len(left) - len(POWERS), 1)
+    variance = float(left @ left) / (len(left) - len(POWERS))
     inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
     both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
     spread = float(np.sqrt(variance * inverse[np.ix_(both, both)].sum())) * 2 / radius**2

@@ -259,6 +259,11 @@ def test_what_is_said_of_columns(tmp_path: Path) -> None:
     path.write_text("Crosshead (mm),Extension (mm),Load (N)\n0,0,1\n2,1,5\n")
     (curve,) = read_load_curves(path, direction="warp")
     assert curve.elongation.tolist() == [0.0, 1.0]
+    (named,) = read_load_curves(path, direction="warp", format="text")
+    for one in (curve, named):
+        assert one.source is not None and one.source.format == "text"
+        assert one.source.columns == {"elongation": "Extension (mm)", "load": "Load (N)"}
+        assert one.source.units == {"elongation": "mm", "load": "N"}
     assert curve.notes == (
         "a.csv: the elongation is column 'Extension (mm)', not 'Crosshead (mm)'; columns = { "
         "elongation = ... } names another",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from bubblefit.experiments.notes import (
     beyond_card,
     beyond_range,
     by_strain,
+    notes_of_record,
     other_thickness,
     unstable_words,
 )
@@ -84,6 +86,12 @@ def test_the_words_of_notes() -> None:
     assert note.kind is NoteKind.THICKNESS and note.endswith(
         "with the card's moduli the fabric is 50 % softer; it was run with the card's thickness"
     )
+    record = SimpleNamespace(strain=beyond, remarks=("made up",), unstable=("132 kPa",))
+    assert [n.kind for n in notes_of_record(record, card)] == [
+        NoteKind.SOLVER, NoteKind.BEYOND_CARD, NoteKind.UNSTABLE
+    ]  # fmt: skip
+    record.strain = None
+    assert [n.kind for n in notes_of_record(record, card)] == [NoteKind.SOLVER, NoteKind.UNSTABLE]
     assert unstable_words(None) == unstable_words(()) == []
     (note,) = unstable_words(("132 kPa",))
     assert note.kind is NoteKind.UNSTABLE and note.endswith(": the model would not stay there")

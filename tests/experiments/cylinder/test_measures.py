@@ -124,6 +124,8 @@ def test_all_numbers_of_the_formula() -> None:
     for at, load in zip((40.0, 100.0, 240.0), found.loads.values(), strict=True):
         assert load == pytest.approx(limit * np.tanh(stiffness * at / limit))
     assert found.pressure_rise == pytest.approx(1e3 * 0.241 * 240e-5, rel=0.01)
+    first, *_, last = (mpa / 1e-3 for mpa in run.pressure)
+    assert found.pressure_rise == pytest.approx(last - first, rel=1e-9)
     assert found.buckling_is == "knee" and found.reached == 240.0 and found.error is None
     assert found.wrinkles[0] == 56.0
 
