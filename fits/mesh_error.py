@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
 from ..experiments.refinable import Refinable
-from ..identification.assessment import Certainty
-from ..identification.discretisation import residual_of, step_to_limit
+from ..identification.assessment import Certainty, certainty
+from ..identification.discretisation import Limit, limit_of, residual_of
 from ..identification.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind
@@ -28,6 +28,8 @@ LEAST = 0.01
 def with_mesh_error(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """The best fit, its certainty with what the mesh does to the moduli.
 
+    What the mesh leaves is then no noise: that is what finer models would leave.
+
     As it is where its derivatives are not known, where another program runs the tests (a finer
     run of it is not made unasked), or where a kind of test knows no finer model.
     """
@@ -37,23 +39,25 @@ def with_mesh_error(setup: FitSetup, problem: FitProblem, best: BestFit) -> Best
     if not all(isinstance(test, Refinable) for test in setup.tests):
         return best
     try:
-        step = _step(setup, problem, best)
+        limit = _limit(setup, problem, best)
     except (InputError, SolverFailure) as error:
         words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
         sure = replace(sure, undetermined=(*sure.undetermined, Note(NoteKind.MESH, words)))
         return replace(best, certainty=sure)
-    if step is None:
+    if limit is None:
         return best
-    limit = best.law.with_beta(problem.unknowns.beta(slopes.unknowns + step))
+    left = replace(slopes, residual=limit.residual)
+    sure = certainty(problem, left, best.law, best.valid)
+    law = best.law.with_beta(problem.unknowns.beta(slopes.unknowns + limit.step))
     mesh = {
-        name: limit.modulus(name, strain) / best.law.modulus(name, strain) - 1.0
+        name: law.modulus(name, strain) / best.law.modulus(name, strain) - 1.0
         for name, strain in sure.strain.items()
     }
     told = (*sure.undetermined, *notes_of_mesh(sure, mesh))
     return replace(best, certainty=replace(sure, mesh=mesh, undetermined=told))
 
 
-def _step(setup: FitSetup, problem: FitProblem, best: BestFit) -> Array | None:
+def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
     assert best.differentiated is not None
     finer = [
         comparison
@@ -62,7 +66,7 @@ def _step(setup: FitSetup, problem: FitProblem, best: BestFit) -> Array | None:
         for comparison in test.finer(setup.make_solver, weighting, FINER)
     ]
     residual = residual_of(problem, finer, best.differentiated, best.law)
-    return step_to_limit(problem, best.differentiated, residual, FINER)
+    return limit_of(problem, best.differentiated, residual, FINER)
 
 
 def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:

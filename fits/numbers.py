@@ -83,6 +83,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     if sure is not None:
         result["uncertainty"] = {
             "noise": sure.noise,
+            "values_that_err_as_one": sure.alike,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),

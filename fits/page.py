@@ -223,11 +223,17 @@ def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
         for name, s in sigmas.items()
     ]
     note = (
-        "white noise of every test, its misfit or its scatter, whichever is larger; before the "
+        "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
+        "as one counted as one; before the "
         f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
     )
     header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
     return [Table("What each test pins down", header, rows, note)] if rows else []
+
+
+def _together(alike: float) -> str:
+    """How many neighbouring values count as one; nothing where each counts."""
+    return f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
 
 
 def _determined(fit: Fit) -> Sequence[Table]:
@@ -244,10 +250,13 @@ def _determined(fit: Fit) -> Sequence[Table]:
         for name, s in sure.sigma.items()
     ]  # fmt: skip
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
-    noise = ", ".join(f"{value:.2g} {units[name]} ({name})" for name, value in sure.noise.items())
+    noise = ", ".join(
+        f"{value:.2g} {units[name]} ({name}{_together(sure.alike[name])})"
+        for name, value in sure.noise.items()
+    )
     note = (
-        f"white noise of {noise} on everything matched: neighbouring values err together, so "
-        "this flatters; single coefficients are far less certain than the moduli they make. Mesh: "
+        f"noise of {noise} on everything matched; a law or a model of the wrong form is not in it; "
+        "single coefficients are far less certain than the moduli they make. Mesh: "
         "by how much a modulus would be another on ever finer meshes, from one run of a finer "
         "model at the best fit"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from ..materials.forms.base import COMPONENTS, modulus_rows
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .comparison import NoiseIs
+from .correlation import alike_in
 from .problem import Evaluation, FitProblem
 
 Array = NDArray[np.float64]
@@ -85,7 +86,8 @@ def notes_of_misfits(found: Mapping[str, Misfit]) -> list[Note]:
 class Certainty:
     """1-sigma relative uncertainty of each modulus up to the strains reached, and plain words.
 
-    noise : by comparison, in the unit of its data (mm, N). strain, sigma : (n,) by modulus.
+    noise : by comparison, in the unit of its data (mm, N); alike : by comparison, how many
+    neighbouring values err as one. strain, sigma : (n,) by modulus.
     undetermined : what the data do not determine, and what lies on its bound. mesh : (n,) by
     modulus, by how much it would be another on ever finer meshes, relative; None where that is
     not known.
@@ -96,6 +98,7 @@ class Certainty:
     sigma: dict[str, Array]
     undetermined: tuple[Note, ...]
     mesh: dict[str, Array] | None = None
+    alike: dict[str, float] = field(default_factory=dict)
 
     @property
     def total(self) -> dict[str, Array]:
@@ -111,11 +114,12 @@ def certainty(
     """Linear propagation of the noise of every comparison to the moduli.
 
     The noise is the RMS misfit, but not less than the objective's least noise: a misfit of zero
-    (computed data) does not mean that a measurement would determine everything. Assumes white
-    noise; a misfit that is systematic makes the moduli less certain than this says.
+    (computed data) does not mean that a measurement would determine everything. Neighbours that
+    err as one (`correlation.alike`) count as one; a misfit that is less than the noise does not
+    tell them, and is taken for white.
     """
     assert best.jacobian is not None
-    noise, sigma = _noise(problem, best)
+    noise, together, sigma = _noise(problem, best)
     strains, sigmas = _along(problem, law, reached, _covariance(problem, best, sigma))
     first = problem.comparisons[0]
     which = f"at {noise[first.name]:.2g} {first.objective.unit} noise"
@@ -130,7 +134,8 @@ def certainty(
         for name, relative in sigmas.items()
         if relative.max() > UNCERTAIN
     ]
-    return Certainty(noise, strains, sigmas, (*words, *_limited(problem, best)))
+    told = (*words, *_limited(problem, best))
+    return Certainty(noise, strains, sigmas, told, alike=together)
 
 
 def pinned_by(
@@ -147,7 +152,7 @@ def pinned_by(
     its prior, or to ten times the width of its bounds.
     """
     assert best.jacobian is not None
-    _, sigma = _noise(problem, best)
+    _, _, sigma = _noise(problem, best)
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
     j = best.jacobian[rows] / sigma[rows, None]
     before = PRIOR * _sizes(problem, best)
@@ -182,18 +187,25 @@ def _covariance(problem: FitProblem, best: Evaluation, sigma: Array) -> Array:
     return np.asarray(scaled * sizes[:, None] * sizes)
 
 
-def _noise(problem: FitProblem, best: Evaluation) -> tuple[dict[str, float], Array]:
-    """Noise of each comparison in its unit, and of each residual (m,)."""
+def _noise(
+    problem: FitProblem, best: Evaluation
+) -> tuple[dict[str, float], dict[str, float], Array]:
+    """Noise of each comparison in its unit, how many values err as one, and of each residual (m,)
+    the noise that as many independent ones would have."""
     scale = problem.scale
-    noise, sigma = {}, np.empty_like(scale)
+    noise, together, sigma = {}, {}, np.empty_like(scale)
     for k, (name, misfit) in enumerate(misfits(problem, best).items()):
         rows = problem.rows(k)
         noise[name] = max(misfit.noise, misfit.rms)
-        sigma[rows] = noise[name] / scale[rows]
+        objective = problem.comparisons[k].objective
+        together[name] = 1.0
+        if misfit.rms > misfit.noise:
+            together[name] = alike_in(objective, best.residual[rows])
+        sigma[rows] = noise[name] * np.sqrt(together[name]) / scale[rows]
     known = [n for n in problem.unknowns.nuisance.all if n.prior is not None]
     if known:
         sigma[len(sigma) - len(known) :] = [n.weight for n in known]
-    return noise, sigma
+    return noise, together, sigma
 
 
 def _along(

@@ -30,7 +30,8 @@ class Objective(Protocol):
 
     sizes : length of each block, together m; scale (m,): `unit`s in one unit of each residual;
     least_noise in `unit`s, to reckon with at least (its `noise_is`, a `NoiseIs`, is "assumed"
-    where the objective has none); data: all that was measured.
+    where the objective has none); data: all that was measured. One whose neighbouring values may
+    err as one also has `places`, (n, 2) mm of each block's values.
     """
 
     @property

@@ -8,6 +8,7 @@ limit lies, within the same inequalities.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,10 +43,19 @@ def residual_of(
     return np.concatenate([rows, best.residual[own:]])  # priors are of the unknowns
 
 
-def step_to_limit(
-    problem: FitProblem, best: Evaluation, finer: Array, factor: float
-) -> Array | None:
-    """(unknowns,) from the best unknowns to those that the limit of finer models would give.
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """What ever finer models would give.
+
+    step : (unknowns,) from the best unknowns to their own; residual : (m,) what they would leave.
+    """
+
+    step: Array
+    residual: Array
+
+
+def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
+    """Where the optimum of the limit of finer models lies, and what it leaves, to first order.
 
     Parameters
     ----------
@@ -61,7 +71,7 @@ def step_to_limit(
     blocks = problem.blocks
     norms = np.maximum(blocks.norms(best.residual), blocks.norms(error))
     if not (norms > 0).any():
-        return np.zeros_like(best.unknowns)
+        return Limit(np.zeros_like(best.unknowns), best.residual)
     weights = 1.0 / np.maximum(norms, 1e-9 * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     a, c = problem.unknowns.inequalities
@@ -72,4 +82,7 @@ def step_to_limit(
         bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
         for residual in (best.residual, best.residual + error)
     )
-    return None if without is None or there is None else there - without
+    if without is None or there is None:
+        return None
+    step = there - without
+    return Limit(step, best.residual + error + best.jacobian @ step)

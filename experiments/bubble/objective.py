@@ -42,7 +42,8 @@ class FieldTarget:
     (None: the places are the nodes). places : (n,) their numbers, by which the same place is known
     in other targets; needed for a field that is constant. frame : of the model's history, the
     target's own number unless given; since : the frame from which the displacement is counted,
-    None for the reference state.
+    None for the reference state. at_rest : (n, 2) mm, where the places are before the test; needed
+    for what neighbours have in common.
     """
 
     pressure: float
@@ -51,6 +52,7 @@ class FieldTarget:
     places: NDArray[np.intp] | None = None
     frame: int | None = None
     since: int | None = None
+    at_rest: Array | None = None
 
     def at(self, nodal: Array) -> Array:
         """Model displacement (nodes, ...) at the places, (n, ...)."""
@@ -120,6 +122,14 @@ class FieldObjective:
         """Everything measured that the residual depends on."""
         places = [t.sample.data for t in self.targets if t.sample is not None]
         return (*(t.displacement for t in self.targets), *places)
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """(n, 2) mm at rest of every block's values; empty where they are not known."""
+        known = [target.at_rest for target in self.targets if target.at_rest is not None]
+        if len(known) < len(self.targets):
+            return ()
+        return tuple(places for places in known for _ in "xyz")
 
     def shifted(self, here: History, there: History) -> FieldObjective:
         """The objective of a model that moves as `here` where this one moves as `there`."""

@@ -58,6 +58,7 @@ def at_nodes(
             source.evaluate(nodes)
             if isinstance(source, DisplacementSurface)
             else _interpolated(source, mesh),
+            at_rest=nodes,
         )
         for source in sources
     ]
@@ -96,7 +97,10 @@ def at_points(
             before = field.points
         outside += int((~inside).sum())
         _check_scale(test, field, inside)
-        targets.append(FieldTarget(field.pressure, field.displacement[inside], sample))
+        rest = field.points[inside]
+        targets.append(
+            FieldTarget(field.pressure, field.displacement[inside], sample, at_rest=rest)
+        )
     return targets, outside
 
 

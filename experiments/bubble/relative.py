@@ -83,6 +83,7 @@ def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget
                 displacement=moved,
                 sample=sample,
                 places=target.places[mine],
+                at_rest=None if target.at_rest is None else target.at_rest[mine],
                 frame=k,
                 since=since,
             )

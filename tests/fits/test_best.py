@@ -18,7 +18,8 @@ def test_one_analysis_serves_both(together: bf.Fit) -> None:
     assert again.differentiated is again.point and again.point.jacobian is not None
     assert again.certainty is not None and together.best.certainty is not None
     for name, sigma in again.certainty.sigma.items():
-        np.testing.assert_array_equal(sigma, together.best.certainty.sigma[name])
+        # That of the fit is of what finer strips would leave: the same but for rounding.
+        np.testing.assert_allclose(sigma, together.best.certainty.sigma[name], rtol=1e-12)
 
 
 def test_a_surrogate_gives_the_derivatives(together: bf.Fit) -> None:

@@ -15,7 +15,7 @@ from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.fits import mesh_error
 from bubblefit.fits.mesh_error import notes_of_mesh, with_mesh_error
 from bubblefit.identification.assessment import Certainty
-from bubblefit.identification.discretisation import residual_of, step_to_limit
+from bubblefit.identification.discretisation import limit_of, residual_of
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import NoteKind
 
@@ -149,4 +149,19 @@ def test_a_finer_model_of_other_rows_is_refused() -> None:
 def test_nothing_to_move() -> None:
     fitted = fit(own_data=True)
     best = replace(fitted.best.differentiated, residual=0 * fitted.best.differentiated.residual)
-    assert not step_to_limit(fitted.problem, best, best.residual, 2.0).any()
+    limit = limit_of(fitted.problem, best, best.residual, 2.0)
+    assert not limit.step.any() and not limit.residual.any()
+
+
+def test_what_the_mesh_leaves_is_no_noise() -> None:
+    """Data without noise: what is left on the coarse mesh is the mesh's, and mostly gone."""
+    fitted = fit()
+    before = fitted.misfits["bubble"].rms
+    assert before > 0.02
+    assert fitted.best.certainty.noise["bubble"] == 0.05  # the least, whatever is left
+    problem, best = fitted.problem, fitted.best.differentiated
+    (test,) = fitted.setup.tests
+    finer = test.finer(fitted.setup.make_solver, Weighting(), 2.0)
+    limit = limit_of(problem, best, residual_of(problem, finer, best, fitted.law), 2.0)
+    after = float(np.sqrt(np.mean((limit.residual * problem.scale) ** 2)))
+    assert after < 0.5 * before

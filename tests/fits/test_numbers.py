@@ -72,6 +72,7 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
         "versions": versions(),
         "uncertainty": {
             "noise": sure.noise,
+            "values_that_err_as_one": {"one: warp": 1.0, "one: fill": 1.0, "two: warp": 1.0},
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},

@@ -18,7 +18,7 @@ from ..projects import ELONGATION, MODULI
 
 ENDS = {"one": 2.9, "two": 2.5}
 NOISE_NOTE = (
-    " on everything matched: neighbouring values err together, so this flatters; single "
+    " on everything matched; a law or a model of the wrong form is not in it; single "
     "coefficients are far less certain than the moduli they make. Mesh: by how much a modulus "
     "would be another on ever finer meshes, from one run of a finer model at the best fit"
 )
@@ -191,7 +191,7 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
         "noise and residual.",
         text=(3, 4),
     )
-    assert determined.note == f"white noise of {said}{NOISE_NOTE}"
+    assert determined.note == f"noise of {said}{NOISE_NOTE}"
     alone = {}
     for part, value in noise.items():
         test, direction = part.split(": ")
@@ -231,7 +231,8 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
             ["all together", "E1", percent(e1), percent(e1)], ["all together", "E2", e2, e2],
             ["all together", "G12", *unknown],
         ],
-        "white noise of every test, its misfit or its scatter, whichever is larger; before the "
+        "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
+        "as one counted as one; before the "
         "tests every modulus is taken to be known to 1000 %",
     )  # fmt: skip
     (strains, curves, known), drawn = told.calls["plot_moduli"]
