@@ -37,22 +37,24 @@ class Measured:
     def tests(
         self, file: str, first: int, last: int, limit: float, loading: bool = False
     ) -> list[str]:
-        """Those that run a line of a statement; if it runs at import, those of the file, or all.
+        """Those that run a line of a statement; if it runs at import, all: any may show it.
 
         loading : it does. Where a test is the first that needs the module, only that one has run
         the line.
 
-        Tests of the module's own name first, then the quick ones, for `limit` seconds in all.
+        Tests of the module's own name first, then those that run some of it, then the quick ones,
+        for `limit` seconds in all.
         """
         known = self.lines.get(file, {})
         found = set().union(*(known.get(line, set()) for line in range(first, last + 1)))
         if loading or found <= {""}:
             at_import = any(line in known for line in range(first, last + 1))
-            found = set().union(*known.values()) - {""} if at_import else set()
-            # Nothing but declarations: any test may show it.
-            found = found or ({*self.seconds} if at_import else found)
-        own = f"test_{Path(file).stem}"
-        order = sorted(found & {*self.seconds}, key=lambda test: (own not in test, self.cost(test)))
+            found = {*self.seconds} if at_import else set()
+        own, inside = f"test_{Path(file).stem}", set().union(*known.values())
+        order = sorted(
+            found & {*self.seconds},
+            key=lambda test: (own not in test, test not in inside, self.cost(test)),
+        )
         total, chosen = 0.0, []
         for test in order:
             total += self.cost(test)

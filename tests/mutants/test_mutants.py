@@ -94,7 +94,11 @@ def test_tests_of_a_line():
     # A test was the first that needed the module.
     late = Measured({"fits/store.py": {1: {"t::quick"}, 2: {"t::slow", ""}}}, known.seconds)
     assert late.tests("fits/store.py", 1, 1, 60.0) == ["t::quick"]
-    assert late.tests("fits/store.py", 1, 1, 60.0, loading=True) == ["t::quick", "t::slow"]
+    every = ["test_store.py::own", "t::quick", "t::slow"]
+    assert late.tests("fits/store.py", 1, 1, 60.0, loading=True) == every
+    # Those that run some of the module come before those that run none of it.
+    some = Measured({"fits/page.py": {1: {""}, 2: {"t::slow"}}}, known.seconds)
+    assert some.tests("fits/page.py", 1, 1, 60.0)[0] == "t::slow"
     # A module of declarations: no test runs a line of it, and any may show it.
     declared = Measured({"fits/schema.py": {1: {""}}}, known.seconds)
     assert sorted(declared.tests("fits/schema.py", 1, 1, 60.0)) == sorted(known.seconds)
