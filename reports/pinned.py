@@ -61,7 +61,7 @@ def plot_pinned(path: Path | str, strains: ArrayLike, sigma: Mapping[str, ArrayL
             _band(panel, top, len(sets), any(mask[m].any() for mask in lost.values()))
         else:
             most = np.ceil(np.log10(known.max(initial=SMALLEST)))
-            panel.set_ylim(10**low, 10 ** max(most, low + 1))
+            panel.set_ylim(top=10 ** max(most, low + 1))
         panel.set_ylim(bottom=10**low)
         panel.yaxis.set_major_locator(FixedLocator([10.0**d for d in np.arange(low, top + 0.5)]))
         panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
