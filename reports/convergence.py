@@ -71,9 +71,9 @@ def plot_convergence(path: Path | str, models: Sequence[ConvergencePanel], what:
         label = "change to the next finer level, %" if column == 0 else ""
         quiet(axes, SIZES[what], label, title)
     cost = drawn[-1]
-    for rank, model in enumerate(models):
+    for model, colour in zip(models, cycle(NAMED), strict=False):
         label = TITLES.get(model.name, model.name)
-        cost.plot(model.work, model.seconds, "o-", color=NAMED[rank % len(NAMED)], label=label)
+        cost.plot(model.work, model.seconds, "o-", color=colour, label=label)
     _logarithmic(cost)
     quiet(cost, "elements x increments", "seconds", "cost")
     if len(models) > 1:

@@ -84,7 +84,7 @@ def plot_moduli(
         if truth is not None:
             _deviation(axes[1, m], x[0, m], fits[:, m], truth[m], strain, looks, first=m == 0)
     lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
-    order = [look["label"] for look in looks[: 2 if names is None else None]]
+    order = [look["label"] for look in looks]
     shown = {n: lines[n] for n in dict.fromkeys([*order, "known", SIGMA]) if n in lines}
     figure.legend(
         list(shown.values()), list(shown), loc="outside upper right", ncols=4, frameon=False
