@@ -67,7 +67,7 @@ def plot_moduli(
         top = axes[0, m]
         if truth is not None:
             # Wide and pale beneath, so that a fit that lies on it is seen to do so.
-            top.plot(x[0, m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
+            top.plot(given[m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
         if sigma is not None:
             s = np.asarray(sigma, dtype=float)[m]
             top.fill_between(
@@ -82,7 +82,7 @@ def plot_moduli(
         label = "tangent modulus, MPa" if m == 0 else ""
         quiet(top, strain if rows == 1 else "", label, name)
         if truth is not None:
-            _deviation(axes[1, m], x[0, m], fits[:, m], truth[m], strain, looks, first=m == 0)
+            _deviation(axes[1, m], given[m], fits[:, m], truth[m], strain, looks, first=m == 0)
     lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
     order = [look["label"] for look in looks]
     shown = {n: lines[n] for n in dict.fromkeys([*order, "known", SIGMA]) if n in lines}

@@ -136,4 +136,6 @@ def test_gas_in_kilopascal_and_litres(tmp_path: Path, drawn: list[Figure]) -> No
     assert by_volume == pytest.approx(np.array([-0.01 * WAY, 140.0 + 0.01 * WAY]))
     assert by_way == pytest.approx(np.array([WAY, 140.0 + 0.01 * WAY]))
     assert legend(drawn[0]) == ["soft, from 50 litres", "stiff, from 50 litres"]
+    shown = [axes.yaxis.get_tick_params()["labelleft"] for axes in (left, right)]
+    assert shown == [True, False]
     assert "litres" in left.get_xlabel() and "kPa" in left.get_ylabel()

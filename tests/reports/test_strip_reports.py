@@ -183,6 +183,7 @@ def test_named_laws_with_their_own_ranges(tmp_path: Path, drawn: list[Figure]) -
     shear = drawn[0].axes[2]
     assert lines(shear, NAMED[0])[0] == pytest.approx(np.array([STRAINS[2], MODULI[2]]))
     assert lines(shear, NAMED[1])[0] == pytest.approx(np.array([0.4 * STRAINS[2], 2 * MODULI[2]]))
+    assert to_hex(shear.collections[0].get_facecolor()[0]) == to_hex(NAMED[0])
     band = shear.collections[0].get_paths()[0].vertices
     assert band[:, 0].max() == pytest.approx(STRAINS[2, 14])
     assert band[:, 1].min() == pytest.approx(MODULI[2, 0] - 5.0)
