@@ -76,8 +76,8 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     weighted = best.jacobian.T * weights
     a, c = problem.unknowns.inequalities
     curvature = weighted @ best.jacobian
-    # A direction of which the data say nothing stays where it is.
-    curvature += 1e-12 * np.diag(np.diag(curvature))
+    # An unknown of which the data say nothing stays where it is.
+    curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
     without, there = (
         bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
         for residual in (best.residual, best.residual + error)

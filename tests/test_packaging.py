@@ -38,7 +38,7 @@ def shipped() -> set[str]:
         folder = ROOT.joinpath(*package.split(".")[1:])
         files = [f for f in folder.glob("*.py") if f != ROOT / "setup.py"]
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
-    for folder in ("examples", "templates"):
+    for folder in ("examples", "templates", "studies/verification/published"):
         for file in (ROOT / folder).rglob("*"):
             inside = file.relative_to(ROOT)
             if file.is_file() and not any(p.startswith((".", "out")) for p in inside.parts):
