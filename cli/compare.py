@@ -10,7 +10,7 @@ import click
 
 from .fitting import fit_options
 from .options import command_line, data_folders, folder_beside, read_with_solver
-from .progress import StudyProgress
+from .progress import FitsProgress
 
 
 @click.command("compare")
@@ -45,7 +45,7 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     project = project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")})
     starts = options["starts"] or STARTS
     quiet = options["quiet"] or options["as_json"]
-    with FormProgress(starts, quiet) as progress:
+    with FitsProgress(starts, quiet, "{} moduli") as progress:
         comparison = compare_laws(
             project,
             options["tests"] or None,
@@ -67,15 +67,3 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
         f"written to {folder} (open report.html)",
     ]
     click.echo(json.dumps(result, indent=1) if options["as_json"] else "\n".join(lines))
-
-
-class FormProgress(StudyProgress):
-    """The form whose turn it is; its starts, then its folds."""
-
-    def saw(self, record: Any) -> None:
-        """Take note of a form that begins, of a start or a fold that ended, or of time passing."""
-        if isinstance(record, str):
-            self.done, self.best = 0, None
-            if not self.quiet:
-                click.echo(f"{record} moduli", err=True)
-        super().saw(record)

@@ -112,7 +112,7 @@ class StudyProgress(CountProgress):
         self.best: float | None = None
         self.analyses = 0
 
-    def saw(self, record: EvaluationRecord | StartRecord | None) -> None:
+    def saw(self, record: object) -> None:
         """Take note of a record, or of time passing."""
         if isinstance(record, EvaluationRecord):
             self.analyses += 1
@@ -126,6 +126,25 @@ class StudyProgress(CountProgress):
         """Best objective so far, analyses, time left."""
         best = "none yet" if self.best is None else f"{self.best:.3g}"
         return f"best e {best}, {self.analyses} analyses, {self.left()}"
+
+
+class FitsProgress(StudyProgress):
+    """Several fits in turn: the words of the one whose turn it is, then its starts.
+
+    said : of the fit, with {} for its name.
+    """
+
+    def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
+        super().__init__(total, quiet)
+        self.said_of_fit = said
+
+    def saw(self, record: object) -> None:
+        """Take note of a fit that begins, of a start or a fold that ended, or of time passing."""
+        if isinstance(record, str):
+            self.done, self.best = 0, None
+            if not self.quiet:
+                print(self.said_of_fit.format(record), file=sys.stderr, flush=True)
+        super().saw(record)
 
 
 class RunsProgress(CountProgress):

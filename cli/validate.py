@@ -17,7 +17,7 @@ from .options import (
     read_with_solver,
     result_folder,
 )
-from .progress import StudyProgress
+from .progress import FitsProgress
 
 
 @click.command("validate")
@@ -63,15 +63,3 @@ def command(forms: tuple[str, ...], cards: tuple[str, ...], **options: Any) -> N
     lines = [*validation.lines(), *note_lines(validation.notes), f"written to {folder}"]
     said = json.dumps(validation.result, indent=1) if options["as_json"] else "\n".join(lines)
     click.echo(said)
-
-
-class FitsProgress(StudyProgress):
-    """The fit whose turn it is, and its starts."""
-
-    def saw(self, record: Any) -> None:
-        """Take note of a fit that begins, of a start that ended, or of time passing."""
-        if isinstance(record, str):
-            self.done, self.best = 0, None
-            if not self.quiet:
-                click.echo(record, err=True)
-        super().saw(record)

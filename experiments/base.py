@@ -8,7 +8,7 @@ is told by the test itself. Nothing outside a folder of this package asks which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -348,6 +348,12 @@ class PredictedRun:
         """Test and card; and the wall where it is the other end of a band."""
         of = f"{self.test.name} with {self.card}"
         return of if self.predicted else f"{of}, {self.wall}"
+
+
+def band_of(runs: Iterable[PredictedRun]) -> list[BandEnd]:
+    """The ends of the band that the solver gave, first what is predicted; empty without one."""
+    ends = [run.end for run in runs if run.end is not None]
+    return list({end.name: end for end in ends}.values())
 
 
 class Predicted(Protocol):

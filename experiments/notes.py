@@ -37,6 +37,15 @@ def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
     return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
+def beyond(reached: Array, ends: Array) -> list[tuple[str, float, float]]:
+    """Name, strain and end of each strain of `reached` (3,) that is beyond its end of `ends`."""
+    return [
+        (name, float(s), float(end))
+        for name, s, end in zip(STRAINS, reached, ends, strict=True)
+        if s > end * BEYOND
+    ]
+
+
 def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
     """Where strains (3,) leave the range that a card is valid for."""
     return [
@@ -44,8 +53,7 @@ def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
             NoteKind.BEYOND_CARD,
             f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there",
         )
-        for name, s, end in zip(STRAINS, reached, card.law.strain_range, strict=True)
-        if s > end * BEYOND
+        for name, s, end in beyond(reached, card.law.strain_range)
     ]
 
 
@@ -65,8 +73,7 @@ def beyond_range(reached: Array, ends: Array) -> list[Note]:
             f"{name} strain reached {s:.3f}, beyond law.strain_range {end:.4g}: the modulus was "
             "held at its end value there; a wider range would let it vary",
         )
-        for name, s, end in zip(STRAINS, reached, ends, strict=True)
-        if s > end * BEYOND
+        for name, s, end in beyond(reached, ends)
     ]
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..experiments.base import Predicted, PredictedOutcome, PredictedRun
+from ..experiments.base import Predicted, PredictedOutcome, PredictedRun, band_of
 from ..experiments.registry import kind_named
 from ..notes import Note, as_note, marks
 from ..notes import lines as note_lines
@@ -90,8 +90,7 @@ class Predictions:
     @property
     def band(self) -> list[BandEnd]:
         """The ends of the solver's band, first what is predicted; empty where there is none."""
-        ends = [run.end for run in self.each if run.end is not None]
-        return list({end.name: end for end in ends}.values())
+        return band_of(self.each)
 
     @property
     def worst(self) -> float | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..experiments.base import MakeSolver, PreparedTest, Weighting
-from ..experiments.notes import BEYOND, STRAINS, strains_of, unstable_words
+from ..experiments.notes import beyond, strains_of, unstable_words
 from ..identification.bounds import LawBounds
 from ..identification.methods.descent import descend
 from ..identification.problem import Evaluation, FitProblem
@@ -75,17 +75,15 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
     notes = []
     for comparison, history in zip(problem.comparisons, point.histories, strict=True):
         part = comparison.name if len(problem.comparisons) > 1 else ""
-        reached = zip(STRAINS, strains_of(history), law.strain_range, strict=True)
-        beyond = [
+        words = [
             Note(
                 NoteKind.BEYOND_CARD,
                 f"{strain} strain {at:.3f} is beyond {end:.3f}, up to which the law is known: "
                 "modulus held there",
                 part,
             )
-            for strain, at, end in reached
-            if at > end * BEYOND
+            for strain, at, end in beyond(strains_of(history), law.strain_range)
         ]
         unstable = [Note(n.kind, str(n), part) for n in unstable_words(history.unstable)]
-        notes += [*beyond, *unstable]
+        notes += [*words, *unstable]
     return notes

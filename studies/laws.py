@@ -13,7 +13,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..experiments.base import FittableTest
-from ..fits.fit import Event, fit
+from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import prepare_fit
@@ -22,6 +22,7 @@ from ..notes import Note, NoteKind
 from .fold_record import validated_folds
 from .folds import FoldError, errors, part_of_objective, specimens_of
 from .law_candidates import candidates, plain
+from .stored_fit import stored_fit
 
 #: Of the smallest cross-validated error: a simpler form within it is as good.
 AS_GOOD = 0.05
@@ -184,17 +185,15 @@ def compare_laws(
     for name, own in projects.items():
         tell(name)
         place = None if folder is None else folder / plain(name)
-        found = fit(
+        found = stored_fit(
             own,
             [test.name for test in chosen],
-            out=place,
-            resume=resume and place is not None and Store(place).used,
+            place,
+            resume=resume,
             overwrite=overwrite,
             progress=tell,
             command_line=command_line,
         )
-        if place is not None:
-            found.report(place)
         errors = validated_folds(setups[name], found, folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return LawComparison(tuple(done), fold_starts)

@@ -9,7 +9,7 @@ from typing import cast
 from .. import __version__
 from ..errors import InputError
 from ..experiments.base import FittableTest, PreparedTest
-from ..fits.fit import Event, fit
+from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import prepare_fit
@@ -17,6 +17,7 @@ from ..fits.store import Store
 from ..materials.card import MaterialCard, thickness_difference
 from .held_out import HeldOut, held_out
 from .law_candidates import candidates, plain
+from .stored_fit import stored_fit
 from .validated import Judged, Validation
 
 STARTS = 3
@@ -69,13 +70,10 @@ def validate(
     def fitted(own: Project, name: str, names: Sequence[str], place: str) -> Fit:
         tell(name)
         into = None if folder is None else folder / place
-        found = fit(
-            own, names, out=into, resume=resume and into is not None and Store(into).used,
-            overwrite=overwrite, progress=tell, command_line=command_line,
+        return stored_fit(
+            own, names, into, resume=resume, overwrite=overwrite, progress=tell,
+            command_line=command_line,
         )  # fmt: skip
-        if into is not None:
-            found.report(into)
-        return found
 
     for form, own in projects.items():
         names = [test.name for test in chosen]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frames import Frame
+from ..outline import Outline
 from .directions import in_all_quarters
 
 Array = NDArray[np.float64]
@@ -38,19 +39,9 @@ class RigidMotion:
 UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), float("nan"), 0)
 
 
-def clamp_points(
-    points: Array, semi_axes: tuple[float, float], angle: float = 0.0
-) -> NDArray[np.bool_]:
+def clamp_points(points: Array, outline: Outline) -> NDArray[np.bool_]:
     """Which of the points (n, 3), about the rim's centre in its plane, are beyond the rim."""
-    return rim_share(points, semi_axes, angle) > BEYOND
-
-
-def rim_share(points: Array, semi_axes: tuple[float, float], angle: float = 0.0) -> Array:
-    """(n,) of the points (n, 3): 0 at the rim's centre, 1 on the rim."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    x, y = points[:, 0], points[:, 1]
-    along, across = (c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]
-    return np.asarray(np.hypot(along, across))
+    return outline.share(points[:, :2]) > BEYOND
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:

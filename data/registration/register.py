@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..frames import Frame
+from ..outline import Outline
 from .clamp import (
     LEAST,
     UNKNOWN,
     RigidMotion,
     clamp_motion,
     clamp_points,
-    rim_share,
     without,
 )
 from .directions import in_all_quarters, line_angle
@@ -123,11 +123,11 @@ def register(
         # Which points lie on the clamp, or at the edge, is known once there is a centre.
         angle = _rim_angle(placement, rim, options)
         places = placement.places(reference.points)
-        points, plane_of = _rim_points(places, semi_axes, angle, options)
+        points, plane_of = _rim_points(places, Outline(*semi_axes, angle), options)
         placement, flatness = plane_through(reference.points[points], up)
         placement, rim = _centred(frames, placement, semi_axes, options)
     moved = all_applied(placement, frames)
-    motions = _motions(moved, semi_axes, _rim_angle(placement, rim, options))
+    motions = _motions(moved, Outline(*semi_axes, _rim_angle(placement, rim, options)))
     if options.remove_clamp_motion:
         moved = tuple(without(f, m) for f, m in zip(moved, motions, strict=True))
     angle, warp = _warp(moved, placement, semi_axes, rim, options)
@@ -196,24 +196,22 @@ def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptio
 
 
 def _rim_points(
-    points: Array, semi_axes: tuple[float, float], angle: float, options: RegistrationOptions
+    points: Array, outline: Outline, options: RegistrationOptions
 ) -> tuple[NDArray[np.bool_], str]:
-    beyond = clamp_points(points, semi_axes, angle)
+    beyond = clamp_points(points, outline)
     seen = beyond.sum() >= LEAST and in_all_quarters(points[beyond])
     if options.plane == "clamp" and not seen:
         problem = "too few points beyond the rim to lay a plane through the clamp; choose 'edge'"
         raise InputError(None, "plane", problem)
     if seen and options.plane != "edge":
         return beyond, "clamp"
-    return (rim_share(points, semi_axes, angle) > EDGE) & ~beyond, "edge"
+    return (outline.share(points[:, :2]) > EDGE) & ~beyond, "edge"
 
 
-def _motions(
-    frames: Sequence[Frame], semi_axes: tuple[float, float], angle: float
-) -> tuple[RigidMotion, ...]:
+def _motions(frames: Sequence[Frame], outline: Outline) -> tuple[RigidMotion, ...]:
     found = []
     for frame in frames:
-        clamp = clamp_points(frame.points, semi_axes, angle)
+        clamp = clamp_points(frame.points, outline)
         found.append(clamp_motion(frame, clamp) if clamp.any() else UNKNOWN)
     return tuple(found)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from ...solvers.base import BandEnd
-from ..base import Exhibit, Output, PredictedRun
+from ..base import Exhibit, Output, PredictedRun, band_of
 from .measures import BendingMeasures, Point, bending_measures
 from .record import BendingRun, run_of
 from .tables import columns_of, curve_of, terminal_table
@@ -42,8 +42,7 @@ class CylinderOutcome:
     @cached_property
     def band(self) -> Sequence[BandEnd]:
         """The ends of the band that the solver gives, first what is predicted; or none."""
-        ends = [run.end for run in self.runs if run.end is not None]
-        return list({end.name: end for end in ends}.values())
+        return band_of(self.runs)
 
     def other_end(self, number: int) -> BendingRun | None:
         """Of the band of a run: with the same card in the same test, where it did not fail."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...solvers.bars import BARS, TOLERANCE
 from ...solvers.calculix.diagnosis import diagnose
 from ...solvers.calculix.solver import CalculixSolver
 from .abaqus import SOURCE as ABAQUS
 from .abaqus import cases, shapes
-from .bars import SOURCE as MARC
+from .bars import end_stresses
 from .number import Number
 
 #: Test and model of Abaqus' bubble. Shells of 432 quads a disk are 0.3 % off at most.
@@ -21,9 +20,7 @@ def with_calculix() -> Iterator[Number]:
     usable = next((one for one in diagnose() if one.usable), None)
     if usable is None or usable.stresses is None or usable.path is None:
         return
-    for bar, stress in zip(BARS, usable.stresses, strict=True):
-        what = f"CalculiX: end stress, {bar.model} {bar.direction} bar"
-        yield Number(what, stress, bar.stress, "MPa", TOLERANCE, MARC)
+    yield from end_stresses(usable.stresses, "CalculiX: ")
     rows = dict(cases())[CASE]
     found = shapes(rows, ELEMENTS, CalculixSolver(usable.path))
     for i in (len(rows) // 2, len(rows) - 1):

@@ -13,6 +13,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.closed import half_tube, sphere_octant, tube_warp
 from ...meshes.mesh import Mesh
 from ...models.inflated import InflatedModel
+from ...solvers.base import History
 from ...solvers.membrane.solver import MembraneSolver
 from .number import Number
 
@@ -70,34 +71,60 @@ def sphere_strain(pressure: float) -> float:
 
 def middle_of_tube(pressures: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
     """Radius (mm), axial and hoop stress (MPa) in the middle of a tube with flat caps."""
-    length, across = 600.0, 24
-    mesh = half_tube(across, 12, RADIUS, length)
+    model, solver = tube_model(24, 12, 600.0, pressures), MembraneSolver(1e-9)
+    return in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
+
+
+def tube_model(
+    across: int,
+    along: int,
+    length: float,
+    pressures: Sequence[float] | NDArray[np.float64],
+    caps: bool = True,
+) -> InflatedModel:
+    """Half of half a tube: x >= 0, z >= 0, its lowest node in the middle held up.
+
+    across, along : facets. caps : a flat one at the end, which otherwise keeps its place along z.
+    """
+    mesh = half_tube(across, along, RADIUS, length, caps)
     hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
     mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
-    supports = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
+    supports: dict[str, tuple[int, ...]] = {
+        "symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)
+    }  # fmt: skip
+    if not caps:
+        supports["end"] = (2,)
     warp = tube_warp(mesh, length)
-    model = InflatedModel(mesh, THICKNESS, warp, list(pressures), supports, copies=4)
-    return in_the_middle(model, ISOTROPIC)
+    return InflatedModel(mesh, THICKNESS, warp, list(pressures), supports, copies=4)
 
 
-def in_the_middle(model: InflatedModel, law: HypoelasticLaw) -> tuple[float, float, float]:
-    """Radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure."""
-    solver = MembraneSolver(1e-9)
-    history = solver.run(model, law)
+def in_the_middle(
+    model: InflatedModel, history: History, stress: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure.
+
+    stress : (quads, points, 3) MPa, at the last pressure.
+    """
     near = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
     ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
     height = (model.mesh.points + history.displacement[-1])[ring, 1]
-    axial, hoop, _ = solver.stress[near].mean(axis=(0, 1))
+    axial, hoop, _ = stress[near].mean(axis=(0, 1))
     return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
+
+
+def sphere_model(
+    n: int, pressures: Sequence[float], warp: tuple[float, float, float] = (0.3, 0.2, 1.0)
+) -> InflatedModel:
+    """An octant of 3 n^2 facets."""
+    mesh = sphere_octant(n, RADIUS)
+    return InflatedModel(mesh, THICKNESS, warp, list(pressures), OCTANT, copies=8)
 
 
 def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
     """Radius (mm), volume (mm^3) and stress (MPa) of a sphere at the last pressure."""
-    mesh = sphere_octant(12, RADIUS)
-    model = InflatedModel(mesh, THICKNESS, (0.3, 0.2, 1.0), list(pressures), OCTANT, copies=8)
-    solver = MembraneSolver(1e-9)
+    model, solver = sphere_model(12, pressures), MembraneSolver(1e-9)
     history = solver.run(model, ISOTROPIC)
-    radius = np.linalg.norm(mesh.points + history.displacement[-1], axis=1).mean()
+    radius = np.linalg.norm(model.mesh.points + history.displacement[-1], axis=1).mean()
     volume = history.cavity_volume
     assert volume is not None
     return float(radius), float(volume[-1]), float(solver.stress[..., :2].mean())

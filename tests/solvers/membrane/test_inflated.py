@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.closed import half_tube, sphere_octant, tube_warp
-from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strain import log_strain_of
 from bubblefit.models.gas import ClosedGas
 from bubblefit.models.inflated import InflatedModel
@@ -20,32 +18,23 @@ from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.wall import Wall
-from bubblefit.studies.verification.thin_walls import capped_strain
+from bubblefit.studies.verification.thin_walls import (
+    ISOTROPIC,
+    NU,
+    RADIUS,
+    THICKNESS,
+    E,
+    capped_strain,
+    in_the_middle,
+)
+from bubblefit.studies.verification.thin_walls import sphere_model as sphere
+from bubblefit.studies.verification.thin_walls import tube_model as tube
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ...published_laws import TABLE_4_2
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
-E, NU, THICKNESS, RADIUS = 300.0, 0.3, 0.8, 75.0
-ISOTROPIC = HypoelasticLaw.linear(E, E, 0.5 * E / (1 + NU), NU)
-OCTANT = {"symmetry_x": (0,), "symmetry_y": (1,), "symmetry_z": (2,)}
-
-
-def sphere(n: int, pressures, warp=(0.3, 0.2, 1.0)) -> InflatedModel:
-    return InflatedModel(sphere_octant(n, RADIUS), THICKNESS, warp, pressures, OCTANT, copies=8)
-
-
-def tube(across: int, along: int, length: float, pressures, caps=True) -> InflatedModel:
-    """Half of half a tube: x >= 0, z >= 0, its lowest node in the middle held up."""
-    mesh = half_tube(across, along, RADIUS, length, caps)
-    hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
-    mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
-    supports = {"symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)}
-    if not caps:
-        supports["end"] = (2,)
-    warp = tube_warp(mesh, length)
-    return InflatedModel(mesh, THICKNESS, warp, pressures, supports, copies=4)
 
 
 def run(model: InflatedModel, law: HypoelasticLaw = ISOTROPIC, tolerance: float = 1e-9):
@@ -239,15 +228,6 @@ def test_sphere_against_the_closed_form() -> None:
     assert [order(e, 12 / 8) for e in np.array(errors).T] == pytest.approx([2.0] * 3, abs=0.15)
 
 
-def middle(model: InflatedModel, history, m) -> tuple[float, float, float]:
-    """Radius (mm), axial and hoop stress (MPa) in the middle of a tube."""
-    near = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
-    ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
-    height = (model.mesh.points + history.displacement[-1])[ring, 1]
-    axial, hoop, _ = m.stress_old[near].mean(axis=(0, 1))
-    return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
-
-
 @pytest.mark.parametrize(("law", "pressure"), [(ISOTROPIC, 0.02), (ISOTROPIC, 0.2), (LAW, 0.14)])
 def test_long_capped_tube_against_the_closed_form(law: HypoelasticLaw, pressure: float) -> None:
     """Middle of a tube with flat caps, from the slack state: hoop p r/t, axial half of it."""
@@ -259,7 +239,7 @@ def test_long_capped_tube_against_the_closed_form(law: HypoelasticLaw, pressure:
     for across in (8, 16, 24):
         model = tube(across, 12, 600.0, pressures)
         history, m = run(model, law)
-        found = middle(model, history, m)
+        found = in_the_middle(model, history, m.stress_old)
         near = np.argmin(np.abs(model.mesh.points[:, 2] - 600.0 / 4))
         stretch = np.log1p(history.displacement[-1, near, 2] / model.mesh.points[near, 2])
         errors.append(
