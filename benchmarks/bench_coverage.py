@@ -19,7 +19,7 @@ from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.bubble.sources import KnownSolution
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.fits.best import best_fit
-from bubblefit.fits.mesh_error import with_mesh_error
+from bubblefit.fits.budget import with_certainty
 from bubblefit.fits.setup import FitSetup, prepare_fit
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.methods.lm import LevenbergMarquardt
@@ -71,7 +71,7 @@ def main() -> None:
             continue
         y, b = (tuple(v.tolist()) for v in (optimum.best.unknowns, optimum.coefficients))
         record = StartRecord(number, (0, 0), optimum.value, optimum.status, 0, y, b, 0.0)
-        best = with_mesh_error(one, problem, best_fit(problem, [record], 1e-7))
+        best = with_certainty(one, problem, best_fit(problem, [record], 1e-7))
         sure = best.certainty
         assert sure is not None and sure.mesh is not None
         white = 1 / np.sqrt(sure.alike["bubble"])

@@ -19,6 +19,7 @@ from types import FrameType
 
 import bubblefit as bf
 from bubblefit.fits.best import best_fit
+from bubblefit.fits.budget import with_certainty
 from bubblefit.fits.result import Fit
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.fits.start import run_start
@@ -75,7 +76,8 @@ def walk() -> dict[str, list[str]]:
             record = run_start(problem, setup.options, project.fit.seed, 0, lambda _: None)
         step("fit from one start")
         with entered(modules):
-            fit = Fit(setup, problem, best_fit(problem, [record], project.fit.tolerance), 0.0)
+            best = best_fit(problem, [record], project.fit.tolerance)
+            fit = Fit(setup, problem, with_certainty(setup, problem, best), 0.0)
             _ = fit.card, fit.findings
         step("assess the best")
         with entered(modules):

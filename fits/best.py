@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverFailure
 from ..experiments.notes import strains_of
-from ..identification.assessment import Certainty, certainty
+from ..identification.assessment import Certainty
 from ..identification.blocks import Blocks
 from ..identification.problem import Evaluation, FitProblem
 from ..materials.law import HypoelasticLaw
@@ -35,7 +35,8 @@ class BestFit:
         that differentiates, where it could.
     ranked : the starts that ended with a fit, best first, the best with the objective of `point`;
         records : all of them, by number.
-    reached : (3,) largest strain (eps1, eps2, gamma12) in all tests.
+    reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. certainty : of
+        `budget.with_certainty`; None before it, and where there are no derivatives.
     """
 
     point: Evaluation
@@ -44,7 +45,7 @@ class BestFit:
     ranked: Sequence[StartRecord]
     records: Sequence[StartRecord]
     reached: Array
-    certainty: Certainty | None
+    certainty: Certainty | None = None
 
     @property
     def objective(self) -> float:
@@ -89,9 +90,7 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
     law = problem.law.with_beta(problem.unknowns.beta(unknowns))
     slopes = point if leading is problem else leading.evaluate(unknowns, True, warm=False)
-    valid = np.minimum(reached, law.strain_range)
-    sure = certainty(leading, slopes, law, valid) if slopes is not None else None
-    return BestFit(point, slopes, law, ranked, again, reached, sure)
+    return BestFit(point, slopes, law, ranked, again, reached)
 
 
 def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:

@@ -11,10 +11,10 @@ from ..errors import NoFeasibleStart, SolverFailure
 from ..experiments.base import FittableTest
 from ..identification.problem import FitProblem
 from .best import BestFit, best_fit
+from .budget import with_certainty
 from .doubts import judge
 from .facts import facts_of, solver_facts
 from .failure_page import failure_page
-from .mesh_error import with_mesh_error
 from .processes import run_starts
 from .project import Project, cores
 from .record import Record, data_rows, this_run
@@ -97,7 +97,7 @@ def fit(
         done = files.begin(resume)
     with failure_page(None if out is None else Path(out), project.title):
         records = _records(setup, files, done, progress or _nobody)
-        best = with_mesh_error(setup, problem, _best(problem, records, project))
+        best = with_certainty(setup, problem, _best(problem, records, project))
     return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverFailure
 from ..experiments.refinable import Refinable
-from ..identification.assessment import Certainty, certainty
+from ..identification.assessment import Certainty
 from ..identification.discretisation import Limit, limit_of, residual_of
 from ..identification.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
+from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .best import BestFit
 from .setup import FitSetup
@@ -25,40 +23,20 @@ FINER = 2.0
 LEAST = 0.01
 
 
-def with_mesh_error(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
-    """The best fit, its certainty with what the mesh does to the moduli.
+def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
+    """Where ever finer meshes would take the best fit, and what they would leave.
 
-    What the mesh leaves is then no noise: that is what finer models would leave.
+    None where its derivatives are not known, where another program runs the tests (a finer run of
+    it is not made unasked), or where a kind of test knows no finer model.
 
-    As it is where its derivatives are not known, where another program runs the tests (a finer
-    run of it is not made unasked), or where a kind of test knows no finer model.
+    Raises
+    ------
+    InputError, SolverFailure : the finer model cannot be made or does not run.
     """
-    sure, slopes = best.certainty, best.differentiated
-    if sure is None or slopes is None or problem.solver.external:
-        return best
+    if best.differentiated is None or problem.solver.external:
+        return None
     if not all(isinstance(test, Refinable) for test in setup.tests):
-        return best
-    try:
-        limit = _limit(setup, problem, best)
-    except (InputError, SolverFailure) as error:
-        words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
-        sure = replace(sure, undetermined=(*sure.undetermined, Note(NoteKind.MESH, words)))
-        return replace(best, certainty=sure)
-    if limit is None:
-        return best
-    left = replace(slopes, residual=limit.residual)
-    sure = certainty(problem, left, best.law, best.valid)
-    law = best.law.with_beta(problem.unknowns.beta(slopes.unknowns + limit.step))
-    mesh = {
-        name: law.modulus(name, strain) / best.law.modulus(name, strain) - 1.0
-        for name, strain in sure.strain.items()
-    }
-    told = (*sure.undetermined, *notes_of_mesh(sure, mesh))
-    return replace(best, certainty=replace(sure, mesh=mesh, undetermined=told))
-
-
-def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
-    assert best.differentiated is not None
+        return None
     finer = [
         comparison
         for test, weighting in zip(setup.tests, setup.weightings, strict=True)
@@ -67,6 +45,13 @@ def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
     ]
     residual = residual_of(problem, finer, best.differentiated, best.law)
     return limit_of(problem, best.differentiated, residual, FINER)
+
+
+def moved_moduli(
+    law: HypoelasticLaw, there: HypoelasticLaw, strain: dict[str, Array]
+) -> dict[str, Array]:
+    """(n,) by modulus: how much larger each is by another law, relative, at strains (n,)."""
+    return {name: there.modulus(name, x) / law.modulus(name, x) - 1.0 for name, x in strain.items()}
 
 
 def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:

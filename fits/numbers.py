@@ -13,7 +13,8 @@ import numpy as np
 
 from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
-from ..identification.assessment import notes_of_misfits, pinned_by
+from ..identification.assessment import pinned_by
+from ..identification.noise import notes_of_misfits
 from ..notes import Note, NoteKind, as_note, rows
 from .store import PROVENANCE
 
@@ -110,7 +111,7 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
     From all together as they are weighted in the fit: the very uncertainty that it reports.
     """
     point, sure = fit.best.differentiated, fit.best.certainty
-    if point is None or sure is None or len(fit.setup.tests) < 2:
+    if point is None or sure is None or sure.rows is None or len(fit.setup.tests) < 2:
         return {}
     leading = fit.problem.surrogate or fit.problem
     names = [c.name for c in fit.problem.comparisons]
@@ -118,8 +119,8 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
         name: [names.index(c.name) for c in fitted.comparisons]
         for name, fitted in fit.tests.items()
     }
-    sigma = partial(pinned_by, leading, point, fit.law, fit.best.valid)
-    alone = {name: sigma(own) for name, own in numbers.items()}
+    sigma = partial(pinned_by, leading, point, fit.law, fit.best.valid, noise=sure.rows)
+    alone = {name: sigma(numbers=own) for name, own in numbers.items()}
     return {**alone, TOGETHER: dict(sure.sigma)}
 
 
@@ -134,7 +135,7 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
             }
             for name, s in sigmas.items()
         }
-        for source, sigmas in pinned(fit).items()
+        for source, sigmas in fit.pinned.items()
     }
 
 

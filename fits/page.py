@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.assessment import PRIOR
+from ..identification.propagation import PRIOR
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
@@ -25,7 +25,6 @@ from ..reports import (
     write_report,
 )
 from ..writing import replacing
-from .numbers import pinned
 from .store import RESULT, Store
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ def _page(fit: Fit, folder: Path) -> Report:
     shown = list(exhibits.values())
     runs = result["external_runs"]
     external = [(f"of them by {project.fit.solver}", runs)] if runs else []
-    pins = pinned(fit)
+    pins = fit.pinned
     own = [
         (label if len(shown) == 1 else f"{name}: {label}", value)
         for name, exhibit in exhibits.items()

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
 from ..experiments.doubts import Judgement
-from ..identification.assessment import Misfit, misfits
+from ..identification.noise import Misfit, misfits
 from ..identification.problem import FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
@@ -25,6 +26,8 @@ from .setup import FitSetup
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Array = NDArray[np.float64]
 
 #: Laws of the best starts that are drawn together.
 BEST = 5
@@ -106,7 +109,7 @@ class Fit:
     @cached_property
     def misfits(self) -> dict[str, Misfit]:
         """What is left of every comparison beside the noise of its data, by name."""
-        return misfits(self.problem, self.best.point)
+        return misfits(self.problem, self.best.point.residual)
 
     @cached_property
     def notes(self) -> list[Note]:
@@ -114,6 +117,13 @@ class Fit:
         from .numbers import notes_of_fit, pinned_numbers
 
         return notes_of_fit(self, pinned_numbers(self))
+
+    @cached_property
+    def pinned(self) -> dict[str, dict[str, Array]]:
+        """(n,) 1 sigma of each modulus along its strains, from each test alone and from all."""
+        from .numbers import pinned
+
+        return pinned(self)
 
     def moduli(self) -> pd.DataFrame:
         """E1, E2 and G12 (MPa) along their strains, with one standard deviation.

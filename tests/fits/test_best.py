@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.fits.best import UNTOLD, best_fit, noise_of
+from bubblefit.fits.budget import with_certainty
 
 
 def test_one_analysis_serves_both(together: bf.Fit) -> None:
@@ -16,10 +17,10 @@ def test_one_analysis_serves_both(together: bf.Fit) -> None:
     problem = together.setup.problem()
     again = best_fit(problem, together.best.records, 0.0)
     assert again.differentiated is again.point and again.point.jacobian is not None
-    assert again.certainty is not None and together.best.certainty is not None
-    for name, sigma in again.certainty.sigma.items():
-        # That of the fit is of what finer strips would leave: the same but for rounding.
-        np.testing.assert_allclose(sigma, together.best.certainty.sigma[name], rtol=1e-12)
+    sure, known = with_certainty(together.setup, problem, again).certainty, together.best.certainty
+    assert again.certainty is None and sure is not None and known is not None
+    for name, sigma in sure.sigma.items():
+        np.testing.assert_allclose(sigma, known.sigma[name], rtol=1e-12)
 
 
 def test_a_surrogate_gives_the_derivatives(together: bf.Fit) -> None:
@@ -29,10 +30,11 @@ def test_a_surrogate_gives_the_derivatives(together: bf.Fit) -> None:
     again = best_fit(problem, together.best.records, 0.0)
     assert again.point.jacobian is None
     assert again.differentiated is not None and again.differentiated.jacobian is not None
-    assert again.certainty is not None
+    assert with_certainty(together.setup, problem, again).certainty is not None
     surrogate.evaluate = lambda *_, **__: None  # type: ignore[method-assign]
     again = best_fit(problem, together.best.records, 0.0)
-    assert again.differentiated is None and again.certainty is None
+    assert again.differentiated is None
+    assert with_certainty(together.setup, problem, again) is again
 
 
 @pytest.mark.parametrize(("external", "tries"), [(True, 2), (False, 1)])

@@ -12,7 +12,8 @@ import pytest
 from bubblefit.cli.fitting import lines_of
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
-from bubblefit.identification.assessment import Misfit, certainty, notes_of_misfits
+from bubblefit.identification.assessment import certainty
+from bubblefit.identification.noise import Misfit, notes_of_misfits
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports.html import number
 

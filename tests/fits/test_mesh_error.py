@@ -13,7 +13,8 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.fits import mesh_error
-from bubblefit.fits.mesh_error import notes_of_mesh, with_mesh_error
+from bubblefit.fits.budget import with_certainty
+from bubblefit.fits.mesh_error import notes_of_mesh
 from bubblefit.identification.assessment import Certainty
 from bubblefit.identification.discretisation import limit_of, residual_of
 from bubblefit.materials.forms.base import COMPONENTS
@@ -118,11 +119,11 @@ def test_strips_are_asked_on_finer_quads(tmp_path: Any) -> None:
 
 def test_where_it_cannot_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
     fitted = fit()
-    plain = replace(fitted.best, certainty=replace(fitted.best.certainty, mesh=None))
+    plain = replace(fitted.best, certainty=None)
 
     def again(**changes: Any) -> Certainty | None:
         setup = replace(fitted.setup, **changes)
-        return with_mesh_error(setup, fitted.problem, plain).certainty
+        return with_certainty(setup, fitted.problem, plain).certainty
 
     class Unable:
         """A test of a kind that has nothing finer."""

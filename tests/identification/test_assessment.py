@@ -9,15 +9,14 @@ import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.identification.assessment import (
     Certainty,
-    Misfit,
     _on_bounds,
     certainty,
     moduli_error,
-    notes_of_misfits,
     pinned_by,
 )
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.methods.descent import descend
+from bubblefit.identification.noise import Misfit, Noise, notes_of_misfits
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
 from bubblefit.identification.problem import Evaluation, FitProblem
 from bubblefit.identification.unknowns import Unknowns
@@ -68,10 +67,13 @@ def test_certainty_predicts_the_scatter_of_noisy_fits() -> None:
     assert predicted.noise["bubble"] == pytest.approx(noise, rel=0.03)  # of 1281 values: 2 %
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANT.to_coefficients @ scatter / moduli, rel=0.03)
-    (words,) = predicted.undetermined
-    assert words.startswith(f"G12 is uncertain by up to {100 * sigma[0]:.0f} % (1 sigma at 0.05 mm")
-    best, _ = descend(fit, point, 1e-7, 10**6)
-    off = best.unknowns - truth - follows(point, -point.residual)
+    assert not predicted.undetermined
+    thrice = certainty(fit, point, FLAT_LAW, clean.strain_max, 3 * point.residual)
+    assert thrice.sigma["G12"][0] == pytest.approx(3 * sigma[0])
+    (words,) = thrice.undetermined
+    assert words.startswith(f"G12 is uncertain by up to {300 * sigma[0]:.0f} % (1 sigma at 0.15 mm")
+    best, _ = descend(fit, point, 1e-7, 10**6, norms=True)
+    off = best.unknowns - truth - follows(fit, point, -point.residual)
     assert np.abs(off / scatter).max() < 0.05  # 0.016: G12 is not quite linear
 
 
@@ -79,10 +81,15 @@ def test_what_a_nuisance_hides_is_not_determined() -> None:
     """At a single pressure that is not known for sure, moduli can only be told up to a factor."""
     model = replace(MODEL, pressures=PRESSURES[-1:], increments=PRESSURES)
     without, beside = flat(CONSTANT, model), flat(PRESSED, model)
-    sure = pinned_by(without, evaluated(without), FLAT_LAW, REACHED, [0])
-    unsure = pinned_by(beside, evaluated(beside), FLAT_LAW, REACHED, [0])
+    sure, unsure = pinned_by_all(without), pinned_by_all(beside)
     for name in ("E1", "E2"):
         assert sure[name].max() < 0.02 and unsure[name].min() > 0.5
+
+
+def pinned_by_all(fit: FitProblem) -> dict[str, np.ndarray]:
+    point = evaluated(fit)
+    noise = Noise.of(fit, point.residual).rows
+    return pinned_by(fit, point, FLAT_LAW, REACHED, [0], noise)
 
 
 def flat(unknowns: Unknowns, model: BubbleModel = MODEL) -> FitProblem:

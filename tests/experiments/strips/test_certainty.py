@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.identification.assessment import certainty, pinned_by
 from bubblefit.identification.methods.descent import descend
+from bubblefit.identification.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 
 from ...identification.scatter import follows, scatter_of
@@ -24,17 +25,18 @@ def test_certainty_predicts_the_scatter_of_noisy_strip_fits() -> None:
     scatter = scatter_of(fit, point, predicted.noise)
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANTS.to_coefficients @ scatter / moduli, rel=0.03)
-    best, _ = descend(fit, point, 1e-7, 10**6)
-    off = best.unknowns - truth - follows(point, -point.residual)
+    best, _ = descend(fit, point, 1e-7, 10**6, norms=True)
+    off = best.unknowns - truth - follows(fit, point, -point.residual)
     assert np.abs(off / scatter).max() < 0.05
 
 
 def test_what_each_data_set_pins_down() -> None:
     fit = joint(noise=10.0, bubble_noise=0.1)
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
-    reached = np.array([0.1, 0.1, 0.3])
+    reached, noise = np.array([0.1, 0.1, 0.3]), Noise.of(fit, point.residual).rows
     bubble, uniaxial, both = (
-        pinned_by(fit, point, LAW, reached, tests) for tests in ([0], [1, 2, 3], [0, 1, 2, 3])
+        pinned_by(fit, point, LAW, reached, tests, noise)
+        for tests in ([0], [1, 2, 3], [0, 1, 2, 3])
     )
     for name in COMPONENTS:
         assert (both[name] <= bubble[name] * (1 + 1e-6)).all()
@@ -43,6 +45,6 @@ def test_what_each_data_set_pins_down() -> None:
     assert worst["G12"] > 2 * max(worst["E1"], worst["E2"])
     assert uniaxial["G12"].max() < 0.2 * bubble["G12"].max()
     # A pull along the warp says nothing of the fill or of shear.
-    warp = pinned_by(fit, point, LAW, reached, [1])
+    warp = pinned_by(fit, point, LAW, reached, [1], noise)
     assert warp["E1"].max() < 0.5
     assert min(warp["E2"].min(), warp["G12"].min()) > 1.0

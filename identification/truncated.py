@@ -1,0 +1,133 @@
+"""Draws from a normal distribution within linear inequalities.
+
+Draws outside are drawn again as long as enough of them lie inside. Where hardly any does (the
+optimum lies on bounds), every draw is the end of a walk of its own inside: from the middle of what
+is allowed, along random directions, to a place drawn from the normal distribution on that line
+between its ends (hit and run).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.special import log_ndtr, ndtri_exp
+
+Array = NDArray[np.float64]
+
+#: Draws a wanted one, before it is a walk.
+MOST_DRAWS = 20
+#: Steps of a walk: some a dimension, and some in any case.
+STEPS_A_DIMENSION, STEPS = 25, 150
+#: Of the largest variance: less is none.
+NONE = 1e-14
+#: In standard deviations: bounds closer than this leave no room between them; what lies outside by
+#: less is inside.
+CLOSE, ROUNDING = 1e-9, 1e-9
+#: Standard deviations from the mean beyond which a place is no longer drawn.
+FAR = 1e6
+
+
+def truncated_draws(
+    mean: Array,
+    covariance: Array,
+    inequalities: tuple[Array, Array],
+    allowed: Array,
+    count: int,
+    random: np.random.Generator,
+) -> Array:
+    """`count` draws (count, n) of a normal distribution, given A y >= c.
+
+    Parameters
+    ----------
+    mean : (n,), which may lie outside. covariance : (n, n). inequalities : A (k, n), c (k,).
+    allowed : (n,) a point that keeps them, up to rounding.
+    """
+    a, c = inequalities
+    c = np.minimum(c, a @ allowed)
+    variance, axes = np.linalg.eigh(covariance)
+    some = variance > NONE * max(variance[-1], 0.0)
+    if not some.any():
+        return np.tile(allowed, (count, 1))
+    root = axes[:, some] * np.sqrt(variance[some])
+    # In standard deviations z, seen from the allowed point: rows @ z >= least.
+    rows, least = a @ root, c - a @ allowed
+    size = np.linalg.norm(rows, axis=1)
+    real = size > NONE * size.max(initial=0.0)
+    rows, least = rows[real] / size[real, None], least[real] / size[real]
+    centre = (axes[:, some].T @ (mean - allowed)) / np.sqrt(variance[some])
+    rows, least, centre, back = _without_equalities(rows, least, centre)
+    drawn = _drawn_again(rows, least, centre, count, random)
+    if len(drawn) < count:
+        drawn = _walked(rows, least, centre, count, random)
+    return np.asarray(allowed + (drawn @ back.T) @ root.T)
+
+
+def _without_equalities(
+    rows: Array, least: Array, centre: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The same within the plane that pairs of opposite inequalities leave."""
+    if not len(rows):
+        return rows, least, centre, np.eye(len(centre))
+    opposite = rows @ rows.T < -1 + CLOSE
+    held = np.flatnonzero((opposite & (least[:, None] + least > -CLOSE)).any(axis=1))
+    if not len(held):
+        return rows, least, centre, np.eye(len(centre))
+    _, size, right = np.linalg.svd(rows[held])
+    free = right[int((size > 1e-6).sum()) :].T
+    others = rows @ free
+    some = np.linalg.norm(others, axis=1) > 1e-6
+    return others[some], least[some], free.T @ centre, free
+
+
+def _drawn_again(
+    rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
+) -> Array:
+    """Up to `count` draws that are inside, of so many as are worth it."""
+    inside: list[Array] = []
+    for _ in range(MOST_DRAWS):
+        draws = centre + random.standard_normal((count, len(centre)))
+        inside.append(draws[(draws @ rows.T >= least - ROUNDING).all(axis=1)])
+        if sum(map(len, inside)) >= count:
+            break
+    return np.concatenate(inside)[:count]
+
+
+def _walked(
+    rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
+) -> Array:
+    """Ends of `count` walks side by side."""
+    place = np.tile(_middle(rows, least), (count, 1))
+    for _ in range(STEPS + STEPS_A_DIMENSION * len(centre)):
+        way = random.standard_normal(place.shape)
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        room, slope = np.minimum(least - place @ rows.T, 0.0), way @ rows.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = room / slope
+        ahead = np.where(slope < 0, reach, FAR).min(axis=1)
+        behind = np.where(slope > 0, reach, -FAR).max(axis=1)
+        nearest = np.einsum("ij,ij->i", way, centre - place)
+        place += _between(behind - nearest, ahead - nearest, random)[:, None] * way
+        place += nearest[:, None] * way
+    return place
+
+
+def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
+    """Standard normal numbers between ends (n,), drawn by their distribution function."""
+    flip = lower > 0  # the lower tail has the digits
+    low, high = np.where(flip, -upper, lower), np.where(flip, -lower, upper)
+    share = random.random(len(low))
+    below, above = log_ndtr(low), log_ndtr(high)
+    # log((1 - share) P(low) + share P(high))
+    mixed = above + np.log(share + (1 - share) * np.exp(np.minimum(below - above, 0.0)))
+    drawn = np.clip(ndtri_exp(mixed), low, high)
+    return np.where(flip, -drawn, drawn)
+
+
+def _middle(rows: Array, least: Array) -> Array:
+    """A point as far inside as can be, but no farther than one standard deviation."""
+    n = rows.shape[1]
+    whole = np.hstack([-rows, np.ones((len(rows), 1))])
+    bounds = [(None, None)] * n + [(0.0, 1.0)]
+    said = linprog(np.r_[np.zeros(n), -1.0], A_ub=whole, b_ub=-least, bounds=bounds)
+    return np.zeros(n) if said.x is None else np.asarray(said.x[:n])
