@@ -63,6 +63,39 @@ def test_a_card_that_fails_is_left_out(bars: BarSolver, tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
 
 
+def test_notes_of_failures_name_test_card_and_part(bars: BarSolver, tmp_path: Path) -> None:
+    bars.law_fails = lambda law: law.nu12 > 0.3
+    stiff = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.4), 0.5, "stiff")
+    cards = {"soft": CARD, "stiff": stiff}
+
+    def said(*tests: BarTest) -> list[str]:
+        done = simulate_cards(project_of(*tests), list(tests), cards, tmp_path)
+        assert {note["kind"] for note in done.numbers["notes"]} == {"failed"}
+        written = (tmp_path / "notes.csv").read_text()
+        lines = [f"{note['of']}: {note['note']}" for note in done.numbers["notes"]]
+        assert all(note["of"] in written for note in done.numbers["notes"])
+        assert done.lines[-len(lines) :] == [f"note: {line}" for line in lines]
+        return lines
+
+    assert said(BarTest("a bar")) == ["stiff: the bar breaks"]
+    assert said(BarTest("a bar", ("warp", "fill"))) == [
+        "stiff, warp: the bar breaks", "stiff, fill: the bar breaks"
+    ]  # fmt: skip
+    assert said(BarTest("one"), BarTest("two", ("warp", "fill"))) == [
+        "one, stiff: the bar breaks", "two, stiff, warp: the bar breaks",
+        "two, stiff, fill: the bar breaks",
+    ]  # fmt: skip
+
+
+def test_progress_names_card_and_part(bars: BarSolver, tmp_path: Path) -> None:
+    tests, steps = [BarTest("a bar", ("warp", "fill"))], []
+    simulate_cards(project_of(*tests), tests, {"soft": CARD}, tmp_path, progress=steps.append)
+    assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps] == [
+        ("soft, warp", 1, 2, 0.0, 0), ("soft, warp", 1, 2, 4.0, 0),
+        ("soft, fill", 2, 2, 0.0, 0), ("soft, fill", 2, 2, 4.0, 0),
+    ]  # fmt: skip
+
+
 def test_a_solver_that_there_is_not() -> None:
     with pytest.raises(InputError, match="nowhere"):
         simulate(BarTest("a bar"), CARD, solver="nowhere")

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from random import Random
 from subprocess import TimeoutExpired
 
 import click
 
-from . import house, listing, rooms
-from .drawing import draw
-from .judging import Verdict, judge
+from . import house, judging, listing, rooms
+from .drawing import Mutant, draw
+from .judging import Verdict
 from .measured import Measured, measure, near
 
 
@@ -24,7 +25,7 @@ from .measured import Measured, measure, near
 @click.option("--minutes", type=float, help="end after this long, with what was tried so far")
 @click.option("--also", multiple=True, help="tests beside those near a module: a file or folder")
 @click.option("--limit", type=float, default=60.0, show_default=True, help="tests' s a mutant")
-@click.option("--processes", type=int, default=2, show_default=True, help="of the first run")
+@click.option("--processes", type=int, default=2, show_default=True, help="at a time")
 @click.option("--out", type=Path, default=Path("out/mutants"), show_default=True)
 def main(
     files: Sequence[str],
@@ -48,45 +49,43 @@ def main(
     seed = rooms.commit_number() if seed is None else seed
     click.echo(f"drawing from {len(chosen)} files, seed {seed}")
     out.mkdir(parents=True, exist_ok=True)
-    with house.copy() as copy:
+    with ExitStack() as stack:
+        copies = [stack.enter_context(house.copy()) for _ in range(processes)]
         # Within a time limit, file by file: there is a list of survivors whatever the limit.
         groups = [chosen] if minutes is None else [[file] for file in _mixed(chosen, seed)]
         verdicts: list[Verdict] = []
         for group in groups:
             if time.monotonic() >= end:
                 break
+            mutants = _drawn(copies[0], group, seed, number)
+            if not mutants:
+                continue
             try:
-                tests = {*also, *(test for file in group for test in near(copy, file))}
-                measured = measure(copy, sorted(tests), copy.parent / "run", processes, _left(end))
+                measured = _measured(copies[0], mutants, also, processes, _left(end))
             except TimeoutExpired:
                 click.echo(f"no time for {' '.join(group)}: its tests take longer than is left")
                 continue
-            verdicts += _verdicts(copy, group, measured, seed, number, limit, end)
+            for verdict in judging.verdicts(copies, mutants, measured, limit, end):
+                verdicts.append(verdict)
+                mutant = verdict.mutant
+                click.echo(f"{verdict.outcome:9s} {mutant.file}:{mutant.line}", err=True)
     for name, text in (("survivors", listing.survivors), ("caught", listing.caught)):
         (out / f"{name}.txt").write_text(f"{listing.summary(verdicts)}\n\n{text(verdicts)}\n")
     click.echo(f"{listing.survivors(verdicts)}\n\n{listing.summary(verdicts)}")
     click.echo(f"listed in {out}/survivors.txt")
 
 
-def _verdicts(
-    copy: Path,
-    group: Sequence[str],
-    measured: Measured,
-    seed: int,
-    number: int | None,
-    limit: float,
-    end: float,
-) -> list[Verdict]:
-    """Of the mutants of some files, until there are no more or the time is over."""
-    sources = {file: (copy / file).read_text() for file in group}
-    found = []
-    with judge(copy, measured, limit) as one:
-        for mutant in draw(sources, seed, number):
-            if time.monotonic() >= end:
-                break
-            found.append(one.judge(mutant))
-            click.echo(f"{found[-1].outcome:9s} {mutant.file}:{mutant.line}", err=True)
-    return found
+def _drawn(copy: Path, group: Sequence[str], seed: int, number: int | None) -> list[Mutant]:
+    return list(draw({file: (copy / file).read_text() for file in group}, seed, number))
+
+
+def _measured(
+    copy: Path, mutants: Sequence[Mutant], also: Sequence[str], processes: int, left: float | None
+) -> Measured:
+    """The files that were drawn from, by the tests near them."""
+    files = sorted({mutant.file for mutant in mutants})
+    tests = {*also, *(test for file in files for test in near(copy, file))}
+    return measure(copy, files, sorted(tests), copy.parent / "run", processes, left)
 
 
 def _mixed(files: Sequence[str], seed: int) -> list[str]:

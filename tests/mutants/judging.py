@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 from typing import IO, Any
 
 from . import server
@@ -16,8 +19,9 @@ from .drawing import Mutant
 from .house import environment, instead
 from .measured import Measured
 
-#: A test that takes this many times its own time, and so many seconds, runs for ever.
-PATIENCE = (4.0, 20.0)
+#: A test that takes this many times its own time, and so many seconds (a fixture may have been
+#: made for another test when it was measured), runs for ever.
+PATIENCE = (4.0, 60.0)
 #: What the tests load anyway, once for all of them.
 LIBRARIES = (
     "click", "gmsh", "hypothesis", "jinja2", "matplotlib.backends.backend_agg", "meshio", "nlopt",
@@ -28,8 +32,9 @@ LIBRARIES = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """outcome: caught, survived, or unrun (no test runs the line); by: the test that caught it;
-    tests: how many there were to catch it"""
+    """outcome: caught, survived, late (the tests did not end: a loop without an end, or a busy
+    machine), or unrun (no test runs the line); by: the test that caught it; tests: how many there
+    were to catch it"""
 
     mutant: Mutant
     outcome: str
@@ -85,10 +90,10 @@ class Judge:
             with instead(self.house / mutant.file, mutant.source):
                 done = self.run(tests)
             by = done["test"]
-            if done["outcome"] == "survived":
-                return Verdict(mutant, "survived", tests=len(tests))
+            if done["outcome"] in ("survived", "late"):
+                return Verdict(mutant, done["outcome"], tests=len(tests))
             if by not in self.measured.seconds or self.fit(by):
-                return Verdict(mutant, "caught", by or done["outcome"], len(tests))
+                return Verdict(mutant, "caught", by, len(tests))
 
     def fit(self, test: str) -> bool:
         """Whether a test passes on the code as it is, alone in this process."""
@@ -104,3 +109,30 @@ def judge(
     """A judge whose process ends with the block."""
     with Judge(house, measured, limit, libraries) as one:
         yield one
+
+
+def verdicts(
+    houses: Sequence[Path],
+    mutants: Iterable[Mutant],
+    measured: Measured,
+    limit: float,
+    end: float = float("inf"),
+    libraries: Sequence[str] = LIBRARIES,
+) -> Iterator[Verdict]:
+    """Of the mutants, in their order, until the time is `end`; a judge in each of the copies."""
+    free: SimpleQueue[Judge] = SimpleQueue()
+
+    def one(mutant: Mutant) -> Verdict | None:
+        if time.monotonic() >= end:
+            return None
+        judge = free.get()
+        try:
+            return judge.judge(mutant)
+        finally:
+            free.put(judge)
+
+    with ExitStack() as stack:
+        for house in houses:
+            free.put(stack.enter_context(judge(house, measured, limit, libraries)))
+        with ThreadPoolExecutor(len(houses)) as pool:
+            yield from filter(None, pool.map(one, mutants))

@@ -13,14 +13,18 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     count = Counter(verdict.outcome for verdict in verdicts)
     return (
         f"{len(verdicts)} mutants: {count['caught']} caught, {count['survived']} survived, "
-        f"{count['unrun']} in lines that no test near them runs"
+        f"{count['late']} did not end, {count['unrun']} in lines that no test near them runs"
     )
 
 
 def survivors(verdicts: Sequence[Verdict]) -> str:
     """File, line and change of everything that was not caught, in the order of the files."""
     left = [verdict for verdict in verdicts if verdict.outcome != "caught"]
-    words = {"survived": "{} tests run it and pass", "unrun": "no test near it runs it"}
+    words = {
+        "survived": "{} tests run it and pass",
+        "late": "its {} tests did not end",
+        "unrun": "no test near it runs it",
+    }
     return "\n".join(
         f"{verdict.mutant}\n  ({words[verdict.outcome].format(verdict.tests)})"
         for verdict in sorted(left, key=lambda verdict: (verdict.mutant.file, verdict.mutant.line))

@@ -19,8 +19,8 @@ from .house import environment
 #: What a copy of the test's process runs counts, too (tests/commands.py): it ends with `_exit`.
 SETTINGS = """
 [run]
-source = {house}
-omit = */tests/*
+include =
+{files}
 data_file = {folder}/coverage
 parallel = true
 patch = _exit
@@ -92,16 +92,22 @@ def _imports(path: Path, word: str) -> set[str]:
 
 
 def measure(
-    house: Path, tests: Iterable[str], folder: Path, processes: int, seconds: float | None = None
+    house: Path,
+    files: Iterable[str],
+    tests: Iterable[str],
+    folder: Path,
+    processes: int,
+    seconds: float | None = None,
 ) -> Measured:
-    """Run test files (not what is marked slow).
+    """Run test files (not what is marked slow), and see which of them run lines of `files`.
 
     Raises TimeoutExpired after `seconds`, ClickException where the run itself broke: what was not
     measured must not be taken for lines that no test runs.
     """
     folder.mkdir(parents=True, exist_ok=True)
     settings = folder / "settings"
-    settings.write_text(SETTINGS.format(house=house, folder=folder))
+    listed = "\n".join(f"    {house / file}" for file in files)
+    settings.write_text(SETTINGS.format(files=listed, folder=folder))
     spread = ["-n", str(processes), "--dist", "worksteal"] if processes > 1 else []
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *spread]
     command += ["-m", "not slow", "-o", "junit_family=xunit1", f"--junitxml={folder}/times.xml"]

@@ -18,7 +18,6 @@ def child(tests: list[str], log: int) -> None:
     """Never returns."""
     code = 3
     try:
-        os.setpgid(0, 0)
         for stream in (1, 2):
             os.dup2(log, stream)
         sys.dont_write_bytecode = True
@@ -36,7 +35,10 @@ def outcome(tests: list[str], seconds: float) -> dict[str, str]:
     with tempfile.TemporaryFile() as log:
         process = os.fork()
         if process == 0:
+            os.setpgid(0, 0)
             child(tests, log.fileno())
+        # Here, too: whoever comes first, the group is there when it is to be killed.
+        os.setpgid(process, process)
         ended, status = 0, 0
         end = time.monotonic() + seconds
         while not ended and time.monotonic() < end:

@@ -9,7 +9,7 @@ import click
 import pytest
 
 from ..places import ROOT
-from . import house, listing, rooms
+from . import house, judging, listing, rooms
 from .drawing import draw, places
 from .judging import Verdict, judge
 from .measured import Measured, measure, near
@@ -148,27 +148,31 @@ WANTED = {
 }
 
 
-def test_caught_survived_and_unrun(little: Path):
+def test_caught_survived_and_unrun(little: Path, monkeypatch):
     """`test_alone` passes beside the coverage only: it fails without a change, too."""
     before = {path: path.read_bytes() for path in little.rglob("*") if path.is_file()}
     file = "rooms/scale.py"
     source = (little / file).read_text()
     mutants = {mutant.after: mutant for seed in range(60) for mutant in draw({file: source}, seed)}
-    with house.copy(little) as copy:
-        known = measure(copy, near(copy, file), copy.parent / "run", processes=1)
+    with house.copy(little) as copy, house.copy(little) as second:
+        known = measure(copy, [file], near(copy, file), copy.parent / "run", processes=1)
+        every = [mutants[after] for after in WANTED]
+        verdicts = list(judging.verdicts([copy, second], every, known, 60.0, libraries=["pytest"]))
+        assert [verdict.mutant for verdict in verdicts] == every
         with judge(copy, known, 60.0, ["pytest"]) as one:
-            found = {after: one.judge(mutants[after]) for after in WANTED}
+            monkeypatch.setattr(judging, "PATIENCE", (0.0, 0.0))
+            assert one.judge(every[0]).outcome == "late"
+            monkeypatch.undo()
             assert one.fit("tests/rooms/test_scale.py::test_kpa")
             assert not one.fit("tests/rooms/test_scale.py::test_alone")
         assert (copy / file).read_text() == source
     assert not copy.parent.exists()
     after = {path: path.read_bytes() for path in little.rglob("*") if path.is_file()}
     assert after == before
-    assert {after: verdict.outcome for after, verdict in found.items()} == WANTED
-    assert found["return 1e3 / mpa"].by == "tests/rooms/test_scale.py::test_kpa"
-    verdicts = list(found.values())
+    assert {verdict.mutant.after: verdict.outcome for verdict in verdicts} == WANTED
+    assert verdicts[0].by == "tests/rooms/test_scale.py::test_kpa"
     assert listing.summary(verdicts) == (
-        "5 mutants: 3 caught, 1 survived, 1 in lines that no test near them runs"
+        "5 mutants: 3 caught, 1 survived, 0 did not end, 1 in lines that no test near them runs"
     )
     assert listing.survivors(verdicts) == (
         "rooms/scale.py:6\n  - return mpa > 2\n  + return mpa > 3\n  (1 tests run it and pass)\n"
@@ -178,7 +182,7 @@ def test_caught_survived_and_unrun(little: Path):
 
 def test_a_run_that_breaks_is_no_run_without_lines(tmp_path: Path):
     with pytest.raises(click.ClickException, match=r"pytest ended with 4: .*/run/log\n"):
-        measure(tmp_path, ["nothing.py"], tmp_path / "run", processes=1)
+        measure(tmp_path, ["a.py"], ["nothing.py"], tmp_path / "run", processes=1)
 
 
 def test_an_interrupted_run_leaves_the_code_as_it_was(tmp_path: Path):
@@ -211,5 +215,7 @@ def test_changed_files(little: Path):
 def test_no_verdict_is_lost_in_the_list():
     (mutant, *_) = drawn()
     verdicts = [Verdict(mutant, "caught", "tests/a.py::b", 3), Verdict(mutant, "unrun")]
+    verdicts.append(Verdict(mutant, "late", tests=3))
     assert listing.caught(verdicts).endswith("(tests/a.py::b)")
-    assert listing.survivors(verdicts).count("a.py:") == 1
+    assert listing.survivors(verdicts).count("a.py:") == 2
+    assert "1 caught, 0 survived, 1 did not end, 1 in lines" in listing.summary(verdicts)

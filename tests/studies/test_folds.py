@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from bubblefit.errors import NoFeasibleStart
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
-from bubblefit.studies.folds import validate
+from bubblefit.studies import folds as room
+from bubblefit.studies.folds import FoldError, folds, validate
 
 #: Without contraction the load is the fabric's 0.8 mm times 25 mm times E ln(1 + elongation / 20).
 PROJECT = """
@@ -57,3 +61,76 @@ def test_a_fold_errs_by_what_the_specimens_differ_by(tmp_path: Path) -> None:
                     for d, (a, b) in MODULI.items()}  # fmt: skip
         assert fold.rms == pytest.approx(expected, rel=1e-3)
         assert fold.value == pytest.approx(sum(expected.values()), rel=1e-3)
+
+
+def setup_of(**specimens: list[int]) -> Any:
+    """As much of a fit as its folds look at."""
+    return SimpleNamespace(
+        tests=[SimpleNamespace(specimens=specimens)],
+        project=SimpleNamespace(fit=SimpleNamespace(seed=3)),
+        options="options",
+    )
+
+
+@pytest.mark.parametrize(
+    ("specimens", "count"),
+    [
+        # No more than the fewest specimens; a single one loses points, as many as are asked for.
+        ({"warp": [0, 0, 1, 2], "fill": [4, 5, 5, 6, 7]}, 3),
+        ({"warp": [0] * 6, "fill": [0, 1, 2, 3, 4, 5]}, 5),
+        ({"warp": [0] * 6}, 5),
+        ({"warp": [0, 1] * 3, "fill": [0] * 3}, 2),
+    ],
+)
+def test_how_many_folds(specimens: dict[str, list[int]], count: int) -> None:
+    assert len(folds(setup_of(**specimens), 5)) == count
+
+
+def test_the_best_start_of_a_fold_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some starts fail, or are none; the others go on."""
+    ends: list[Any] = [3.0, None, NoFeasibleStart("none"), 1.0, 2.0]
+    drawn: list[tuple[int, int]] = []
+    reset: list[int] = []
+
+    def feasible_start(problem: Any, seed: int, number: int) -> int:
+        drawn.append((seed, number))
+        if isinstance(ends[number], NoFeasibleStart):
+            raise ends[number]
+        return number
+
+    def fit_from(problem: Any, start: int, options: Any) -> Any:
+        assert options == "options"
+        value, best = ends[start], SimpleNamespace(unknowns=f"of start {start}")
+        return None if value is None else SimpleNamespace(value=value, best=best)
+
+    monkeypatch.setattr(room, "feasible_start", feasible_start)
+    monkeypatch.setattr(room, "fit_from", fit_from)
+    problem: Any = SimpleNamespace(reset=lambda: reset.append(1))
+    assert room._best(setup_of(), problem, 5) == "of start 3"
+    assert drawn == [(3, number) for number in range(5)] and len(reset) == 5
+    assert room._best(setup_of(), problem, 3) == "of start 0"
+    ends[0] = None
+    assert room._best(setup_of(), problem, 3) is None
+
+
+def test_a_fold_without_a_fit_or_an_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is left out is what is judged, of the comparisons that lose points, from rest."""
+    mask, asked = np.array([True, False]), []
+
+    class Whole:
+        comparisons = (SimpleNamespace(name="bubble"), SimpleNamespace(name="warp"))
+
+        def part(self, numbers: list[int]) -> Any:
+            asked.append(numbers)
+            return SimpleNamespace(evaluate=lambda *a, **named: asked.append((a, named)))
+
+    def problem(masks: Any) -> Whole:
+        asked.append({name: own.tolist() for name, own in masks.items()})
+        return Whole()
+
+    own = SimpleNamespace(problem=problem)
+    monkeypatch.setattr(room, "fit_of", lambda *_: (own, None))
+    assert room._fold(setup_of(), 4, {"warp": mask}, 1) == FoldError(4, None, {}) and not asked
+    monkeypatch.setattr(room, "fit_of", lambda *_: (own, "unknowns"))
+    assert room._fold(setup_of(), 4, {"warp": mask}, 1) == FoldError(4, None, {})
+    assert asked == [{"warp": [False, True]}, [1], (("unknowns", False), {"warm": False})]

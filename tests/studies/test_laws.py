@@ -10,6 +10,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.errors import OutputError
 from bubblefit.notes import rows
 from bubblefit.reports import LawRow, Report, Table
 from bubblefit.studies import law_page
@@ -162,6 +163,8 @@ def test_table_and_page(compared: LawComparison, run: Run) -> None:
 
 def test_going_on_validates_nothing_twice(compared: LawComparison, run: Run) -> None:
     before = [form.folds for form in compared.forms]
+    with pytest.raises(OutputError, match="--resume"):
+        run.compare()
     again = run.compare(resume=True)
     assert [form.folds for form in again.forms] == before
     assert not any(isinstance(event, FoldError) for event in run.events)

@@ -132,3 +132,14 @@ def test_notes_name_the_level(what: str, size: str) -> None:
     failed, own = study(RUNS, what=what).notes
     assert failed.line == f"bar, {size}: no equilibrium" and failed.kind is NoteKind.FAILED
     assert own.line == "made up"
+
+
+def test_the_order_of_a_curve_is_that_of_its_finest_levels() -> None:
+    """A first change that is nothing, or of another order, is neither noise nor in the order."""
+    more = [run(0.25, 6, 12.0, None, 5.3001), *RUNS[:3]]
+    for noise in (1e-7, 1e-3):
+        found = study(more, noise).result["models"]["bar"]["rms_N"]
+        assert len(found["to_next_finer"]) == 3 and found["to_next_finer"][0] < 2e-4
+        assert found["order"] == pytest.approx(1.0)
+    early = [run(0.25, 6, 12.0, None, 9.3), *RUNS[:3]]
+    assert study(early).result["models"]["bar"]["rms_N"]["order"] == pytest.approx(1.0)
