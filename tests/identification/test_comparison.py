@@ -153,3 +153,28 @@ def test_what_contracts_asks_for_a_positive_definite_law() -> None:
     assert (
         replace(unknowns, definite_nu12=None).inequalities[0].shape == CUBIC.inequalities[0].shape
     )
+
+
+def test_only_a_near_guess_is_a_warm_start() -> None:
+    """A change of at most a fiftieth of the largest displacement, whichever way."""
+    plain = Comparison("bar", None, Plain(), None)  # type: ignore[arg-type]
+    assert plain._guess(np.zeros(2)) is None
+    path = np.array([[0.5, -4.0], [1.0, 2.0]])
+    slope = np.zeros((2, 2, 1))
+    slope[0, 1, 0] = 1.0
+    plain._last = np.array([3.0]), path, slope
+    for change in (0.0799, -0.0799):
+        guess = plain._guess(np.array([3.0 + change]))
+        assert guess is not None
+        np.testing.assert_allclose(guess, [[0.5, -4.0 + change], [1.0, 2.0]])
+    plain._last = np.array([0.0]), path, slope
+    assert plain._guess(np.array([0.08])) is not None  # the limit itself
+    for change in (0.0801, -0.0801, 5.0):
+        assert plain._guess(np.array([change])) is None
+    plain.forget()
+    assert plain._guess(np.zeros(1)) is None
+
+
+def test_limits_of_a_comparison_that_is_not_told_otherwise() -> None:
+    plain = Comparison("bar", None, Plain(), None)  # type: ignore[arg-type]
+    assert (plain.stage, plain.contracts, plain.must_be_stable) == (0, False, True)

@@ -72,6 +72,8 @@ def test_optima(tmp_path: Path, drawn: list[Figure], values: list[float]):
         assert all(low <= y <= high for y in (*optima[1], *references.values()))
         # Room for every start, the failed ones too, half a place to either side.
         assert axes.get_xlim() == (0.5, max(len(values), 2) + 0.5)
+        # Starts are counted: there is none between two.
+        assert all(float(place).is_integer() for place in axes.get_xticks())
         failed = len(values) - len(ended)
         said = f"Optima of {len(values)} start" + ("s" if len(values) > 1 else "")
         said += f", {failed} without a result" if failed else ""
