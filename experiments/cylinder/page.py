@@ -41,7 +41,7 @@ def _write_tables(
         curve.insert(0, "wall", run.wall)
         curve.insert(0, "card", run.card)
         curve.insert(0, "test", run.test.name)
-    _write(pd.concat(curves, ignore_index=True), out, CURVES)
+    _write(pd.concat(curves), out, CURVES)
     what = "every curve: deflection, load, pressure, volume, wrinkled share"
     files = [(out.name(CURVES), what)]
     measured = measured_table(tests)

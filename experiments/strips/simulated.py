@@ -127,7 +127,7 @@ def _write(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> Non
         for (name, direction), pull in ended.items()
     ]
     with replacing(out.path("loads.csv")) as path:
-        pd.concat(tables, ignore_index=True).to_csv(path, index=False)
+        pd.concat(tables).to_csv(path, index=False)
     drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
     rms: dict[str, list[float]] = {d: [] for d in test.strips}
     for (name, direction), pull in ended.items():

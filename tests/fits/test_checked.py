@@ -95,4 +95,5 @@ def test_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, judgements: Any, 
     }
     assert page.warnings == [line for name in names for line in told[name]]
     assert page.files == [("check.json", "the doubts in plain values")]
-    assert json.loads((tmp_path / "a" / "b" / "check.json").read_text()) == done.result
+    text = (tmp_path / "a" / "b" / "check.json").read_text()
+    assert text == json.dumps(done.result, indent=1) + "\n"

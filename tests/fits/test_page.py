@@ -300,6 +300,8 @@ def test_starts_that_failed_other_programs_and_no_certainty(
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
     assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
+    assert fit.moduli().index.tolist() == list(range(3 * 61))
+    assert fit.residuals().index.tolist() == list(range(len(fit.residuals())))
 
 
 def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) -> None:

@@ -325,10 +325,13 @@ def test_a_kind_without_files_has_none() -> None:
 
 
 def test_the_record_says_when_where_and_with_what(tmp_path: Path) -> None:
-    setup = prepared(read_project(written(tmp_path)))
+    setup = prepared(read_project(written(tmp_path, ("[law]", "# g/m²\n[law]"))))
     record = recorded(setup, ["bubblefit", "fit", "project.toml", "--starts", "3"])
     record.write(tmp_path / "out")
-    said = json.loads((tmp_path / "out" / PROVENANCE).read_text())
+    text = (tmp_path / "out" / PROVENANCE).read_text(encoding="utf-8")
+    said = json.loads(text)
+    # For people, too: a value a line, and every letter as it is.
+    assert text == json.dumps(said, indent=1, ensure_ascii=False) + "\n" and "m²" in text
     assert said["project"]["text"] == (tmp_path / "project.toml").read_text()
     digest = hashlib.sha256((tmp_path / "project.toml").read_bytes()).hexdigest()
     assert said["project"]["sha256"] == digest

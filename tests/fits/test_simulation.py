@@ -30,7 +30,8 @@ def test_cards_in_tests(bars: BarSolver, tmp_path: Path) -> None:
     tests, steps = [BarTest("one", ("warp", "fill")), BarTest("two")], []
     cards = {"soft": CARD, "thick": THICK}
     done = simulate_cards(project_of(*tests), tests, cards, tmp_path, progress=steps.append)
-    assert json.loads((tmp_path / "result.json").read_text()) == done.numbers
+    text = (tmp_path / "result.json").read_text()
+    assert text == json.dumps(done.numbers, indent=1) + "\n"
     assert list(done.numbers["tests"]) == ["one", "two"] and "cards" not in done.numbers
     soft, thick = done.numbers["tests"]["two"]["cards"].values()
     assert thick["warp"] == pytest.approx(2 * soft["warp"])

@@ -15,7 +15,8 @@ from ..complaints import complaint
 def test_a_folder_far_below_is_made(tmp_path: Path) -> None:
     store = Store(tmp_path / "a" / "b" / "c")
     assert not store.begin({"law": "1"}, False, False) and store.used
-    assert json.loads((store.path / RUN).read_text()) == {"parts": {"law": "1"}, "facts": {}}
+    content = {"parts": {"law": "1"}, "facts": {}}
+    assert (store.path / RUN).read_text() == json.dumps(content, indent=1) + "\n"
     # A folder that is there and holds nothing of this is as good.
     (tmp_path / "there").mkdir()
     (tmp_path / "there" / "notes.txt").write_text("mine")

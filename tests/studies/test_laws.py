@@ -174,4 +174,5 @@ def test_going_on_validates_nothing_twice(compared: LawComparison, run: Run) -> 
     again = run.compare(resume=True)
     assert [form.folds for form in again.forms] == before
     assert sum(isinstance(event, FoldError) for event in run.events) == 2
-    assert len(json.loads(path.read_text())["folds"]) == 2
+    written = json.loads(path.read_text())
+    assert path.read_text() == json.dumps(written, indent=1) + "\n" and len(written["folds"]) == 2

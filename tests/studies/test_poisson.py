@@ -47,7 +47,8 @@ def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path, drawn: list[Figur
     study.write(tmp_path)
     table = pd.read_csv(tmp_path / "nu12.csv")
     pd.testing.assert_frame_equal(table, study.table())
-    assert json.loads((tmp_path / "result.json").read_text()) == study.result
+    text = (tmp_path / "result.json").read_text()
+    assert text == json.dumps(study.result, indent=1) + "\n"
     assert (tmp_path / "nu12.png").exists()
     _, shown, base = data(drawn[0].axes[0])
     np.testing.assert_array_equal(shown, [found.nu12, found.to_base])

@@ -92,6 +92,8 @@ def test_curves_and_readings() -> None:
     way = np.array([0.0, 30.0])
     read = [BendingCurve("a", way, np.array([0.0, 58.0])), BendingCurve("b", way, 2.0 * way)]
     tests = [SimpleNamespace(name="x", measured=read), SimpleNamespace(name="y", measured=())]
+    twice = measured_table([*tests, SimpleNamespace(name="z", measured=read[:1])])
+    assert twice.index.tolist() == list(range(2 * 61)) and set(twice["test"]) == {"x", "z"}
     table = measured_table(tests)
     assert list(table.columns) == [
         "test", "deflection_mm", "mean_N", "standard_deviation_N", "repetitions"
