@@ -7,6 +7,8 @@ import re
 import numpy as np
 import pytest
 from bubblefit.data.clock_offset import find_offset, given_offset
+from bubblefit.data.offset_misfits import log_at, offset_misfits
+from bubblefit.data.rising import WITHIN
 
 from ..complaints import complaint
 
@@ -118,6 +120,18 @@ def test_frames_beyond_the_log_have_no_pressure():
 def test_what_cannot_be_told_is_refused(change, words):
     said = complaint(find_offset, *recorded(offset=12.0, noise=5e-4, **change))
     assert all(word in said for word in ["offset" if "log" not in words[0] else "", *words]), said
+
+
+@pytest.mark.parametrize("cut", [slice(300, None), slice(None, 760)])
+def test_no_offset_is_looked_at_for_which_there_is_no_log(cut):
+    """Also where the best is the first or the last that there is: closer together, not beyond."""
+    times, heights, clock, pressures = recorded(steps, "flat", 37.3, 5e-4, count=100)
+    clock, pressures = clock[cut], pressures[cut]
+    offsets, misfits = offset_misfits(times, heights, clock, pressures)
+    assert len(offsets) == len(misfits) > 100 and (np.diff(offsets) >= 0).all()
+    assert min(offsets[np.argmin(misfits)] - offsets[0], np.ptp(offsets)) >= 0
+    ends = [np.isfinite(log_at(s, times, clock, pressures)).mean() for s in offsets]
+    assert min(ends) >= WITHIN - 1e-9
 
 
 def test_offsets_that_do_as_well_are_told_from_the_least_to_the_largest():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.data.frames import Frame
-from bubblefit.data.spheres import fit_sphere, points_of
+from bubblefit.data.spheres import _linear, fit_sphere, points_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,6 +34,12 @@ def test_a_perfect_ball_is_found_exactly(radius, half, seed):
     assert found.radius == pytest.approx(radius, rel=1e-9, abs=rounding)
     np.testing.assert_allclose(found.centre, CENTRE, atol=rounding + 1e-9 * radius)
     assert found.left_out == 0 and found.rms < rounding + 1e-9 * radius
+
+
+def test_the_first_guess_is_exact_without_noise():
+    """Eq. A.6; what the least squares of the distances begin at."""
+    centre, radius = _linear(cap(count=12)[0])
+    np.testing.assert_allclose([*centre, radius], [*CENTRE, 40.0], rtol=1e-9)
 
 
 def test_noise_moves_it_as_far_as_is_said():

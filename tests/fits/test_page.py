@@ -336,6 +336,19 @@ def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Pa
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
 
 
+def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: Path) -> None:
+    """Whatever the other fits that are drawn with it."""
+    one, two = together.best.ranked
+    unknowns = tuple(1.5 * u for u in one.unknowns)
+    best = replace(together.best, ranked=[one, replace(two, unknowns=unknowns)])
+    fit = replace(together, best=best)
+    page._moduli(fit, tmp_path)
+    (_, curves, _), drawn = told.calls["plot_moduli"]
+    assert curves[1][0] == pytest.approx(1.5 * curves[0][0])
+    share = fit.best.certainty.total["E1"][0]
+    assert drawn["sigma"][0] == pytest.approx(np.full(121, share * fit.law.beta[11]))
+
+
 def test_a_modulus_known_no_better_than_before_is_unknown() -> None:
     """Before the tests each is known to 1000 %, less a thousandth for rounding."""
     said = [page.sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]

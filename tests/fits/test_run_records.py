@@ -64,6 +64,14 @@ def test_a_run_is_stored_exactly(tmp_path: Path) -> None:
     assert folder.read("a" * 64) is None
 
 
+def test_runs_of_an_earlier_version_are_found_by_their_names(tmp_path: Path) -> None:
+    """The first twenty digits of the mark: under another name nothing would be gone on with."""
+    folder = RunRecords(tmp_path)
+    folder.begin(False, False)
+    folder.write("0123456789abcdef" * 4, ran(model(), card()))
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["0123456789abcdef0123.npz"]
+
+
 def test_there_is_nothing_to_go_on_with_where_nothing_was(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nothing to go on with"):
         RunRecords(tmp_path / "out").begin(True, False)

@@ -99,6 +99,8 @@ def test_tests_of_a_line():
     # Those that run some of the module come before those that run none of it.
     some = Measured({"fits/page.py": {1: {""}, 2: {"t::slow"}}}, known.seconds)
     assert some.tests("fits/page.py", 1, 1, 60.0)[0] == "t::slow"
+    # Unless they are slow, and the line is no more than loaded.
+    assert some.tests("fits/page.py", 1, 1, 60.0, loading=True)[0] == "t::quick"
     # A module of declarations: no test runs a line of it, and any may show it.
     declared = Measured({"fits/schema.py": {1: {""}}}, known.seconds)
     assert sorted(declared.tests("fits/schema.py", 1, 1, 60.0)) == sorted(known.seconds)

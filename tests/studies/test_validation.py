@@ -62,7 +62,9 @@ def test_what_a_fit_to_the_other_test_foretells(tmp_path: Path) -> None:
     assert said["mean_foretold"]["constant"] == pytest.approx(
         (found.judged[0].foretold.error + relative) / 2, rel=1e-4
     )
-    assert (tmp_path / "out" / "constant-without-2" / "report.html").exists()
+    folders = {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()}
+    assert folders == {"constant-all", "constant-without-1", "constant-without-2"}
+    assert all((tmp_path / "out" / name / "report.html").exists() for name in folders)
     assert found.lines()[-1] == (
         f"constant: foretold {100 * said['mean_foretold']['constant']:.3g} % on average"
     )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from bubblefit.experiments.base import FittedTest, Output
+from bubblefit.experiments.bubble.findings import FAITHFUL, _warnings
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
+from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...projects import small
@@ -59,3 +63,17 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path: Path) -> None:
     # At the known moduli every difference is the offsets': mean |dx| + |dy| + |dz|.
     off = moved.displacement + SHIFT - np.array([f.displacement for f in prepared.fields])
     assert findings.numbers["mean_abs_mm"] == pytest.approx(np.abs(off).sum(axis=2).mean())
+
+
+@pytest.mark.parametrize("by_this_model", [False, True])
+def test_what_is_warned_of_before_the_numbers_are_used(by_this_model: bool) -> None:
+    """Surfaces of a low degree, where they are what is matched; data of the fit's own model."""
+
+    def told(by: str, degree: int) -> list[NoteKind]:
+        test = SimpleNamespace(match_by=by, match_degree=degree)
+        prepared: Any = SimpleNamespace(test=test, by_this_model=by_this_model)
+        return [note.kind for note in _warnings(prepared)]
+
+    crime = [NoteKind.INVERSE_CRIME] * by_this_model
+    assert told("points", 4) == told("points", FAITHFUL) == told("surfaces", FAITHFUL) == crime
+    assert told("surfaces", FAITHFUL - 1) == [*crime, NoteKind.SURFACES]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.beam import bodies_of, whole_beam
+from bubblefit.experiments.cylinder.beam import Beam, bodies_of, whole_beam
 from bubblefit.experiments.cylinder.record import BendingRun, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
@@ -59,3 +62,32 @@ def test_bodies_touch_the_inflated_beam() -> None:
     inside = np.abs(at[:, 2]) <= 72.5
     reach = np.hypot(at[inside, 0], at[inside, 1] - bodies.collar_height - 30.0).max()
     assert reach == pytest.approx(120.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "height", "top"),
+    [
+        # In a collar of 100 mm in radius a point 60 mm aside is touched 80 mm above the middle.
+        ([[0.0, 20.0, 0.0], [60.0, 30.0, 0.0]], 10.0, -50.0),
+        # As long as the collar, and no longer; as wide as its inside, less nothing.
+        ([[0.0, 90.0, 20.1], [0.0, 95.0, -20.1], [0.0, 20.0, 20.0]], 10.0, -80.0),
+        ([[-99.0, 20.0, 0.0], [100.0, 500.0, 0.0]], 10.0, 20.0 - np.sqrt(199.0)),
+        # On a support of 50 mm in radius 30 mm beside its middle, on either side.
+        ([[0.0, 20.0, 0.0], [0.0, -5.0, 170.0]], -45.0, -80.0),
+        ([[0.0, 20.0, 0.0], [0.0, -5.0, -230.0]], -45.0, -80.0),
+        ([[0.0, 20.0, 0.0], [0.0, -99.0, 250.0]], 10.0, -80.0),
+    ],
+)
+def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float) -> None:
+    """Beside a node that stands on a support 60 mm high."""
+    rest = np.array([*points, [0.0, 60.0, 200.0]])
+    made: Any = SimpleNamespace(
+        supports=SimpleNamespace(diameter=100.0, span=400.0),
+        collar=SimpleNamespace(inner_diameter=200.0, length=40.0),
+    )
+    mesh: Any = SimpleNamespace(points=rest - [0.0, 7.0, 0.0])
+    moved = np.tile([0.0, 7.0, 0.0], (len(rest), 1))
+    found = bodies_of(made, Beam(mesh, moved, moved), 12.0)
+    assert found.supports == ((-200.0, pytest.approx(height)), (200.0, pytest.approx(height)))
+    assert (found.support_radius, found.collar_radius, found.collar_length) == (50.0, 100.0, 40.0)
+    assert found.collar_height == pytest.approx(top - 12.0)
