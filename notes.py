@@ -50,6 +50,7 @@ class NoteKind(StrEnum):
     STARTS = "starts that failed"
     UNCERTAIN = "uncertain"
     MESH = "mesh error"
+    TAKEN_OUT = "mesh error taken out"
     MARGIN = "on its margin"
     BOUND = "on a bound"
     ALONE = "undetermined alone"

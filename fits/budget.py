@@ -6,35 +6,43 @@ from dataclasses import replace
 
 from ..errors import InputError, SolverFailure
 from ..identification.assessment import certainty
+from ..identification.discretisation import Limit
 from ..identification.problem import FitProblem
 from ..notes import Note, NoteKind
 from .best import BestFit
-from .mesh_error import limit_of_meshes, moved_moduli, notes_of_mesh
+from .mesh_error import TAKEN_OUT, limit_of_meshes, note_of_limit, notes_of_mesh
 from .setup import FitSetup
+
+NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """The best fit with its certainty; as it is where its derivatives are not known.
 
-    What the mesh leaves is no noise: that is what finer models would leave.
+    What the mesh leaves is no noise: that is what finer models would leave. Where the project asks
+    for it, the law is that of ever finer meshes; the analysis stays that of the fit.
     """
     slopes = best.differentiated
     if slopes is None:
         return best
-    limit = None
-    unknown: tuple[Note, ...] = ()
+    out = setup.project.fit.mesh_error == TAKEN_OUT
+    limit, notes = _limit(setup, problem, best)
+    law = best.law
+    if limit is None and out:
+        notes.append(Note(NoteKind.MESH, NOT_TAKEN_OUT))
+    elif limit is not None and out:
+        law = law.with_beta(problem.unknowns.beta(slopes.unknowns + limit.step))
+    sure = certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
+    if sure.mesh is not None:
+        notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)
+    told = (*sure.undetermined, *notes)
+    sure = replace(sure, undetermined=told, taken_out=out and limit is not None)
+    return replace(best, law=law, certainty=sure)
+
+
+def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit | None, list[Note]]:
     try:
-        limit = limit_of_meshes(setup, problem, best)
+        return limit_of_meshes(setup, problem, best), []
     except (InputError, SolverFailure) as error:
         words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
-        unknown = (Note(NoteKind.MESH, words),)
-    leading = problem.surrogate or problem
-    left = None if limit is None else limit.residual
-    sure = certainty(leading, slopes, best.law, best.valid, left)
-    sure = replace(sure, undetermined=(*sure.undetermined, *unknown))
-    if limit is not None:
-        law = best.law.with_beta(problem.unknowns.beta(slopes.unknowns + limit.step))
-        mesh = moved_moduli(best.law, law, sure.strain)
-        told = (*sure.undetermined, *notes_of_mesh(sure, mesh))
-        sure = replace(sure, mesh=mesh, mesh_step=limit.step, undetermined=told)
-    return replace(best, certainty=sure)
+        return None, [Note(NoteKind.MESH, words)]

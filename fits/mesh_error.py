@@ -10,7 +10,6 @@ from ..identification.assessment import Certainty
 from ..identification.discretisation import Limit, limit_of, residual_of
 from ..identification.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
-from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .best import BestFit
 from .setup import FitSetup
@@ -19,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Elements and increments are divided by it, once.
 FINER = 2.0
+#: What a project says of it (`fit.mesh_error`).
+TOLD, TAKEN_OUT = "told", "taken out"
 #: Less of a modulus is no matter, whatever the noise.
 LEAST = 0.01
 
@@ -47,13 +48,6 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
     return limit_of(problem, best.differentiated, residual, FINER)
 
 
-def moved_moduli(
-    law: HypoelasticLaw, there: HypoelasticLaw, strain: dict[str, Array]
-) -> dict[str, Array]:
-    """(n,) by modulus: how much larger each is by another law, relative, at strains (n,)."""
-    return {name: there.modulus(name, x) / law.modulus(name, x) - 1.0 for name, x in strain.items()}
-
-
 def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
     """Each modulus that the mesh moves by more than the noise does, where that is most."""
     notes = []
@@ -68,3 +62,14 @@ def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
             )
             notes.append(Note(NoteKind.MESH, words))
     return notes
+
+
+def note_of_limit(mesh: dict[str, Array]) -> Note:
+    """That the card is not that of the mesh that the fit was run with."""
+    by = ", ".join(f"{name} {100 * off[np.abs(off).argmax()]:+.2g} %" for name, off in mesh.items())
+    words = (
+        f"the error of the mesh is taken out of the moduli ({by} at most): the card is the law of "
+        "ever finer meshes, to first order; objective, residuals and what is drawn of the tests "
+        "are those of the mesh of the fit"
+    )
+    return Note(NoteKind.TAKEN_OUT, words)

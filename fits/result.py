@@ -86,6 +86,8 @@ class Fit:
             f"bubblefit {__version__} {self.command}, {self.project.path.name}, objective "
             f"{self.objective:.4g}, {quality}"
         )
+        if self.best.certainty is not None and self.best.certainty.taken_out:
+            source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
         return MaterialCard(law, self.project.fabric.thickness, self.project.title, source)
 
@@ -128,19 +130,22 @@ class Fit:
     def moduli(self) -> pd.DataFrame:
         """E1, E2 and G12 (MPa) along their strains, with one standard deviation.
 
-        Columns modulus, strain, MPa, sigma_relative, and what it is made of: noise_relative,
-        mesh_relative (by how much the modulus would be another on ever finer meshes). NaN where
-        it is not known; sigma is that of the noise alone where the mesh's part is not known.
+        Columns modulus, strain, MPa, the ends of its band, lower_MPa and upper_MPa (95 %, noise and
+        mesh together), sigma_relative, and what it is made of: noise_relative, mesh_relative (by
+        how much the modulus would be another on ever finer meshes than on that of the fit). NaN
+        where it is not known; sigma is that of the noise alone where the mesh's part is not known.
         """
         import pandas as pd
 
         sure, rows = self.best.certainty, []
         for name, component in COMPONENTS.items():
             strain = np.linspace(0.0, self.best.valid[component], PLACES)
-            sigma = noise = mesh = np.full(PLACES, np.nan)
+            sigma = noise = mesh = lower = upper = np.full(PLACES, np.nan)
             if sure is not None:
                 at = sure.strain[name]
                 sigma, noise = (np.interp(strain, at, s[name]) for s in (sure.total, sure.sigma))
+                if name in sure.band:
+                    lower, upper = (np.interp(strain, at, end) for end in sure.band[name])
                 if sure.mesh is not None:
                     mesh = np.interp(strain, at, sure.mesh[name])
             rows.append(
@@ -149,6 +154,8 @@ class Fit:
                         "modulus": name,
                         "strain": strain,
                         "MPa": self.law.modulus(name, strain),
+                        "lower_MPa": lower,
+                        "upper_MPa": upper,
                         "sigma_relative": sigma,
                         "noise_relative": noise,
                         "mesh_relative": mesh,
@@ -191,9 +198,8 @@ class Fit:
     def laws(self) -> list[HypoelasticLaw]:
         """The laws of the best starts, best first."""
         unknowns = self.problem.unknowns
-        return [
-            self.law.with_beta(unknowns.beta(np.array(r.unknowns))) for r in self.best.ranked[:BEST]
-        ]
+        others = [unknowns.beta(np.array(r.unknowns)) for r in self.best.ranked[1:BEST]]
+        return [self.law, *map(self.law.with_beta, others)]
 
     def report(self, folder: Path | str) -> Path:
         """Write the card, tables, figures, report.html and, last, result.json into a folder.

@@ -83,6 +83,7 @@ class FitSection(Section):
     tolerance: Positive = 1e-7
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
+    mesh_error: Literal["told", "taken out"] = "told"
 
 
 class CommonSections(Section):

@@ -26,7 +26,7 @@ MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
 SOLVER_KEY = "fit.solver"
 #: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
 #: solver is told by what it says of itself.
-UNCOUNTED = ("starts", "solver", "jobs", "trust")
+UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error")
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
+from .bands import bands_of
+from .discretisation import Limit
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
-from .propagation import POINTS, PRIOR, along, posterior_of, sizes_of
+from .propagation import LEFT, POINTS, PRIOR, along, moduli_of, posteriors_of, sizes_of
 
 Array = NDArray[np.float64]
 
@@ -36,15 +38,17 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """1-sigma relative uncertainty of each modulus up to the strains reached, and plain words.
+    """How sure each modulus is up to the strains reached, and plain words.
 
     noise : by comparison, in the unit of its data (mm, N); alike : by comparison, how many
-    neighbouring values err as one. strain, sigma : (n,) by modulus.
+    neighbouring values err as one. strain, sigma : (n,) by modulus, 1 sigma by noise, relative.
     undetermined : what the data do not determine, and what lies on its bound. mesh : (n,) by
-    modulus, by how much it would be another on ever finer meshes, relative; None where that is
-    not known. posterior : of all unknowns, from the noise alone. rows : (m,) of each residual the
-    noise that as many independent ones would have. mesh_step : (unknowns,) from the best unknowns
-    to those of ever finer meshes, None where that is not known.
+    modulus, by how much it would be another on ever finer meshes, relative, than on that of the
+    fit; None where that is not known. posterior : of all unknowns, from the noise alone. fine : of
+    those of ever finer meshes, with what may be left of their error; None as `mesh`. rows : (m,)
+    of each residual the noise that as many independent ones would have. band : (2, n) MPa by
+    modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
+    whether the law reported is that of ever finer meshes.
     """
 
     noise: dict[str, float]
@@ -54,15 +58,37 @@ class Certainty:
     mesh: dict[str, Array] | None = None
     alike: dict[str, float] = field(default_factory=dict)
     posterior: Posterior | None = None
+    fine: Posterior | None = None
     rows: Array | None = None
-    mesh_step: Array | None = None
+    band: dict[str, Array] = field(default_factory=dict)
+    taken_out: bool = False
 
     @property
     def total(self) -> dict[str, Array]:
-        """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma."""
+        """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma.
+
+        Of a mesh whose error is taken out, what may be left of it.
+        """
         if self.mesh is None:
             return dict(self.sigma)
-        return {name: np.hypot(sigma, self.mesh[name]) for name, sigma in self.sigma.items()}
+        share = LEFT if self.taken_out else 1.0
+        return {
+            name: np.hypot(sigma, share * self.mesh[name]) for name, sigma in self.sigma.items()
+        }
+
+    def laws(
+        self, law: HypoelasticLaw, count: int, random: np.random.Generator
+    ) -> list[HypoelasticLaw]:
+        """`count` laws as data and mesh leave them: `law` with other numbers, within its bounds.
+
+        Raises
+        ------
+        ValueError : the posterior is not there (a certainty made by hand).
+        """
+        known = self.fine or self.posterior
+        if known is None:
+            raise ValueError("this certainty has no posterior to draw laws from")
+        return known.laws(law, count, random)
 
 
 def certainty(
@@ -70,17 +96,17 @@ def certainty(
     best: Evaluation,
     law: HypoelasticLaw,
     reached: Array,
-    left: Array | None = None,
+    limit: Limit | None = None,
 ) -> Certainty:
     """Linear propagation of the noise of every comparison to the moduli.
 
     Parameters
     ----------
-    left : (m,) the residual that counts as noise (see `Noise.of`), that of the best fit unless
-        given.
+    law : that is reported. limit : of ever finer models, where it is known: what it leaves counts
+        as noise (see `Noise.of`), else what the best fit leaves.
     """
-    noise = Noise.of(problem, best.residual if left is None else left)
-    posterior = posterior_of(problem, best, noise)
+    noise = Noise.of(problem, best.residual if limit is None else limit.residual)
+    posterior, fine = posteriors_of(problem, best, noise, limit)
     strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
     first = problem.comparisons[0]
     which = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
@@ -96,8 +122,22 @@ def certainty(
         if relative.max() > UNCERTAIN
     ]
     told = (*words, *_limited(problem, best))
+    mesh = None
+    if limit is not None:
+        moduli = moduli_of(problem.unknowns, best.unknowns, strains)
+        there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
+        mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
     return Certainty(
-        noise.level, strains, sigmas, told, alike=noise.alike, posterior=posterior, rows=noise.rows
+        noise.level,
+        strains,
+        sigmas,
+        told,
+        mesh,
+        noise.alike,
+        posterior,
+        fine,
+        noise.rows,
+        bands_of(fine or posterior, law, strains),
     )
 
 

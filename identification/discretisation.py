@@ -47,11 +47,13 @@ def residual_of(
 class Limit:
     """What ever finer models would give.
 
-    step : (unknowns,) from the best unknowns to their own; residual : (m,) what they would leave.
+    step : (unknowns,) from the best unknowns to their own; residual : (m,) what they would leave;
+    error : (m,) of the residual at the best unknowns, by which theirs would be another.
     """
 
     step: Array
     residual: Array
+    error: Array
 
 
 def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
@@ -71,7 +73,7 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     blocks = problem.blocks
     norms = np.maximum(blocks.norms(best.residual), blocks.norms(error))
     if not (norms > 0).any():
-        return Limit(np.zeros_like(best.unknowns), best.residual)
+        return Limit(np.zeros_like(best.unknowns), best.residual, error)
     weights = 1.0 / np.maximum(norms, 1e-9 * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     a, c = problem.unknowns.inequalities
@@ -85,4 +87,4 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     if without is None or there is None:
         return None
     step = there - without
-    return Limit(step, best.residual + error + best.jacobian @ step)
+    return Limit(step, best.residual + error + best.jacobian @ step, error)

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The unknowns as the noise of the data leaves them; the error of the mesh is not in it.
+    """The unknowns as the noise of the data leaves them.
 
     Parameters
     ----------
@@ -61,6 +61,17 @@ class Posterior:
         sigma = np.sqrt(np.diag(self.coefficients))
         unit = np.where(sigma > 0, sigma, 1.0)
         return np.asarray(self.coefficients / unit / unit[:, None])
+
+    def moved(self, step: Array, centre: Array, share: float) -> Posterior:
+        """The same about other unknowns.
+
+        Parameters
+        ----------
+        step : (n,) from the best to the other best. centre : (n,) the other centre. share : of the
+            step, by which the other best is uncertain (one standard deviation).
+        """
+        covariance = self.covariance + share**2 * np.outer(step, step)
+        return Posterior(self.unknowns, self.best + step, centre, covariance)
 
     def sample(self, count: int, random: np.random.Generator) -> Array:
         """`count` draws of all unknowns (count, n), all of which keep the inequalities.

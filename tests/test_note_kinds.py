@@ -114,6 +114,7 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     ),
     K.UNCERTAIN: ((fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),),
     K.MESH: ((fits.notes_of_mesh, r"on a fine mesh E1 would be \+4 % at strain 0\.050"),),
+    K.TAKEN_OUT: ((fits.notes_of_limit, r"taken out of the moduli \(E1 \+4 %, E2 \+4 %"),),
     K.MARGIN: ((fits.notes_of_fit, "E2 touches its positivity margin"),),
     K.BOUND: (
         (fits.notes_of_fit, "E1 touches its upper bound"),

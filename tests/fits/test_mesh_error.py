@@ -166,3 +166,52 @@ def test_what_the_mesh_leaves_is_no_noise() -> None:
     limit = limit_of(problem, best, residual_of(problem, finer, best, fitted.law), 2.0)
     after = float(np.sqrt(np.mean((limit.residual * problem.scale) ** 2)))
     assert after < 0.5 * before
+
+
+def test_the_error_is_taken_out_where_the_project_says_so() -> None:
+    """The card is the law of ever finer meshes, within the bounds; objective and run stay."""
+    fitted = fit()
+    settings = fitted.project.fit.model_copy(update={"mesh_error": "taken out"})
+    setup = replace(fitted.setup, project=replace(fitted.project, fit=settings))
+    plain = replace(fitted.best, certainty=None)
+    best = with_certainty(setup, fitted.problem, plain)
+    told, sure = fitted.best.certainty, best.certainty
+    assert sure.taken_out and not told.taken_out
+    assert best.point is plain.point and best.objective == fitted.objective
+    a, c = fitted.problem.unknowns.inequalities
+    assert (a @ sure.fine.best >= c - 1e-9).all()
+    for name, strain in sure.strain.items():
+        moved = best.law.modulus(name, strain) / fitted.law.modulus(name, strain) - 1.0
+        assert moved == pytest.approx(told.mesh[name], abs=1e-12)
+        # What may be left is a tenth of it; the band is about the card.
+        assert sure.total[name] == pytest.approx(np.hypot(sure.sigma[name], 0.1 * sure.mesh[name]))
+        for which, law in ((sure, best.law), (told, fitted.law)):
+            lower, upper = which.band[name]
+            own = law.modulus(name, strain)
+            assert (lower <= own).all() and (own <= upper).all()
+        wide, narrow = (np.ptp(which.band[name], axis=0) for which in (told, sure))
+        assert (narrow <= wide * (1 + 1e-9)).all()
+    (note,) = [n for n in sure.undetermined if n.kind is NoteKind.TAKEN_OUT]
+    assert "is taken out of the moduli (E1 " in note
+    assert not [n for n in sure.undetermined if n.kind is NoteKind.MESH]
+    again = replace(fitted, setup=setup, best=best)
+    assert again.card.source.endswith(", error of the mesh taken out")
+    assert again.law is best.law and again.laws[0] is best.law
+    rows = again.moduli().query("modulus == 'E1'")
+    assert rows["upper_MPa"].to_numpy() == pytest.approx(sure.band["E1"][1], rel=1e-9)
+
+
+def test_an_error_that_is_not_known_is_not_taken_out() -> None:
+    fitted = fit()
+    settings = fitted.project.fit.model_copy(update={"mesh_error": "taken out"})
+
+    class Unable:
+        """A test of a kind that has nothing finer."""
+
+    project = replace(fitted.project, fit=settings)
+    setup = replace(fitted.setup, project=project, tests=(Unable(),))
+    best = with_certainty(setup, fitted.problem, replace(fitted.best, certainty=None))
+    assert best.law is fitted.best.law and not best.certainty.taken_out
+    assert best.certainty.undetermined[-1] == (
+        "the error of the mesh is not known here and is not taken out of the moduli"
+    )

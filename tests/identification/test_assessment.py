@@ -15,6 +15,7 @@ from bubblefit.identification.assessment import (
     pinned_by,
 )
 from bubblefit.identification.bounds import LawBounds
+from bubblefit.identification.discretisation import Limit
 from bubblefit.identification.methods.descent import descend
 from bubblefit.identification.noise import Misfit, Noise, notes_of_misfits
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
@@ -68,7 +69,9 @@ def test_certainty_predicts_the_scatter_of_noisy_fits() -> None:
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANT.to_coefficients @ scatter / moduli, rel=0.03)
     assert not predicted.undetermined
-    thrice = certainty(fit, point, FLAT_LAW, clean.strain_max, 3 * point.residual)
+    still = np.zeros_like(point.unknowns)
+    limit = Limit(still, 3 * point.residual, 0 * point.residual)
+    thrice = certainty(fit, point, FLAT_LAW, clean.strain_max, limit)
     assert thrice.sigma["G12"][0] == pytest.approx(3 * sigma[0])
     (words,) = thrice.undetermined
     assert words.startswith(f"G12 is uncertain by up to {300 * sigma[0]:.0f} % (1 sigma at 0.15 mm")

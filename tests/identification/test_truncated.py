@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.identification import truncated
 from bubblefit.identification.truncated import truncated_draws
-from scipy.stats import halfnorm, kstest, norm, truncnorm
+from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
 
 COUNT = 4000
 COVARIANCE = np.array([[4.0, 1.5], [1.5, 1.0]])
@@ -80,3 +80,15 @@ def test_a_direction_without_variance_stays() -> None:
         np.zeros(2), flat, (np.eye(2), np.zeros(2)), np.zeros(2), 100, np.random.default_rng(0)
     )
     assert (drawn[:, 0] >= 0).all() and drawn[:, 0].std() > 0.4 and not drawn[:, 1].any()
+
+
+def test_between_bounds_that_are_close_to_each_other() -> None:
+    """A slab of a thousandth of a standard deviation, askew: along it everything is drawn."""
+    across, along = np.array([[0.6, 0.8, 0.0], [0.8, -0.6, 0.0]])
+    inequalities = np.array([across, -across]), np.array([2.0, -2.001])
+    drawn = truncated_draws(
+        np.zeros(3), np.eye(3), inequalities, 2.0 * across, COUNT, np.random.default_rng(2)
+    )
+    assert kstest(drawn @ along, norm.cdf).pvalue > 0.01
+    assert kstest(drawn[:, 2], norm.cdf).pvalue > 0.01
+    assert kstest(drawn @ across, uniform(2.0, 0.001).cdf).pvalue > 0.01

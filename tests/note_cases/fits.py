@@ -93,6 +93,11 @@ def notes_of_mesh(*_: Any) -> Iterable[Note]:
     return mesh_error.notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
 
 
+def notes_of_limit(*_: Any) -> Iterable[Note]:
+    """The same mesh, its error taken out."""
+    return [mesh_error.note_of_limit({name: np.array([0.0, 0.04]) for name in COMPONENTS})]
+
+
 def notes_of_certainty(*_: Any) -> Iterable[Note]:
     """A pressure that is as far off as it may be."""
     offset = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
