@@ -29,10 +29,11 @@ if TYPE_CHECKING:
     from .fits.result import Fit
     from .fits.simulation import simulate
     from .materials.card import MaterialCard, read_card
+    from .studies.plan import plan
 
 __version__ = "0.2.0"
-__all__ = ["Fit", "MaterialCard", "Project", "fit", "predict", "read_card", "read_project",
-           "simulate"]  # fmt: skip
+__all__ = ["Fit", "MaterialCard", "Project", "fit", "plan", "predict", "read_card",
+           "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -41,6 +42,7 @@ _PLACES = {
     "MaterialCard": "materials.card",
     "Project": "fits.project",
     "fit": "fits.fit",
+    "plan": "studies.plan",
     "predict": "fits.predictions",
     "read_card": "materials.card",
     "read_project": "fits.project",

@@ -26,10 +26,11 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "studies": (
         "Studies",
         ("studies.refinement:refine,Refinement", "studies.poisson:vary_nu12,Nu12Study,Ratios",
-         "studies.laws:compare_laws,LawComparison",
+         "studies.laws:compare_laws,LawComparison", "studies.plan:plan",
+         "studies.planned:Plan,Planned",
          "studies.convergence:convergence,Convergence"),
     ),
-    "tests": ("Kinds of test", ("experiments.base",
+    "tests": ("Kinds of test", ("experiments.base", "experiments.candidates",
                                 "identification.comparison:Comparison,Objective")),
     "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base",
                       "materials.forms.registry")),

@@ -431,7 +431,8 @@ class Kind(Protocol):
     name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
     section : what such a table may say; `name` is among it, and `weight` where it is fitted.
     fitted : whether its tests are `FittableTest`s. predicted : what tests offer that cards predict,
-    None for others. studied : None where no study runs it. A kind whose section names the folder of
+    None for others. studied : None where no study runs it. A kind that knows tests worth making
+    next offers them (`candidates.Plannable`). A kind whose section names the folder of
     measured files has `folder_key`, the dotted key of it, by which a project can be written down
     with the folder that it was run with.
     """

@@ -21,6 +21,7 @@ from .nu12 import plot_nu12
 from .optima import plot_optima
 from .orders import OrderErrors, plot_orders
 from .pinned import plot_pinned
+from .plan import plot_plan
 from .profiles import plot_profiles
 from .registration import plot_registration
 from .rises import plot_rises
@@ -60,6 +61,7 @@ __all__ = [
     "plot_optima",
     "plot_orders",
     "plot_pinned",
+    "plot_plan",
     "plot_profiles",
     "plot_registration",
     "plot_rises",

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..experiments.base import MakeSolver, PreparedTest, Weighting
 from ..experiments.notes import beyond, strains_of, unstable_words
 from ..identification.bounds import LawBounds
-from ..identification.methods.descent import descend
+from ..identification.given_law import evaluate_law
 from ..identification.problem import Evaluation, FitProblem
 from ..identification.unknowns import Unknowns
 from ..materials.law import HypoelasticLaw
@@ -19,9 +17,6 @@ from .folds import errors
 
 #: MPa: the law is given and not looked for; bounds only size the unknowns.
 ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
-#: Analyses in which what is no law (offsets, the sheet's surface) is fitted to the test.
-MOST = 40
-TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +46,12 @@ def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolve
     unknowns = Unknowns.of(law.form, law.nu12, ends, bounds, comparisons)
     problem = FitProblem(comparisons, law, unknowns)
     units = {c.name: c.objective.unit for c in comparisons}
-    point = _evaluated(problem, unknowns.at(law.beta[list(unknowns.free)]))
+    point = evaluate_law(problem, unknowns.at(law.beta[list(unknowns.free)]))
     if point is None:
         note = Note(NoteKind.FAILED, f"no analysis: {problem.failure}", name)
         return HeldOut(name, None, {}, units, (note,))
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
     return HeldOut(name, point.value, errors(problem, point.residual), units, notes)
-
-
-def _evaluated(problem: FitProblem, y: np.ndarray) -> Evaluation | None:
-    """At the law given, the nuisance where it fits best."""
-    if not problem.unknowns.nuisance.all or not problem.differentiates:
-        return problem.evaluate(y, False, warm=False)
-    first = problem.evaluate(y, True)
-    if first is None:
-        return None
-    free = np.arange(problem.unknowns.count) >= problem.unknowns.size
-    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, only=free)
-    return best
 
 
 def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[Note]:

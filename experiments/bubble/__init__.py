@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...materials.card import MaterialCard
 from ..base import CardRun, Output, Place, Simulation, Studied
+from ..candidates import Candidate, Planning
 from .doubts.names import NAMES
 from .section import BubbleSection
 from .test import BubbleTest, read
@@ -48,6 +49,12 @@ class BubbleKind:
         from .forward import simulate
 
         return simulate(test, cards, runs, out, within_range)
+
+    def candidates(self, planning: Planning) -> Sequence[Candidate]:
+        """The same again, to more pressure, with an elliptic rim."""
+        from .candidates import candidates
+
+        return candidates(planning)
 
 
 KIND = BubbleKind()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydantic import BaseModel
@@ -11,6 +11,7 @@ from ...materials.card import MaterialCard
 from ...models.uniaxial import UniaxialModel
 from ...solvers.base import History
 from ..base import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..candidates import Candidate, Planning
 from .objective import Array
 from .section import StripsSection
 from .test import StripsTest, read
@@ -65,3 +66,9 @@ class Strips:
         from .simulated import simulate
 
         return simulate(test, cards, runs, out, within_range)
+
+    def candidates(self, planning: Planning) -> Sequence[Candidate]:
+        """Strips along the yarns and at angles to them."""
+        from .candidates import candidates
+
+        return candidates(planning)

@@ -41,39 +41,3 @@ def test_strains_beyond_the_law_and_unstable_equilibria_with_their_part() -> Non
     # Of the only comparison nothing else could be meant.
     assert notes(history(0.1181, 0.0, ("2 mm",))) == [f"one: {beyond}", f"one: {unstable}"]
     assert notes(history(0.1, -0.1)) == []
-
-
-def asked(nuisance: tuple[str, ...], differentiates: bool, first: Any = "first") -> list[Any]:
-    """What is asked of a problem of two coefficients, and of the descent."""
-    calls: list[Any] = []
-
-    def evaluate(y: np.ndarray, jacobian: bool, **how: bool) -> Any:
-        calls.append((jacobian, how))
-        return first
-
-    problem: Any = SimpleNamespace(
-        unknowns=SimpleNamespace(
-            nuisance=SimpleNamespace(all=nuisance), count=2 + len(nuisance), size=2
-        ),
-        differentiates=differentiates,
-        evaluate=evaluate,
-    )
-    calls.append(room._evaluated(problem, np.zeros(2 + len(nuisance))))
-    return calls
-
-
-def test_only_what_is_no_law_is_fitted(monkeypatch) -> None:
-    told: list[Any] = []
-
-    def descend(problem: Any, first: Any, *limits: float, norms: bool, only: np.ndarray) -> Any:
-        told.append((first, limits, norms, only.tolist()))
-        return "best", None
-
-    monkeypatch.setattr(room, "descend", descend)
-    assert asked(("x", "y"), True) == [(True, {}), "best"]
-    assert told == [("first", (room.TOLERANCE, room.MOST), True, [False, False, True, True])]
-    assert asked(("x",), True, None) == [(True, {}), None]
-    # Nothing but the law is unknown, or the solver cannot tell where to go: as it is, from rest.
-    assert asked((), True) == [(False, {"warm": False}), "first"]
-    assert asked(("x",), False) == [(False, {"warm": False}), "first"]
-    assert len(told) == 1

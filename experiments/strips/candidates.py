@@ -1,0 +1,141 @@
+"""Strip tests that could be made next: along the yarns, and at angles to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ...data.curves import DIRECTIONS, LoadCurve
+from ...models.uniaxial import GRIP_DISTANCE, WIDTH
+from ..candidates import Candidate, Planning, Precision
+from .prepared import PreparedStrips, loads_to_match
+from .strip import Strip
+from .test import StripsTest
+
+#: Degrees from the pull to the warp yarn, of strips across the yarns.
+ANGLES = (30.0, 45.0, 60.0)
+#: Where the project has no strips: mm of the gauge, increments and values of a curve, specimens.
+GAUGE, INCREMENTS, SPECIMENS = 20.0, 20, 3
+#: Of the largest load: scatter of specimens where none is known. That of the published strips is
+#: 2, 6 and 4 % (examples/uniaxial-valmex7318/curves.csv). A specimen is stiffer or softer along
+#: much of its curve: so many values of it are taken to be independent.
+SCATTER, INDEPENDENT = 0.04, 5
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A strip that could be pulled: direction as the kind knows it, and its angle in degrees."""
+
+    direction: str
+    angle: float
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        if self.direction != "bias":
+            return f"{self.direction} strip"
+        return f"strip at {self.angle:g} degrees"
+
+
+def candidates(planning: Planning) -> Sequence[Candidate]:
+    """Each direction by itself; of the project's first strips, or of usual ones."""
+    own = [test for test in planning.present if isinstance(test, PreparedStrips)]
+    template = own[0] if own else None
+    angles = dict.fromkeys([*ANGLES, *([template.test.bias_angle] if template else [])])
+    pulls = [Pull("warp", 0.0), Pull("fill", 90.0), *(Pull("bias", a) for a in sorted(angles))]
+    noise_is = "assumed" if template is None else f"that of {template.test.name}"
+    if planning.noise is not None:
+        noise_is = "given"
+    return [
+        Candidate(pull.name, partial(_made, pull, template, planning), noise_is, SPECIMENS)
+        for pull in pulls
+    ]
+
+
+def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
+    """The strip with the loads that the law gives, one value an increment."""
+    strip = _strip(pull, template, planning)
+    test = _test(pull, strip, template, planning)
+    (model,) = test.models().values()
+    history = planning.make_solver().run(model, planning.law)
+    load, elongation = np.asarray(history.load), np.array(model.elongations)
+    noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
+    curve = LoadCurve(pull.direction, "computed", elongation, load, None)
+    done = replace(strip, curves=(curve,))
+    return PreparedStrips(replace(test, strips={pull.direction: done}, noise=noise))
+
+
+def _strip(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Strip:
+    """As long as the project's own of the direction, else pulled as far as the law is known."""
+    own = None if template is None else template.test.strips.get(pull.direction)
+    gauge = GAUGE if own is None else own.gauge_length
+    final = gauge * math.exp(_strain(pull, planning))
+    if template is not None and own is not None:
+        alike = pull.direction != "bias" or pull.angle == template.test.bias_angle
+        final = own.final_length if alike else final
+    return Strip(pull.direction, gauge, final)
+
+
+def _strain(pull: Pull, planning: Planning) -> float:
+    """Logarithmic strain of the gauge at which a yarn, or the shear between them, is at its end.
+
+    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    """
+    warp, fill, shear = planning.ends.tolist()
+    if pull.direction != "bias":
+        return float(warp if pull.direction == "warp" else fill)
+    turn = math.radians(2 * pull.angle)
+    along, end = math.cos(turn), warp if pull.angle < 45 else fill
+    most = shear / (2 * math.sin(turn))
+    return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
+
+
+def _test(
+    pull: Pull, strip: Strip, template: PreparedStrips | None, planning: Planning
+) -> StripsTest:
+    own = None if template is None else template.test
+    return StripsTest(
+        name=pull.name,
+        place=planning.place,
+        weight=1.0,
+        width=WIDTH if own is None else own.width,
+        grip_distance=GRIP_DISTANCE if own is None else own.grip_distance,
+        bias_angle=pull.angle if pull.direction == "bias" else 45.0,
+        increments=INCREMENTS,
+        strips={pull.direction: strip},
+        match_by="points",
+        weights=dict.fromkeys(DIRECTIONS, 1.0),
+        objective="N",
+    )
+
+
+def _noise(
+    pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
+) -> float:
+    """N of independent loads: that of the own direction, else of the others or the usual scatter.
+
+    The largest of the others counts, relative to the largest load.
+    """
+    if planning.noise is not None:
+        return planning.noise
+    if template is None:
+        return Precision(SCATTER * largest, 1.0, INDEPENDENT).at(values)
+    own = {d: _precision(d, template, planning).at(values) for d in template.test.matched}
+    if pull.direction in own:
+        return own[pull.direction]
+    models = template.test.models()
+    loads = {d: loads_to_match(template.test, template.test.strips[d], models[d])[1] for d in own}
+    return max(noise / float(np.abs(loads[d]).max()) for d, noise in own.items()) * largest
+
+
+def _precision(direction: str, template: PreparedStrips, planning: Planning) -> Precision:
+    """Of the project's own strips of a direction, one specimen."""
+    told = planning.precision[template.part(direction)]
+    if template.test.match_by != "points":
+        return told
+    specimens = len(template.test.strips[direction].curves)
+    return replace(told, values=max(1, told.values // specimens))

@@ -1,0 +1,90 @@
+"""The folder of a plan: plan.csv, plan.png, report.html, notes.csv, and last result.json."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..fits.store import RESULT
+from ..materials.forms.base import COMPONENTS
+from ..notes import NOTES, NOTES_ARE, write_notes
+from ..reports import Report, Table, plot_plan, write_report
+from ..writing import replacing, write_text
+from .planned import ASSUMED, words
+
+if TYPE_CHECKING:
+    from .planned import Plan, Planned
+
+TABLE, FIGURE = "plan.csv", "plan.png"
+WITHOUT = "the present tests alone"
+
+
+def write_plan(plan: Plan, folder: Path) -> Path:
+    """Write everything; raises OutputError. The page's path."""
+    (folder / RESULT).unlink(missing_ok=True)
+    with replacing(folder / TABLE) as path:
+        plan.table().to_csv(path, index=False, float_format="%.6g", lineterminator="\n")
+    every = (plan.now, *plan.candidates)
+    titles = [WITHOUT, *(planned.title for planned in plan.candidates)]
+    sigma = {name: [100 * planned.summary[name] for planned in every] for name in COMPONENTS}
+    plot_plan(folder / FIGURE, titles, sigma, WITHOUT)
+    write_notes(folder, plan.notes)
+    page = write_report(folder, _page(plan))
+    write_text(folder / RESULT, json.dumps(plan.result, indent=1) + "\n")
+    return page
+
+
+def _page(plan: Plan) -> Report:
+    first = plan.candidates[0]
+    told = ", ".join(
+        f"{name} {words(plan.now.summary[name])} to {words(first.summary[name])}"
+        for name in COMPONENTS
+    )
+    return Report(
+        title=f"{plan.title}: which test next?",
+        summary=f"{first.title}: 1 sigma of {told}.",
+        facts=[
+            ("card", plan.card),
+            ("present tests", ", ".join(plan.tests)),
+            ("ranked by", plan.criterion),
+            *_following(plan),
+        ],
+        warnings=[note.line for note in plan.notes],
+        figures=[(FIGURE, "1 sigma of the moduli with one more test, root mean square along each")],
+        tables=[_summaries(plan), *(_at_strains(plan, name) for name in COMPONENTS)],
+        files=[
+            (TABLE, "the tables"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers of this page, for programs"),
+        ],
+    )
+
+
+def _following(plan: Plan) -> list[tuple[str, object]]:
+    if plan.following is None:
+        return []
+    told = ", ".join(f"{name} {words(s)}" for name, s in plan.following.summary.items())
+    return [("best after the first", f"{plan.following.title}: {told}")]
+
+
+def _rows(plan: Plan) -> list[tuple[str, Planned]]:
+    ranked = [(f"{k}. {p.title}", p) for k, p in enumerate(plan.candidates, start=1)]
+    return [(WITHOUT, plan.now), *ranked]
+
+
+def _summaries(plan: Plan) -> Table:
+    rows: list[list[object]] = [
+        [title, *(words(p.summary[name]) for name in COMPONENTS), p.noise]
+        for title, p in _rows(plan)
+    ]
+    header = ["test", *(f"1 sigma of {name}" for name in COMPONENTS), "noise"]
+    return Table("Which test next", header, rows, ASSUMED, text=(4,))
+
+
+def _at_strains(plan: Plan, name: str) -> Table:
+    rows: list[list[object]] = [
+        [title, *(words(value) for value in plan.at(p)[name])] for title, p in _rows(plan)
+    ]
+    header = ["test", *(f"at strain {strain:.3g}" for strain in plan.strains[name])]
+    return Table(f"1 sigma of {name}", header, rows)
