@@ -347,6 +347,9 @@ def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: 
     assert curves[1][0] == pytest.approx(1.5 * curves[0][0])
     share = fit.best.certainty.total["E1"][0]
     assert drawn["sigma"][0] == pytest.approx(np.full(121, share * fit.law.beta[11]))
+    # Of many, those of the five best.
+    many = replace(fit, best=replace(best, ranked=[one, *[two] * 7]))
+    assert len(many.laws) == 5
 
 
 def test_a_modulus_known_no_better_than_before_is_unknown() -> None:

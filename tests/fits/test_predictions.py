@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import shutil
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.base import RunRecord
 from bubblefit.experiments.notes import notes_of_record
+from bubblefit.fits import predictions
 from bubblefit.fits.cards import chosen_cards
 from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import RunEvent, predict
@@ -126,6 +128,51 @@ def test_what_is_there_is_not_run_again(project: Project, tmp_path: Path) -> Non
     pd.testing.assert_frame_equal(one, other[other["test"] == "high"].reset_index(drop=True))
     with pytest.raises(InputError, match="nothing to go on with"):
         predict(project, jobs=1, out=tmp_path / "none", resume=True)
+
+
+def test_nothing_is_written_over_unless_it_is_asked_for(project: Project, tmp_path: Path) -> None:
+    predict(project, ["high"], jobs=1, out=tmp_path / "out")
+    with pytest.raises(OutputError, match="--resume"):
+        predict(project, ["high"], jobs=1, out=tmp_path / "out")
+    events: list[RunEvent | None] = []
+    predict(project, ["high"], jobs=1, out=tmp_path / "out", overwrite=True, progress=events.append)
+    assert [event.again for event in events if event is not None] == [False] * 3
+    # Gone on with, the record has both times.
+    again = predict(project, ["high"], jobs=1, out=tmp_path / "out", resume=True)
+    assert again.record is not None and len(again.record.runs) == 2
+
+
+def test_seconds_are_those_that_it_took(project: Project) -> None:
+    begun = time.perf_counter()
+    done = predict(project, ["high"], jobs=1)
+    took = time.perf_counter() - begun
+    assert 0 < done.result["runs"][0]["seconds"] <= done.wall_s <= took
+    assert 0 < done.runs()["seconds"].sum() <= took
+
+
+@pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])
+def test_processes(project: Project, monkeypatch, asked, said, some: int) -> None:
+    """As asked for, else as the project says, else as many as there are cores; time is told."""
+    told: list[tuple[int, str]] = []
+    events: list[RunEvent | None] = []
+
+    def side_by_side(prepare, numbers, jobs: int, what: str):
+        told.append((jobs, what))
+        run = prepare()
+        yield None
+        yield from (run(number, lambda _: None) for number in numbers)
+
+    monkeypatch.setattr(predictions, "run_tasks", side_by_side)
+    monkeypatch.setattr(predictions, "cores", lambda: 7)
+    predict(project.with_fit(jobs=said), ["high"], jobs=asked, progress=events.append)
+    assert told == [(some, "runs")]
+    assert [event is None for event in events] == [False, True, False, False]
+
+
+def test_a_thickness_that_makes_no_model_names_test_and_card(project: Project) -> None:
+    card = MaterialCard(HypoelasticLaw.linear(500.0, 150.0, 20.0), 0.0)
+    said = complaint(predict, project, ["high"], {"of nothing": card}, jobs=1)
+    assert said.startswith(f"{project.path}: 'high' with card 'of nothing', ")
 
 
 def test_an_interrupt_leaves_what_ended(project: Project, tmp_path: Path) -> None:
