@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,11 +20,13 @@ from bubblefit.experiments.strips import figures
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.experiments.strips.strip import Strip
 from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
 from ...projects import project_file
+from ...published_laws import TABLE_4_2
 from .sections import CURVES, PUBLISHED, SMALL, read, write_exports
 
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
@@ -313,6 +318,81 @@ def test_what_the_panels_of_loads_show() -> None:
         "fill", None, None, None
     )  # fmt: skip
     assert (bare.models, bare.rms) == ((), ())
+
+
+def bias(*shear: float) -> tuple[Any, Any]:
+    """A row of quads, 10 mm long, from -20 mm on, between gauge points at -10 and 10 mm."""
+    heights = np.arange(-20.0, 10.0 * len(shear) - 19.0, 10.0)
+    points = np.array([[x, y, 0.0] for y in heights for x in (0.0, 5.0)])
+    quads = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(len(shear))]
+    gauge = [int(np.flatnonzero(points[:, 1] == y)[0]) for y in (-10.0, 10.0)]
+    mesh = SimpleNamespace(points=points, quads=np.array(quads), node_sets={"gauge": gauge})
+    frames = np.array([np.zeros_like(points), np.ones_like(points)])
+    return SimpleNamespace(mesh=mesh, warp="warp"), SimpleNamespace(displacement=frames)
+
+
+def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> None:
+    model, history = bias(0.9, 0.2, -0.3, 0.8)
+    strain = np.column_stack([np.ones(4), np.ones(4), [0.9, 0.2, -0.3, 0.8]])
+
+    def middle(mesh: Any, u: np.ndarray, warp: Any) -> np.ndarray:
+        assert mesh is model.mesh and warp == "warp" and (u == 1.0).all()
+        return strain
+
+    monkeypatch.setattr(figures, "middle_strain", middle)
+    assert figures._gauge_shear(model, history) == pytest.approx(0.3)
+    drawn: list[Any] = []
+    monkeypatch.setattr(figures, "plot_strip", lambda *what: drawn.append(what))
+    monkeypatch.setattr(figures, "write_vtu", lambda *what, **more: drawn.append((what, more)))
+    figures.draw_bias(model, history, Path("b.png"), Path("b.vtu"))
+    picture, (written, more) = drawn
+    assert picture[0] == Path("b.png") and (picture[3] == 1.0).all()
+    assert picture[4].tolist() == [0.9, 0.2, -0.3, 0.8]
+    assert picture[5] == model.mesh.node_sets["gauge"]
+    assert written[0] is model.mesh and (written[1] == 1.0).all() and written[2] == Path("b.vtu")
+    assert more == {"cell_data": {"log_strain_1_2_12": strain}}
+
+
+def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr(figures, "plot_moduli_together", lambda *what: drawn.append(what))
+    law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), strain_range=np.full(3, 0.13))
+    prepared = published()
+    fit = fitted(prepared)
+    strips = prepared.fitted_strips(fit)
+    figures.draw_moduli(strips, replace(fit, law=law), Path("m.png"))
+    ((path, strains, curves),) = drawn
+    assert path == Path("m.png") and strains.shape == curves.shape == (3, 121)
+    assert strains[:, 0].tolist() == [0.0] * 3
+    ends = figures.failure_strains(strips, fit.valid)
+    # E1 over the warp strain, E2 over the fill's, G12 over the shear.
+    assert sorted(strains[:, -1]) == pytest.approx(sorted(ends))
+    for name, x, y in zip(COMPONENTS, strains, curves, strict=True):
+        assert x[-1] == pytest.approx(ends[COMPONENTS[name]])
+        np.testing.assert_allclose(y, law.modulus(name, x))
+
+
+def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeypatch) -> None:
+    told: list[Any] = []
+    monkeypatch.setattr(figures, "plot_orders", lambda path, panels: told.extend(panels))
+    test = exported(("[data]", "[data]\norder = 3")).test
+    strips = [
+        test.strips["warp"],
+        replace(test.strips["fill"], polynomial=None),
+        test.strips["fill"],
+    ]
+    assert figures.draw_orders(strips, Path("o.png"))
+    assert [(p.direction, p.orders, p.chosen) for p in told] == [
+        ("warp", list(range(1, 9)), 3), ("fill", list(range(1, 9)), 3)
+    ]  # fmt: skip
+    for strip, panel in zip((strips[0], strips[2]), told, strict=True):
+        several = len(set(strip.specimen_of.tolist())) > 1
+        whose = strip.specimen_of.tolist() if several else None
+        scores = compare_orders(
+            *strip.points, range(1, 9), through_origin=True, specimens=whose
+        ).scores
+        assert panel.left_out == [score.left_out for score in scores]
+    assert not figures.draw_orders(strips[1:2], Path("o.png"))
 
 
 def write_offset(folder: Path) -> None:

@@ -132,6 +132,23 @@ def test_points_end_where_the_model_ends(small):
     assert len(p.strips["fill"].points[0]) == 21 and p.strips["fill"].beyond == 0
 
 
+def test_a_polynomial_is_followed_a_twentieth_beyond_the_points(small, example):
+    def gauge(final: float):
+        end = ("gauge_length = 20.0", f"gauge_length = 20.0\nfinal_length = {final}")
+        return small(end).strips["warp"].final_length
+
+    assert gauge(24.199) == 24.199
+    said = complaint(gauge, 24.201)
+    assert said.endswith(
+        "strips[0].warp.final_length: the data end at an elongation of 4 mm; expected up to 24 mm, "
+        "got 24.201 mm"
+    )
+    # A published polynomial ends where its own final length is.
+    warp = "[warp]\nfinal_length = {}\n[data]"
+    assert list(example(("[data]", warp.format(23.49))).strips) == ["warp"]
+    assert "the data end" in complaint(example, ("[data]", warp.format(23.50)))
+
+
 def test_breaks_follow_the_specimens_kept(small, tmp_path):
     """A second specimen of another shape moves the breaks; without it they are the first's."""
     u = np.linspace(0, 4, 41)
