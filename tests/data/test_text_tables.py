@@ -11,7 +11,7 @@ from bubblefit.data.frame_headings import columns_of, heading_of
 from bubblefit.data.frames import FrameOptions, read_frames
 from bubblefit.data.text_cells import _quick, _slow, read_numbers
 from bubblefit.data.text_columns import quantity_columns
-from bubblefit.data.text_layouts import TOP, cells_of, find_layout
+from bubblefit.data.text_layouts import cells_of, find_layout
 
 from ..complaints import complaint
 
@@ -130,8 +130,8 @@ def test_no_row_of_names(tmp_path: Path) -> None:
 
 def test_the_names_stand_within_the_first_lines(tmp_path: Path) -> None:
     table = "x,y,dx,dy,dz\n1,2,3,4,5\n"
-    above = "word\n" * (TOP - 1)
-    assert layout(tmp_path, above + table).header == TOP == 300
+    above = "word\n" * 299
+    assert layout(tmp_path, above + table).header == 300
     assert "no row of names" in complaint(layout, tmp_path, "word\n" + above + table)
 
 

@@ -144,6 +144,18 @@ def test_remarks_and_unstable_equilibria_with_the_name_of_the_part(together: bf.
     ]
 
 
+def test_without_noise_nothing_is_so_many_times_the_noise(together: bf.Fit) -> None:
+    fit = replace(together)
+    name, misfit = next(iter(together.misfits.items()))
+    fit.__dict__["misfits"] = {
+        name: replace(misfit, noise=0.0),
+        "other": replace(misfit, noise=4.0),
+    }
+    said = fit.result["misfit"]
+    assert said[name]["times_noise"] is None and said[name]["noise"] == 0.0
+    assert said["other"]["times_noise"] == pytest.approx(misfit.rms / 4.0)
+
+
 def test_versions_of_what_computes() -> None:
     found = versions()
     names = ("bubblefit", "python", "numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")

@@ -408,3 +408,13 @@ def test_a_damaged_good_card_is_read_or_refused(where: int, damage: bytes) -> No
     content = tomli_w.dumps(GOOD).encode()
     where %= len(content)
     read_bytes(content[:where] + damage + content[where + len(damage) :])
+
+
+def test_a_card_is_in_gpa_unless_told_otherwise(tmp_path: Path) -> None:
+    card = MaterialCard(HypoelasticLaw.linear(500.0, 200.0, 20.0), 0.8)
+    write_card(card, tmp_path / "a.toml")
+    card.write(tmp_path / "b.toml")
+    card.write(tmp_path / "c.toml", "MPa")
+    for name, unit, e1 in (("a", "GPa", 0.5), ("b", "GPa", 0.5), ("c", "MPa", 500.0)):
+        said = tomllib.loads((tmp_path / f"{name}.toml").read_text())
+        assert (said["unit"], said["beta"][11]) == (unit, pytest.approx(e1))

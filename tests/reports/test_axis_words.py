@@ -21,7 +21,6 @@ from bubblefit.reports import (
     plot_orders,
     plot_pinned,
 )
-from bubblefit.reports.pinned import NOT_DETERMINED, STEP, WORDS
 from bubblefit.reports.style import GREY
 from matplotlib.figure import Figure
 
@@ -85,8 +84,8 @@ def test_what_is_not_determined_lies_above_a_line(figures: list[Figure]) -> None
     plot_pinned("p", STRAINS, {"bubble": lost, "strips": SIGMA})
     for panel in figures[0].axes:
         (line,) = (line for line in panel.lines if line.get_color() == GREY)
-        assert line.get_ydata() == pytest.approx([NOT_DETERMINED] * 2)
-        end = NOT_DETERMINED * 10 ** (2.6 * STEP + WORDS)
+        assert line.get_ydata() == pytest.approx([1000.0] * 2)
+        end = 1000.0 * 10 ** (2.6 * 0.14 + 0.32)
         assert panel.get_ylim() == pytest.approx((10.0, end))
     assert figures[0].axes[0].get_ylabel() == r"1 $\sigma$, % of the modulus"
     assert [panel.get_ylabel() for panel in figures[0].axes[1:]] == ["", ""]

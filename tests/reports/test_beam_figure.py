@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports.beam import CLOSE, WALL, BeamBodies, plot_beam
+from bubblefit.reports.beam import BeamBodies, plot_beam
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
+#: mm of the collar's wall; how far the close view goes, in the collar's lengths.
+WALL, CLOSE = 12.0, 2.2
 BODIES = BeamBodies(((-500.0, -150.0), (500.0, -150.0)), 50.0, 10.0, 100.0, 80.0)
 #: Four quads in a row on the seen side, two behind: (n, 3) mm.
 Z = np.linspace(-600.0, 600.0, 5)

@@ -53,3 +53,17 @@ def test_five_nodes_on_the_axis_are_its_profile(on: int, taken: int) -> None:
     assert len(cut.position) == taken
     np.testing.assert_allclose(cut.position, np.linspace(0.0, 80.0, taken))
     np.testing.assert_allclose(cut.height, cut.position)
+
+
+@pytest.mark.parametrize("cut", [node_cut, point_cut])
+def test_heights_at_rest_do_not_count(cut) -> None:
+    """Points of a measured sheet have three coordinates: places are told by x and y."""
+    draw = np.random.default_rng(2)
+    flat = draw.uniform(-50, 50, (200, 2))
+    moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
+    raised = np.column_stack([flat, 600.0 + 40.0 * draw.normal(size=200)])
+    for axis in (0, 1):
+        one, other = cut(flat, moved, axis), cut(raised, moved, axis)
+        assert len(one.position) > 3
+        np.testing.assert_array_equal(one.position, other.position)
+        np.testing.assert_array_equal(one.height, other.height)

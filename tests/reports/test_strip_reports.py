@@ -20,8 +20,6 @@ from bubblefit.reports import (
     plot_pinned,
     plot_strip,
 )
-from bubblefit.reports.pinned import NOT_DETERMINED
-from bubblefit.reports.strip import GRIP
 from bubblefit.reports.style import BLACK, GREY, NAMED, SKY, named_look
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex
@@ -270,7 +268,7 @@ def test_deformed_strip(tmp_path: Path, drawn: list[Figure]) -> None:
     assert [(p.get_x(), p.get_width()) for p in axes.patches] == [
         (corners[:, 0].min(), pytest.approx(np.ptp(corners[:, 0])))
     ] * 2
-    assert upper_height(axes) == pytest.approx(GRIP * 8.0)
+    assert upper_height(axes) == pytest.approx(0.06 * 8.0)
     upper, lower = axes.patches
     assert (upper.get_y(), lower.get_y() + lower.get_height()) == pytest.approx((8.0, -4.0))
     assert axes.get_aspect() == 1.0 and "gamma" in bar.get_ylabel()
@@ -364,14 +362,14 @@ def test_what_is_not_determined_is_marked(tmp_path: Path, drawn: list[Figure]) -
     warp, _, shear = drawn[0].axes
     line, mark = lines(shear, NAMED[0])
     assert line[1, :10] == pytest.approx(3.0) and np.isnan(line[1, 10:]).all()
-    assert np.isnan(mark[1, :10]).all() and (mark[1, 10:] > NOT_DETERMINED).all()
+    assert np.isnan(mark[1, :10]).all() and (mark[1, 10:] > 1000.0).all()
     assert (mark[1, 10:] < shear.get_ylim()[1]).all()
     assert [t.get_text() for t in shear.texts] == ["not determined (over 1000 %)"]
     assert mark[1, 10:] == pytest.approx(10 ** (3 + 0.14 * 0.8))
     (band,) = shear.patches
     end = shear.get_ylim()[1]
     low, high = band.get_extents().transformed(shear.transData.inverted()).intervaly
-    assert (low, high) == pytest.approx((NOT_DETERMINED, end))
+    assert (low, high) == pytest.approx((1000.0, end))
     assert [f"{tick:g}" for tick in shear.get_yticks()] == ["1", "10", "100", "1000"]
     labels = [label.get_text() for label in warp.get_yticklabels()]
     assert labels == ["1", "10", "100", "1000"]
@@ -403,11 +401,11 @@ def test_pinned_at_the_ends(tmp_path: Path, drawn: list[Figure], value: float) -
     low, high = drawn[0].axes[0].get_ylim()
     assert 0 < low < high
     shown, lost = lines(drawn[0].axes[0], NAMED[0])
-    assert lost[1] == pytest.approx(10 ** (3 + 0.14 * 0.8), nan_ok=True) or value <= NOT_DETERMINED
-    assert value > NOT_DETERMINED or shown[1] == pytest.approx(max(value, 1e-3))
+    assert lost[1] == pytest.approx(10 ** (3 + 0.14 * 0.8), nan_ok=True) or value <= 1000.0
+    assert value > 1000.0 or shown[1] == pytest.approx(max(value, 1e-3))
     assert low == pytest.approx({0.0: 1e-3, 0.4: 0.1, 1000.0: 1e3}.get(value, 1.0))
     line, mark = (np.isfinite(data[1]).all() for data in (shown, lost))
-    assert (line, mark) == (value <= NOT_DETERMINED, value > NOT_DETERMINED)
+    assert (line, mark) == (value <= 1000.0, value > 1000.0)
 
 
 def test_orders(tmp_path: Path, drawn: list[Figure]) -> None:

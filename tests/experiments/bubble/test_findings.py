@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.base import FittedTest, Output
-from bubblefit.experiments.bubble.findings import FAITHFUL, _warnings
+from bubblefit.experiments.bubble.findings import _warnings
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.notes import NoteKind
@@ -75,5 +75,5 @@ def test_what_is_warned_of_before_the_numbers_are_used(by_this_model: bool) -> N
         return [note.kind for note in _warnings(prepared)]
 
     crime = [NoteKind.INVERSE_CRIME] * by_this_model
-    assert told("points", 4) == told("points", FAITHFUL) == told("surfaces", FAITHFUL) == crime
-    assert told("surfaces", FAITHFUL - 1) == [*crime, NoteKind.SURFACES]
+    assert told("points", 4) == told("points", 6) == told("surfaces", 6) == crime
+    assert told("surfaces", 5) == [*crime, NoteKind.SURFACES]

@@ -118,6 +118,16 @@ def test_the_frames_nearest_to_the_pressures(folder, said):
     assert table.rows[0][1:] == pytest.approx([10.0, 10.5, -0.5])
 
 
+def test_a_tolerance_is_in_the_unit_of_the_pressures(folder):
+    def taken(tolerance: float):
+        said = f"[bubble.data.points.pressure]\nfrom_name = true\ntolerance = {tolerance}\n"
+        return bubble(project(folder, said, "[10.5, 60]")).pressures
+
+    assert taken(0.51) == pytest.approx([0.010, 0.060])
+    said = complaint(taken, 0.49)
+    assert "bubble[0].pressures[0]" in said and "10.5" in said
+
+
 def test_all_frames_and_some(folder):
     section = "[bubble.data.points.pressure]\nfrom_name = true\n"
     test = bubble(project(folder, section))
