@@ -9,7 +9,7 @@ its names: of several tables the one with most rows is read, and all blocks with
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +28,9 @@ def read(path: Path, options: TableOptions) -> MachineTable:
 
     Raises
     ------
-    InputError : no such table, nothing below it, two units for one column, rows longer than the
-        header, a decimal mark that cannot be told from a mark of thousands.
+    InputError : no such table, nothing below it, two units for one column (also where its names
+        come again), rows longer than the header, a decimal mark that cannot be told from a mark of
+        thousands.
     """
     import pandas as pd
 
@@ -47,7 +48,7 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     blocks = find_blocks(path, rows, index, named, quantities)
     chosen = max(blocks, key=lambda names: sum(len(one.rows) for one in blocks[names]))
     names, several = list(chosen), blocks[chosen]
-    header_line, units = several[0].line, several[0].units
+    header_line, units = several[0].line, _units(path, several)
     rest = [row for one in several for row in one.rows]
     if not rest:
         raise InputError(path, f"line {header_line}", "no rows of numbers below these names")
@@ -66,6 +67,21 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     decimal = options.decimal or decimal_mark(path, numbers)
     table = TextTable(path, cells, line_numbers, decimal)
     return MachineTable(table, units, header_line, _notes(path, blocks, chosen))
+
+
+def _units(path: Path, several: Sequence[Block]) -> dict[str, str]:
+    """Of the columns of tables of the same names, which are read as one."""
+    first = several[0]
+    for one in several[1:]:
+        for name, unit in one.units.items():
+            if unit and unit != first.units[name]:
+                before = repr(first.units[name]) if first.units[name] else "none"
+                problem = (
+                    f"unit {unit!r} here, but {before} in the table of the same names in line "
+                    f"{first.line}; correct one"
+                )
+                raise InputError(path, f"line {one.line}, column {name!r}", problem)
+    return first.units
 
 
 def _notes(

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from bubblefit.data.clock_offset import find_offset, given_offset
-from bubblefit.data.offset_misfits import log_at, offset_misfits
+from bubblefit.data.offset_misfits import _rest_height, log_at, offset_misfits
 
 from ..complaints import complaint
 
@@ -131,6 +131,15 @@ def test_no_offset_is_looked_at_for_which_there_is_no_log(cut):
     assert min(offsets[np.argmin(misfits)] - offsets[0], np.ptp(offsets)) >= 0
     ends = [np.isfinite(log_at(s, times, clock, pressures)).mean() for s in offsets]
     assert min(ends) >= 0.8 - 1e-9
+
+
+def test_up_to_where_a_frame_is_at_rest():
+    """Six standard deviations above the lowest, by second differences; a fiftieth of the most."""
+    assert _rest_height(np.linspace(3.0, 60.0, 20)) == pytest.approx(1.2)
+    assert _rest_height(np.linspace(0.0, 60.0, 20)) == pytest.approx(0.0, abs=1e-9)
+    rough = np.arange(20.0) % 2  # second differences of 2, which noise of 1.21 makes
+    assert _rest_height(np.append(rough, 900.0)) == pytest.approx(6 * 2 / 0.6745 / np.sqrt(6))
+    assert _rest_height(np.append(rough, 90.0)) == pytest.approx(1.8)
 
 
 def test_offsets_that_do_as_well_are_told_from_the_least_to_the_largest():

@@ -395,3 +395,27 @@ def test_garbage_is_refused(scratch, garbage):
 
 def test_directions_have_a_table_of_names():
     assert set(DIRECTION_ALIASES.values()) == {"warp", "fill", "bias"}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "words"),
+    [
+        ("mm,kN\n", "mm,N\n", "column 'Load': unit 'N' here, but 'kN' in the table"),
+        ("mm,kN\n", "cm,kN\n", "column 'Extension': unit 'cm' here, but 'mm' in the table"),
+        ("", "mm,kN\n", "column 'Extension': unit 'mm' here, but none in the table"),
+        ("mm,kN\n", "mm,kN\n", ""),
+        ("mm,kN\n", "", ""),
+    ],
+)
+def test_tables_of_the_same_names_have_the_same_units(tmp_path: Path, first, second, words):
+    """Of two specimens, one after the other: the second's loads are not a thousand times."""
+    path, rows = tmp_path / "a.csv", "0,0\n1,0.1\n2,0.2\n"
+    head = "Extension,Load\n"
+    path.write_text(f"{head}{first}{rows}\n{head}{second}{rows}")
+    if words:
+        said = complaint(read_load_curves, path, direction="warp")
+        line = 6 + bool(first)
+        assert said == f"{path}: line {line}, {words} of the same names in line 1; correct one"
+    else:
+        loads = [curve.load for curve in read_load_curves(path, direction="warp")]
+        assert np.concatenate(loads) == pytest.approx([0.0, 100.0, 200.0] * 2)

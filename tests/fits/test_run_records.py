@@ -64,6 +64,17 @@ def test_a_run_is_stored_exactly(tmp_path: Path) -> None:
     assert folder.read("a" * 64) is None
 
 
+@pytest.mark.parametrize("resume", [True, False])
+def test_a_file_whose_writing_was_cut_off_goes(tmp_path: Path, resume: bool) -> None:
+    folder = RunRecords(tmp_path)
+    folder.begin(False, False)
+    folder.write("a" * 64, ran(model(), card()))
+    (tmp_path / "runs" / ".aaaa.123.npz").write_bytes(b"half")
+    folder.begin(resume, not resume)
+    assert len(list((tmp_path / "runs").iterdir())) == resume
+    assert (folder.read("a" * 64) is not None) == resume
+
+
 def test_runs_of_an_earlier_version_are_found_by_their_names(tmp_path: Path) -> None:
     """The first twenty digits of the mark: under another name nothing would be gone on with."""
     folder = RunRecords(tmp_path)

@@ -21,7 +21,7 @@ from bubblefit.experiments.bubble.outline_section import outline_of
 from bubblefit.experiments.bubble.places import at_points
 from bubblefit.experiments.bubble.pressure_section import LogSection
 from bubblefit.experiments.bubble.relative import at_rest, counted_from, with_places
-from bubblefit.experiments.bubble.sheet import measured_sheet, sheet_nuisance
+from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
 from bubblefit.experiments.bubble.sheet_section import Sheet, SheetSection, sheet_of
 from bubblefit.meshes.disk import disk_mesh
 
@@ -166,6 +166,10 @@ def test_heights_of_a_reference_picture(field: DisplacementField, words: str) ->
         assert complaint(measured_sheet, *asked).startswith(words)
     else:
         assert measured_sheet(*asked).surface is not None
+    # The motion of the rim asks for no height.
+    if np.isnan(field.z).any():
+        assert _on_disk(field, asked[1], "rim").all()
+        assert _on_disk(field, asked[1], "rim").sum() == 200
     rim = Sheet(moving_rim=True, degree=2)
     if field.points.max() < 84.95:
         assert "sheet.rim: points go out to 85 %" in complaint(measured_sheet, rim, *asked[1:])

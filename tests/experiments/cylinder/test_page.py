@@ -161,6 +161,8 @@ def test_without_readings_there_is_nothing_to_compare(
         (((150.0, 20.0), (200.0, 20.0)), "20 mm"),
         (((150.0, 15.0), (200.0, 20.0)), "0.1 diameters (15 to 20 mm)"),
         (((150.0, 20.0), (200.0, 15.0)), "15 to 20 mm"),
+        (((150.0, 20.0), (200.0, 20.0000004)), "20 mm"),
+        (((150.0, 20.0), (200.0, 20.00001)), "20 to 20 mm"),
     ],
 )
 def test_over_what_a_slope_is_taken(cases, words: str) -> None:
