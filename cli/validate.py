@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import InputError
 from .exits import resumable
 from .fitting import fit_options
 from .options import (
@@ -18,6 +20,9 @@ from .options import (
     result_folder,
 )
 from .progress import FitsProgress
+
+if TYPE_CHECKING:
+    from ..fits.project import Project
 
 
 @click.command("validate")
@@ -31,22 +36,47 @@ from .progress import FitsProgress
 @click.option(
     "--card", "cards", multiple=True, metavar="CARD", help="Judge it instead of a fit; several."
 )
+@click.option(
+    "--leave",
+    metavar="SORT",
+    help="Left out in turn: tests, frames, specimens or directions.  [tests]",
+)
+@click.option(
+    "--weights",
+    metavar="KIND",
+    help="Instead: moduli and errors over the weight of a kind of test (strips), or of one test.",
+)
 @fit_options
-def command(forms: tuple[str, ...], cards: tuple[str, ...], **options: Any) -> None:
+def command(
+    forms: tuple[str, ...],
+    cards: tuple[str, ...],
+    leave: str | None,
+    weights: str | None,
+    **options: Any,
+) -> None:
     """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
 
-    Or judge cards at the tests, without a fit. Writes validation.csv and result.json, and a folder
-    for each fit, into the output folder.
+    With --leave single frames of bubbles, specimens or directions of strips instead; with --card
+    cards at the tests, without a fit. Writes validation.csv and result.json, and a folder for each
+    fit, into the output folder. With --weights moduli and errors over the weight of a kind of test:
+    weights.csv, weights.png, result.json.
+
+    \b
+        bubblefit validate PROJECT.toml --form cubic --form spline:6
+        bubblefit validate PROJECT.toml --leave frames
+        bubblefit validate PROJECT.toml --weights strips
     """
     from ..fits.cards import chosen_cards
     from ..notes import lines as note_lines
-    from ..studies.validation import STARTS, judge_cards, validate
+    from ..studies.validation import STARTS, TESTS, judge_cards, validate
 
     path: Path = options["project"]
+    _one_of(path, {"--card": cards, "--leave": leave, "--weights": weights})
+    if weights is not None:
+        _weights(weights, forms, options)
+        return
     folder: Path = options["out"] or folder_beside(path, "validated")
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    trusted = [*project.fit.trust, *options["trust"]]
-    project = project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")}, trust=trusted)
+    project = _project(options)
     tests, starts = options["tests"] or None, options["starts"] or STARTS
     quiet = options["quiet"] or options["as_json"]
     if cards:
@@ -55,11 +85,46 @@ def command(forms: tuple[str, ...], cards: tuple[str, ...], **options: Any) -> N
     else:
         with resumable(folder), FitsProgress(starts, quiet) as progress:
             validation = validate(
-                project, tests, forms, starts=starts, out=folder, resume=options["resume"],
-                overwrite=options["overwrite"], progress=progress.saw,
+                project, tests, forms, leave=leave or TESTS, starts=starts, out=folder,
+                resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
                 command_line=command_line(),
             )  # fmt: skip
     validation.write(folder)
     lines = [*validation.lines(), *note_lines(validation.notes), f"written to {folder}"]
     said = json.dumps(validation.result, indent=1) if options["as_json"] else "\n".join(lines)
     click.echo(said)
+
+
+def _project(options: Mapping[str, Any]) -> Project:
+    data = data_folders(options["data"])
+    project = read_with_solver(options["project"], options["solver_given"], data)
+    trusted = [*project.fit.trust, *options["trust"]]
+    return project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")}, trust=trusted)
+
+
+def _one_of(path: Path, given: Mapping[str, object]) -> None:
+    """Complain where two of the options are given that exclude each other."""
+    several = [name for name, value in given.items() if value]
+    if len(several) > 1:
+        raise InputError(path, ", ".join(several), "give one of them")
+
+
+def _weights(counted: str, forms: Sequence[str], options: Mapping[str, Any]) -> None:
+    """The study of the weight of a kind of test."""
+    from ..notes import lines as note_lines
+    from ..studies.weights import STARTS, weight_study
+
+    path = options["project"]
+    _one_of(path, {"--form": forms, "--weights": counted})
+    folder: Path = options["out"] or folder_beside(path, "weights")
+    starts = options["starts"] or STARTS
+    quiet = options["quiet"] or options["as_json"]
+    with resumable(folder), FitsProgress(starts, quiet) as progress:
+        study = weight_study(
+            _project(options), counted, options["tests"] or None, starts=starts, out=folder,
+            resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
+            command_line=command_line(),
+        )  # fmt: skip
+    study.write(folder)
+    lines = [*study.lines(), *note_lines(study.notes), f"written to {folder}"]
+    click.echo(json.dumps(study.result, indent=1) if options["as_json"] else "\n".join(lines))

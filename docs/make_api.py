@@ -28,6 +28,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
         ("studies.refinement:refine,Refinement", "studies.poisson:vary_nu12,Nu12Study,Ratios",
          "studies.laws:compare_laws,LawComparison", "studies.plan:plan",
          "studies.planned:Plan,Planned",
+         "studies.validation:validate,judge_cards", "studies.validated:Validation",
+         "studies.weights:weight_study", "studies.weights_result:WeightStudy",
          "studies.convergence:convergence,Convergence"),
     ),
     "tests": ("Kinds of test", ("experiments.base", "experiments.candidates",

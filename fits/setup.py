@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
 from ..identification.comparison import Comparison
@@ -35,19 +35,22 @@ class FitSetup:
 
     Parameters
     ----------
-    law : everything but the coefficients. tests : with their data.
+    law : everything but the coefficients. tests : with their data. counts : by name of a test, how
+    many times the weight that the project gives it.
     """
 
     project: Project
     law: HypoelasticLaw
     bounds: LawBounds
     tests: tuple[PreparedTest, ...]
+    counts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def weightings(self) -> tuple[Weighting, ...]:
         """One a test: alone it has its own objective, among others its relative errors count."""
         several = len(self.tests) > 1
-        return tuple(Weighting(several, t.test.weight if several else 1.0) for t in self.tests)
+        weights = [t.test.weight * self.counts.get(t.test.name, 1.0) for t in self.tests]
+        return tuple(Weighting(several, weight if several else 1.0) for weight in weights)
 
     @property
     def objective_is(self) -> str:

@@ -30,6 +30,7 @@ from .sphere import plot_spheres
 from .strip import plot_strip
 from .surface import plot_disk
 from .vtu import write_vtu
+from .weights import plot_weights
 
 __all__ = [
     "BeamBodies",
@@ -67,6 +68,7 @@ __all__ = [
     "plot_rises",
     "plot_spheres",
     "plot_strip",
+    "plot_weights",
     "write_report",
     "write_vtu",
 ]

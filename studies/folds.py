@@ -75,7 +75,7 @@ def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.nda
     """The fit with a law of the points that the masks keep; unknowns None where all starts fail."""
     law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
     own = replace(setup, law=law)
-    return own, _best(own, own.problem(masks), starts)
+    return own, best_of(own, own.problem(masks), starts)
 
 
 def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
@@ -92,7 +92,7 @@ def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
     )
 
 
-def _best(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
+def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
     """Unknowns of the best of some starts; None where all failed."""
     best, least = None, np.inf
     for number in range(starts):

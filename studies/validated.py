@@ -19,15 +19,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = "validation.csv"
-HEADER = f"{'law':14}{'test left out':20}{'compared':24}{'foretold':>12}{'fitted':>10}  unit"
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
     """One law at one test.
 
-    law : the form that was fitted, or the card. foretold : by the fit to the other tests, or by
-    the card. fitted : by the fit to all of them, None for a card.
+    law : the form that was fitted, or the card. foretold : by the fit to the rest of the data, or
+    by the card. fitted : by the fit to all of them, None for a card.
     """
 
     law: str
@@ -37,10 +36,11 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Laws at tests that they were not fitted to."""
+    """Laws at what they were not fitted to: whole tests, or parts (frames, ...) as `leave` says."""
 
     title: str
     judged: tuple[Judged, ...]
+    leave: str = "tests"
 
     @property
     def means(self) -> dict[str, float]:
@@ -71,6 +71,7 @@ class Validation:
                     "fitted_rms": _rms(one.fitted, name),
                     "foretold_relative": _relative(one.foretold),
                     "fitted_relative": _relative(one.fitted),
+                    "foretold_words": one.foretold.words,
                 }
                 for one in self.judged
                 for name, unit in one.foretold.units.items()
@@ -86,7 +87,8 @@ class Validation:
             "command": "validate",
             "title": self.title,
             "version": __version__,
-            "error": "mean relative RMS error of a test",
+            "left_out": self.leave,
+            "error": "mean relative RMS error of a test, or of its part",
             "mean_foretold": means,
             "rows": [
                 {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()}
@@ -97,14 +99,20 @@ class Validation:
 
     def lines(self) -> list[str]:
         """The table for a terminal, and what it comes to."""
-        said = [
-            f"{'law':14}{'test left out':20}{'compared':24}{'foretold':>12}{'fitted':>10}  unit"
-        ]
-        for row in self.table().itertuples():
+        table = self.table()
+        wide = max([20, *(2 + len(name) for name in table["test"])])
+        head = "left out" if self.leave != "tests" else "test left out"
+        said = [f"{'law':14}{head:{wide}}{'compared':24}{'foretold':>12}{'fitted':>10}  unit"]
+        for row in table.itertuples():
             said.append(
-                f"{row.law:14}{row.test:20}{row.compared:24}{row.foretold_rms:12.4g}"
+                f"{row.law:14}{row.test:{wide}}{row.compared:24}{row.foretold_rms:12.4g}"
                 f"{row.fitted_rms:10.4g}  {row.unit}"
             )
+        said += [
+            f"{one.law}, {one.foretold.test}: {one.foretold.words}"
+            for one in self.judged
+            if one.foretold.words
+        ]
         means = {law: mean for law, mean in self.means.items() if not np.isnan(mean)}
         said += [f"{law}: foretold {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:

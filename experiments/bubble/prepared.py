@@ -21,7 +21,7 @@ from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import View, doubts_of
 from .findings import findings_of
-from .objective import OFFSETS, FieldObjective
+from .objective import OFFSETS, FieldObjective, FieldTarget
 from .places import at_nodes, at_points, folded
 from .point_files import PointFiles
 from .relative import at_rest, counted_from, with_places
@@ -70,8 +70,15 @@ class PreparedBubble:
         """None: a bubble is one specimen."""
         return {}
 
+    @property
+    def parts(self) -> Mapping[str, Mapping[str, Masks]]:
+        """Frames, where no field that is constant over them is projected out."""
+        from .frames_left_out import frames_of
+
+        return frames_of(self)
+
     def reach(self, masks: Masks) -> Reach:
-        """As the test's own: nothing of it is left out."""
+        """As the test's own: a bubble does not tell how far it is strained."""
         return self.test.reach
 
     @property
@@ -82,34 +89,53 @@ class PreparedBubble:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """The one comparison: the whole field at every pressure.
+        """The one comparison: the whole field at every pressure; none where nothing is left.
 
         Raises
         ------
         InputError : data that cannot be matched.
         """
-        test, model = self.test, self.model
+        from .frames_left_out import kept_targets
+
+        test, model, sheet = self.test, self.model, self.test.sheet
+        whole = self.targets
+        targets = kept_targets(whole, (masks or {}).get(test.name))
+        if not targets:
+            return ()
         # Blocks: one a direction and pressure.
-        weight = weighting.weight / (3 * len(test.pressures)) if weighting.relative else 1.0
-        fields = self.matched
-        if test.match_by == "surfaces":
-            targets = at_nodes(self.surfaces, model.mesh)
-        elif self.known is not None:
-            targets = at_nodes(fields, model.mesh)
-        else:
-            targets, _ = at_points(test, fields, model.mesh)
-        sheet = test.sheet
+        blocks = 3 * (len(test.pressures) - len(whole) + len(targets))
+        weight = weighting.weight / blocks if weighting.relative else 1.0
+        kind = "e" if weighting.relative else test.objective
         try:
-            if sheet.constant or sheet.since is not None:
-                targets = with_places(targets, model.mesh.points[:, :2])
-            if sheet.since is not None:
-                targets = counted_from(targets, sheet.since)
-            kind = "e" if weighting.relative else test.objective
             objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
         except InputError as error:
             raise test.place.error(error.field, error.problem) from None
         nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
+
+    @property
+    def targets(self) -> list[FieldTarget]:
+        """What is matched, frame by frame, on the model's mesh.
+
+        Raises
+        ------
+        InputError : data that cannot be matched.
+        """
+        test, mesh, sheet = self.test, self.model.mesh, self.test.sheet
+        if test.match_by == "surfaces":
+            targets = at_nodes(self.surfaces, mesh)
+        elif self.known is not None:
+            targets = at_nodes(self.matched, mesh)
+        else:
+            targets, _ = at_points(test, self.matched, mesh)
+        try:
+            if sheet.constant or sheet.since is not None:
+                targets = with_places(targets, mesh.points[:, :2])
+            if sheet.since is not None:
+                targets = counted_from(targets, sheet.since)
+        except InputError as error:
+            raise test.place.error(error.field, error.problem) from None
+        return targets
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float

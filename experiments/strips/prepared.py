@@ -73,10 +73,22 @@ class PreparedStrips:
             return {}
         return {self.part(d): test.strips[d].specimen_of.tolist() for d in test.matched}
 
+    @property
+    def parts(self) -> Mapping[str, Mapping[str, Masks]]:
+        """Directions, and specimens of a direction that has several."""
+        from .parts import parts_of
+
+        return parts_of(self)
+
     def reach(self, masks: Masks) -> Reach:
         """What the points matched say of the law."""
         by_direction = {d: masks.get(self.part(d)) for d in self.test.matched}
         return reach_of(self.test, by_direction)
+
+    def kept(self, masks: Masks | None) -> tuple[str, ...]:
+        """The directions of which masks leave anything to match."""
+        known = masks or {}
+        return tuple(d for d in self.test.matched if known.get(self.part(d), np.True_).any())
 
     def part(self, direction: str) -> str:
         """The name of the comparison of a direction."""
@@ -85,16 +97,16 @@ class PreparedStrips:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """One a direction, without those whose weight is zero.
+        """One a direction, without those whose weight is zero, or of which nothing is left.
 
         Raises
         ------
         InputError : nothing was measured, or no load at all.
         """
         test, models = self.test, self.test.models()
-        share = weighting.weight
-        if weighting.relative:
-            share /= sum(test.weights[d] for d in test.matched)
+        share, kept = weighting.weight, self.kept(masks)
+        if weighting.relative and kept:
+            share /= sum(test.weights[d] for d in kept)
         relative = weighting.relative or test.objective == "relative"
         return tuple(
             Comparison(
@@ -108,7 +120,7 @@ class PreparedStrips:
                 # stress along them is more than G12 (docs/reference/law.md): fabrics do not.
                 must_be_stable=False,
             )
-            for direction in test.matched
+            for direction in kept
         )
 
     def finer(

@@ -165,9 +165,11 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
     keeps its area, 2 sin(2 angle) ln(l_f/l_i). Breaks: where three lines follow a load curve best,
     in shares of the strain of its gauge.
 
-    masks : which of the points a curve follows, by direction; all unless given.
+    masks : which of the points a curve follows, by direction; all unless given. A direction whose
+    mask keeps none says nothing.
     """
-    masks, strips = masks or {}, test.strips
+    masks = {d: mask for d, mask in (masks or {}).items() if mask is not None}
+    strips = {d: s for d, s in test.strips.items() if d not in masks or masks[d].any()}
     per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
     ends, shares = {}, {}
     for direction, strip in strips.items():

@@ -65,6 +65,10 @@ def test_what_a_fit_to_the_other_test_foretells(tmp_path: Path) -> None:
     folders = {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()}
     assert folders == {"constant-all", "constant-without-1", "constant-without-2"}
     assert all((tmp_path / "out" / name / "report.html").exists() for name in folders)
+    # In the test's own words, too, as after a fit.
+    own = two.foretold.rms["two: warp"]
+    assert f"constant, two: RMS errors in N: warp {own:.4g}" in found.lines()
+    assert two.foretold.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
     assert found.lines()[-1] == (
         f"constant: foretold {100 * said['mean_foretold']['constant']:.3g} % on average"
     )
