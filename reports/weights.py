@@ -46,10 +46,10 @@ def plot_weights(
     for axes, (name, by_strain) in zip(others, moduli.items(), strict=True):
         bars = sigma.get(name) or [0.0] * len(by_strain)
         looks = zip(by_strain.items(), DASHES, bars, strict=False)
-        for (strain, values), dashes, bar in looks:
+        for (strain, moved), dashes, bar in looks:
             look = {"color": BLUE, "linestyle": dashes, "linewidth": 1.4}
-            axes.plot(counts, values, marker="o", markersize=4, label=f"at {strain:.3g}", **look)
-            own = float(np.interp(AS_WRITTEN, counts, values))
+            axes.plot(counts, moved, marker="o", markersize=4, label=f"at {strain:.3g}", **look)
+            own = float(np.interp(AS_WRITTEN, counts, moved))
             axes.errorbar([AS_WRITTEN], [own], [bar * own], color=GREY, capsize=4, zorder=1)
         quiet(axes, "", "MPa", name)
         from_zero(axes, list(by_strain.values()))

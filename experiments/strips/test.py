@@ -168,13 +168,13 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
     masks : which of the points a curve follows, by direction; all unless given. A direction whose
     mask keeps none says nothing.
     """
-    masks = {d: mask for d, mask in (masks or {}).items() if mask is not None}
-    strips = {d: s for d, s in test.strips.items() if d not in masks or masks[d].any()}
+    known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
+    strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}
     per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
     ends, shares = {}, {}
     for direction, strip in strips.items():
-        ends[direction] = per_stretch.get(direction, 1.0) * strip.strain_by(masks.get(direction))
-        shares[direction] = strip.break_shares(masks.get(direction))
+        ends[direction] = per_stretch.get(direction, 1.0) * strip.strain_by(known.get(direction))
+        shares[direction] = strip.break_shares(known.get(direction))
     return Reach(
         (ends.get("warp"), ends.get("fill"), ends.get("bias")),
         (shares.get("warp"), shares.get("fill"), shares.get("bias")),
