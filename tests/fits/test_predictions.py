@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
-from bubblefit.experiments.base import RunRecord
+from bubblefit.experiments.base import Exhibit, RunRecord
+from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.notes import notes_of_record
 from bubblefit.fits import predictions
 from bubblefit.fits.cards import chosen_cards
@@ -210,8 +211,9 @@ def test_a_card_runs_with_its_own_thickness(project: Project) -> None:
     assert thick > 1.05 * thin
 
 
-def test_notes_stand_wherever_a_run_does(project: Project, tmp_path: Path) -> None:
+def test_notes_stand_wherever_a_run_does(project: Project, tmp_path: Path, monkeypatch) -> None:
     """On the terminal, on the page, in the table and in result.json."""
+    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     short = replace(law, strain_range=np.array([0.3, 0.01, 0.3]))
     done = predict(project, cards={"short": MaterialCard(short, 0.9)}, jobs=1)
