@@ -152,7 +152,7 @@ def test_linear_orthotropic_as_abaqus(ccx):
     0.3 %; at the first pressure, 3.9 kPa, 0.6 %: our membrane is 0.49 % off there, too.
     """
     rows = dict(cases())[2, "e"]
-    apex = shapes(rows, 432, CalculixSolver())["apex"].to_numpy()
+    apex = shapes(rows, 300, CalculixSolver())["apex"].to_numpy()
     theirs = rows["apex_x_profile"].to_numpy()
     print(np.round(100 * (apex / theirs - 1), 3))
     error = np.abs(apex / theirs - 1)
