@@ -21,6 +21,7 @@ KERNELS = (
     "materials/wrinkles.py",
     "materials/relaxation.py",
     "materials/law.py",
+    "materials/biaxial_response.py",
     "meshes/volume.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/sensitivity.py",

@@ -16,6 +16,18 @@ WORDS = {
     "pressure": frozenset("pressure druck überdruck innendruck p".split()),
     "deflection": frozenset("deflection displacement durchbiegung weg".split()),
 }
+#: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
+LOADS = frozenset("n force load kraft stress spannung tension".split())
+STRAINS = frozenset("eps epsilon strain dehnung".split())
+WARP = frozenset("w warp kette x".split())
+FILL = frozenset("f fill weft schuss y".split())
+#: Quantities that need a word of each of two sets.
+PAIRS = {
+    "warp load": (LOADS, WARP),
+    "fill load": (LOADS, FILL),
+    "warp strain": (STRAINS, WARP),
+    "fill strain": (STRAINS, FILL),
+}
 #: Words of columns of elongation: those measured on the strip, then those of the machine's travel,
 #: which holds the slip in the grips and the machine's own give too.
 ON_THE_STRIP = frozenset(
@@ -33,6 +45,7 @@ OTHERS = frozenset(
 LABELS = {
     "specimen": frozenset({"specimen", "specimen id", "specimen label", "sample id"})
     | {"specimen name", "specimen number", "specimen no", "sample name", "probe"},
+    "ratio": frozenset({"ratio", "load ratio", "stress ratio", "lastverhältnis", "verhältnis"}),
     "repetition": frozenset({"repetition", "repeat", "run", "trial", "wiederholung"}),
     "direction": frozenset({"direction", "series", "test direction", "orientation", "richtung"}),
 }
@@ -42,6 +55,8 @@ LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
 LOAD_UNITS = {"N": 1.0, "kN": 1e3}
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {"kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02}
+#: One in each unit of strain.
+STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "-": 1.0, "1": 1.0}
 #: MPa in one of each unit of pressure.
 PRESSURE_UNITS = {
     "Pa": 1e-6, "hPa": 1e-4, "mbar": 1e-4, "kPa": 1e-3, "psi": 6.894757293168e-3, "bar": 0.1,
@@ -50,7 +65,7 @@ PRESSURE_UNITS = {
 #: Seconds in one of each unit of time.
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
-_KNOWN = r"kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
+_KNOWN = r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%][A-Za-z0-9µμ°%/^*·²-]{0,5}"
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
@@ -68,11 +83,14 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def means(name: str, quantity: str) -> bool:
-    """Whether a column holds `quantity`, one of those in `WORDS` and `LABELS`."""
+    """Whether a column holds `quantity`, one of those in `WORDS`, `PAIRS` and `LABELS`."""
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
     words = set(re.split(r"[\W\d_]+", plain))
+    if quantity in PAIRS:
+        what, along = PAIRS[quantity]
+        return bool(words & what and words & along) and not words & (OTHERS - what)
     return bool(words & WORDS[quantity]) and not words & (OTHERS - WORDS[quantity])
 
 

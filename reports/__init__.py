@@ -9,6 +9,7 @@ from .bending import (
     plot_bending_cases,
     plot_gas,
 )
+from .biaxial import BiaxialPanel, plot_biaxial
 from .clock import plot_clock
 from .convergence import ConvergencePanel, plot_convergence
 from .curves import plot_curves
@@ -37,6 +38,7 @@ __all__ = [
     "BendLine",
     "BendPanel",
     "BendReadings",
+    "BiaxialPanel",
     "ConvergencePanel",
     "LawRow",
     "OrderErrors",
@@ -48,6 +50,7 @@ __all__ = [
     "plot_beam",
     "plot_bending",
     "plot_bending_cases",
+    "plot_biaxial",
     "plot_clock",
     "plot_convergence",
     "plot_curves",

@@ -12,13 +12,14 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.mesh import Mesh
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
+from ...models.patch import PatchModel
 from ...models.uniaxial import UniaxialModel
 from ..analyses import analysis_of
 from ..base import History, Progress, SolverCheck
 from ..identity import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder
-from . import bubble, cylinder_analysis, strip
+from . import bubble, cylinder_analysis, patch, strip
 from .analysis import Reader, Rescue, Run, Setup
 from .executable import ADVICE, Executable, find_ccx
 from .law_file import law_files
@@ -36,6 +37,7 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
     BubbleModel: bubble.analyse,
     UniaxialModel: strip.analyse,
     CylinderModel: cylinder_analysis.analyse,
+    PatchModel: patch.analyse,
 }
 
 

@@ -16,11 +16,12 @@ from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
 from ...models.cylinder import CylinderModel
 from ...models.inflated import InflatedModel
+from ...models.patch import PatchModel
 from ...models.uniaxial import UniaxialModel
 from ..analyses import analysis_of
 from ..base import BandEnd, History, Progress, SolverCheck, parameters_of
 from ..identity import in_words
-from . import bubble, closed_model, cylinder, inflated, strip
+from . import bubble, closed_model, cylinder, inflated, patch, strip
 from .march import Asked
 from .newton import Membrane
 from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
@@ -34,7 +35,7 @@ class Analysis(NamedTuple):
     The wall is None where none was asked for.
     """
 
-    prepare: Callable[..., Membrane]
+    prepare: Callable[..., Membrane | patch.Patch]
     analyse: Callable[..., tuple[History, Array]]
 
 
@@ -44,6 +45,7 @@ ANALYSES: dict[type, Analysis] = {
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
     InflatedModel: Analysis(closed_model.prepare, inflated.analyse),
     CylinderModel: Analysis(cylinder.prepare, cylinder.analyse),
+    PatchModel: Analysis(patch.prepare, patch.analyse),
 }
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
@@ -84,7 +86,7 @@ class MembraneSolver:
         self.tolerance = tolerance
         self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
-        self._prepared: tuple[Any, Membrane] | None = None
+        self._prepared: tuple[Any, Membrane | patch.Patch] | None = None
 
     @property
     def identity(self) -> str:
@@ -172,7 +174,7 @@ class MembraneSolver:
         )
         return history, slope
 
-    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane:
+    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | patch.Patch:
         """Geometry and sparsity are made once a model; strain history anew every run."""
         if self._prepared is None or self._prepared[0] is not model:
             prepare = analysis_of(ANALYSES, model, self.name).prepare

@@ -1,0 +1,1 @@
+"""Biaxial tests of a cruciform: loads per width and strains along warp and fill."""

@@ -1,0 +1,38 @@
+"""What a biaxial test puts on the page of a fit, and the files that it writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...materials.law import HypoelasticLaw
+from ...reports import BiaxialPanel, plot_biaxial
+from ...writing import replacing
+from ..base import Exhibit, Output
+from .objective import PERCENT
+from .prepared import FittedPath
+from .tables import misfit_table, path_table
+from .test import BiaxialTest
+
+
+def exhibit(
+    test: BiaxialTest, paths: Sequence[FittedPath], law: HypoelasticLaw, out: Output
+) -> Exhibit:
+    """Write paths.csv and the picture of the ratios."""
+    with replacing(out.path("paths.csv")) as path:
+        path_table(paths).to_csv(path, index=False, float_format="%.9g")
+    panels = [
+        BiaxialPanel(
+            p.path.ratio,
+            p.path.load.max(axis=1),
+            PERCENT * p.objective.strain,
+            (("model", p.path.load.max(axis=1), PERCENT * p.objective.modelled(p.history)),),
+        )
+        for p in paths
+    ]
+    plot_biaxial(out.path("paths.png"), panels)
+    return Exhibit(
+        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
+        figures=[(out.name("paths.png"), "Strain over the larger load: measured and modelled")],
+        tables=[misfit_table(paths)],
+        files=[(out.name("paths.csv"), "loads and strains of every ratio, measured and modelled")],
+    )

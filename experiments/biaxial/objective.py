@@ -1,0 +1,101 @@
+"""Residuals of a ratio: strains along warp and fill since the beginning of the path, two blocks."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError
+from ...identification.comparison import NoiseIs
+from ...models.patch import elongations
+from ...solvers.base import History
+
+Array = NDArray[np.float64]
+
+#: Of one measured strain: what an extensometer or a camera on a cruciform is good for.
+EXTENSOMETER = 1e-4
+PERCENT = 100.0
+
+
+class StrainObjective:
+    """(model - measured) / (scale sqrt(n)) of n strains along the warp, then along the fill.
+
+    The norm of a block is the RMS error of a strain over the scale, times the weight. Both are
+    counted from the first load of the path: what the fabric kept of earlier cycles is no part.
+
+    Parameters
+    ----------
+    load : (n, 2) N/mm, by which the values lie along their path. strain : (n, 2) measured since the
+        beginning of the path, as shares.
+    scale : share of strain that counts as one. weight : of both blocks.
+    noise : of one measured strain; None: `EXTENSOMETER` is reckoned with.
+    """
+
+    #: What the residuals are in after `scale`.
+    unit = "%"
+
+    def __init__(
+        self,
+        load: ArrayLike,
+        strain: ArrayLike,
+        scale: float = 1.0,
+        weight: float = 1.0,
+        noise: float | None = None,
+    ) -> None:
+        self.load, self.strain = np.asarray(load, float), np.asarray(strain, float)
+        if len(self.strain) < 2:
+            raise InputError(None, "path", "expected two loads at least")
+        self.least_noise = PERCENT * (EXTENSOMETER if noise is None else noise)
+        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
+        # The first row is the zero of the others and matches whatever the law is.
+        self.sizes = (len(self.strain) - 1,) * 2
+        self._unit = scale * np.sqrt(len(self.strain) - 1) / weight
+
+    @property
+    def scale(self) -> Array:
+        """(2 n,): % of strain in one unit of each residual."""
+        return np.full(sum(self.sizes), PERCENT * self._unit)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Everything measured that the residual depends on."""
+        return self.load, self.strain
+
+    def modelled(self, history: History) -> Array:
+        """(n, 2) the model's strains since the beginning of the path."""
+        own = elongations(history.displacement)
+        return np.asarray(own - own[0])
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Both blocks, (2 n,); there is no nuisance."""
+        return self._blocks(self.modelled(history) - self.strain)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """(2 n, parameters) from the slope of the displacements."""
+        own = elongations(slope)
+        return self._blocks(own - own[0])
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        """(2 n, 0): there is none."""
+        if names:
+            raise InputError(None, "nuisance", f"a biaxial path knows no {', '.join(names)}")
+        return np.empty((sum(self.sizes), 0))
+
+    def shifted(self, here: History, there: History) -> StrainObjective:
+        """The objective of a model that shows `here` where this one shows `there`."""
+        other = copy.copy(self)
+        other.strain = self.strain - (self.modelled(here) - self.modelled(there))
+        return other
+
+    def rms(self, history: History) -> Array:
+        """(2,) RMS error of the strains along warp and fill, %."""
+        off = (self.modelled(history) - self.strain)[1:]
+        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
+
+    def _blocks(self, values: Array) -> Array:
+        """Rows (n, 2, ...) without the first as one column of values, the warp's first."""
+        rows = np.swapaxes(values[1:], 0, 1)
+        return np.asarray(rows.reshape(-1, *values.shape[2:]) / self._unit)

@@ -1,0 +1,1 @@
+"""Constants that designers of membrane structures type in, and the evaluation behind them."""
