@@ -15,6 +15,7 @@ COMMANDS = {
     "fit": ("fit", "Fit a material to all tests of a fabric together."),
     "bubble": ("bubble", "Fit a material to bubble inflation tests only."),
     "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests only."),
+    "biaxial": ("biaxial", "Constants that a designer types in, from biaxial tests."),
     "check": ("check", "Look at the data before anything is fitted."),
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "validate": ("validate", "Does a fit foretell the test that it was not given?"),
