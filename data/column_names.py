@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import permutations
 
 #: Words that make a column one of these quantities, in English and German exports.
 WORDS = {
@@ -17,7 +18,7 @@ WORDS = {
     "deflection": frozenset("deflection displacement durchbiegung weg".split()),
 }
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
-LOADS = frozenset("n force load kraft stress spannung tension".split())
+LOADS = frozenset("n f force load kraft stress spannung tension".split())
 STRAINS = frozenset("eps epsilon strain dehnung".split())
 WARP = frozenset("w warp kette x".split())
 FILL = frozenset("f fill weft schuss y".split())
@@ -67,7 +68,7 @@ TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
 _KNOWN = r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
-_UNIT = r"[A-Za-zµμ°%][A-Za-z0-9µμ°%/^*·²-]{0,5}"
+_UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,5}"
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
 _AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")
 
@@ -87,10 +88,13 @@ def means(name: str, quantity: str) -> bool:
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
-    words = set(re.split(r"[\W\d_]+", plain))
+    listed = re.split(r"[\W\d_]+", plain)
+    words = set(listed)
     if quantity in PAIRS:
         what, along = PAIRS[quantity]
-        return bool(words & what and words & along) and not words & (OTHERS - what)
+        # One word is not both: F is a force before the yarn, and the fill after another word.
+        both = any(a in what and b in along for a, b in permutations(listed, 2))
+        return both and not words & (OTHERS - what)
     return bool(words & WORDS[quantity]) and not words & (OTHERS - WORDS[quantity])
 
 

@@ -46,7 +46,7 @@ def plain_ratio(ratio: str) -> str:
     warp, fill = shares(ratio)
     least = min(x for x in (warp, fill) if x > 0)
     whole = [round(x / least, 3) for x in (warp, fill)]
-    for factor in range(1, 11):
+    for factor in range(1, 6):
         if all(math.isclose(factor * x, round(factor * x), abs_tol=0.005 * factor) for x in whole):
             return ":".join(f"{round(factor * x)}" for x in whole)
     return ":".join(f"{x:g}" for x in (round(warp, 3), round(fill, 3)))

@@ -8,10 +8,13 @@ from __future__ import annotations
 from . import (
     abaqus_fabric,
     abaqus_umat,
+    constants_table,
     csv_tables,
+    data_sheets,
     ls_dyna_mat34,
     marc_hypela2,
     marc_nlelast,
+    radioss_law58,
 )
 from .formats import Format
 
@@ -21,5 +24,8 @@ FORMATS: tuple[Format, ...] = (
     abaqus_umat.FORMAT,
     abaqus_fabric.FORMAT,
     ls_dyna_mat34.FORMAT,
+    radioss_law58.FORMAT,
+    constants_table.FORMAT,
+    *data_sheets.FORMATS,
     csv_tables.FORMAT,
 )

@@ -1,0 +1,115 @@
+"""`bubblefit biaxial`: constants of computed paths, every option told, spread, what is kept."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from bubblefit.materials.designers.constants import DesignersConstants
+
+from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows
+from ..commands import in_process, one_line, result_in
+
+LAST = DesignersConstants(800.0, 640.0, 0.4, 0.5)
+#: In its first cycle a fabric is softer.
+FIRST = DesignersConstants(600.0, 400.0, 0.3, 0.45)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three cycles a ratio, the first of other constants; each leaves 0.03 and 0.05 %."""
+    place = tmp_path_factory.mktemp("constants")
+    shares = {"1:1": (1, 1), "2:1": (1, 0.5), "1:2": (0.5, 1), "1:0": (1, 0), "0:1": (0, 1)}
+    rows, kept = [], np.zeros(2)
+    for ratio in FIVE:
+        for number in range(3):
+            prestress = np.array([2.0, 2.0])
+            loads = prestress + np.outer(cycle() - 2.0, shares[ratio])
+            loads = np.concatenate([loads, prestress[None]])
+            constants = LAST if number else FIRST
+            strain = 100 * (constants.strain(loads) - constants.strain(prestress[None])) + kept
+            kept = kept + np.array([0.03, 0.05])
+            strain[30:] = kept + (strain[30:] - strain[-1])
+            rows += [(ratio, *n, *e) for n, e in zip(loads.tolist(), strain.tolist(), strict=True)]
+    write_rows(place / "test.csv", rows)
+    biaxial_project(place)
+    return place
+
+
+def test_the_usual_constants_are_those_of_the_last_cycles(folder):
+    done = in_process("biaxial", "project.toml", cwd=folder)
+    said = done.stdout
+    assert "least squares of strains, reciprocal, without unloaded yarns; 8 strain paths" in said
+    assert "E warp 800 kN/m, E fill 640 kN/m, nu_warp 0.4, nu_fill 0.5" in said
+    assert "A warp 1000, A fill 800, A warp-fill 400, A fill-warp 400 kN/m" in said
+    assert "first cycles: E warp 600, E fill 4" in said and "last cycles: 800, 640 kN/m" in said
+    assert "strain kept after 0:1" in said and "warp 0.45 %, fill 0.75 %" in said
+    assert "nothing of the shear stiffness" in said
+    out = folder / "out" / f"{folder.name}-biaxial"
+    told = result_in(out)["tests"]["biaxial"]
+    first = told["constants"][0]
+    assert first["what"] == "chosen" and first["paths"] == 8
+    assert first["E_warp_kN_per_m"] == pytest.approx(800, rel=1e-9)
+    assert first["A_warp_fill_kN_per_m"] == pytest.approx(400, rel=1e-9)
+    assert first["squares_percent2"] < 1e-15
+    table = pd.read_csv(out / "constants.csv")
+    assert list(table.what.fillna(""))[-2:] == ["first cycle", "last cycle"] and len(table) == 13
+    assert table.E_fill_kN_per_m.iloc[-2] < 480
+    kept = pd.read_csv(out / "kept.csv")
+    np.testing.assert_allclose(kept.warp_after_percent, 0.09 * np.arange(1, 6), atol=1e-9)
+    np.testing.assert_allclose(kept.fill_before_percent, 0.15 * np.arange(5), atol=1e-9)
+    lines = pd.read_csv(out / "lines.csv")
+    row = lines[lines.ratio == "2:1"].iloc[0]
+    assert (row.cycle, row.cycles, row.readings) == (3, 3, 30)
+    assert (row.from_kN_per_m, row.to_kN_per_m) == (2.0, 30.0)
+    assert row.fill_load_change_kN_per_m == pytest.approx(14.0)
+    wanted = 100 * LAST.strain([[28.0, 14.0]])[0]
+    assert row.fill_strain_change_percent == pytest.approx(wanted[1])
+    assert (out / "constants.png").is_file()
+
+
+def test_the_options_choose_what_is_evaluated(folder, tmp_path):
+    def chosen(*options):
+        out = tmp_path / "-".join(options).replace(":", "")
+        done = in_process("biaxial", "project.toml", *options, "--json", "--out", out, cwd=folder)
+        told = json.loads(done.stdout)["tests"]["biaxial"]
+        return told["options"], told["constants"][0]
+
+    words, row = chosen("--paths", "10", "--free")
+    assert "free, with unloaded yarns" in words
+    assert row["paths"] == 10 and row["reciprocal"] is False and row["unloaded_yarns"] is True
+    words, row = chosen("--minimise", "load", "--ratio", "1:1", "--ratio", "2/1")
+    assert words.startswith("least squares of loads, reciprocal") and "1:1 and 2:1 only" in words
+    assert (row["minimise"], row["ratios"], row["paths"]) == ("load", "1:1 2:1", 4)
+
+
+def test_what_cannot_be_evaluated_is_said(folder, tmp_path):
+    def run(*options):
+        out = tmp_path / "x"
+        return in_process("biaxial", "project.toml", *options, "--out", out, cwd=folder, code=2)
+
+    one_line(run("--ratio", "3:1"), "there is no ratio 3:1", "1:1, 2:1")
+    one_line(run("--ratio", "1:1"), "two that differ")
+    one_line(run("--test", "none"), "none")
+    assert not (tmp_path / "x").exists()
+
+
+def test_constants_that_hang_on_the_choice_are_remarked(tmp_path):
+    """Published with free ratios: reciprocal evaluations differ by more than a tenth."""
+    free = DesignersConstants(1188.0, 864.0, 0.73, 0.69)
+    rows = []
+    for ratio, share in zip(FIVE, [(1, 1), (1, 0.5), (0.5, 1), (1, 0), (0, 1)], strict=True):
+        loads = np.outer(cycle(), share)
+        rows += [
+            (ratio, *n, *e)
+            for n, e in zip(loads.tolist(), (100 * free.strain(loads)).tolist(), strict=True)
+        ]
+    write_rows(tmp_path / "test.csv", rows)
+    biaxial_project(tmp_path)
+    said = in_process("biaxial", "project.toml", "--free", cwd=tmp_path).stdout
+    assert "E warp 1188 kN/m, E fill 864 kN/m, nu_warp 0.73, nu_fill 0.69" in said
+    assert "E warp lies between" in said and "say which options are meant" in said
+    again = in_process("biaxial", "project.toml", cwd=tmp_path, code=2)
+    one_line(again, "already holds a result", "--overwrite")

@@ -1,0 +1,174 @@
+"""Files of biaxial tests: names, units, ratios, cycles, and the paths that are evaluated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.data.biaxial.cycles import find_cycles
+from bubblefit.data.biaxial.paths import cycles_of, evaluated_paths
+from bubblefit.data.biaxial.ratios import KNOWN, nearest_ratio, plain_ratio, shares
+from bubblefit.data.biaxial.table import read_biaxial_table
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ...biaxial_files import BENT, FIVE, HEAD, cycle, rows_of, write_rows
+from ...complaints import complaint_with
+
+ROWS = rows_of(BENT, cycles=3, kept=0.02)
+
+
+@pytest.fixture
+def table(tmp_path):
+    return read_biaxial_table(write_rows(tmp_path / "test.csv", ROWS))
+
+
+def test_a_file_is_read_in_newtons_a_millimetre_and_shares(table):
+    load = np.array([row[1:3] for row in ROWS])
+    strain = np.array([row[3:] for row in ROWS])
+    np.testing.assert_allclose(table.load, load, rtol=1e-14)
+    np.testing.assert_allclose(table.strain, 0.01 * strain, rtol=1e-12, atol=1e-16)
+    assert table.ratio == tuple(row[0] for row in ROWS)
+    assert table.source.columns["warp load"] == "n_w, kN/m"
+    assert table.source.units["fill strain"] == "%" and table.lines[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("head", "load", "strain"),
+    [
+        (
+            "ratio;Kraft Kette [N/m];Kraft Schuss [N/m];Dehnung Kette [‰];Dehnung Schuss [‰]",
+            1e3,
+            10,
+        ),
+        ("Load ratio;F_warp (N/mm);F_weft (N/mm);Strain warp (mm/mm);Strain weft (mm/mm)", 1, 0.01),
+        ("ratio;Stress x (N/cm);Stress y (N/cm);epsilon_x (%);epsilon_y (%)", 10, 1),
+    ],
+)
+def test_other_names_and_units_mean_the_same(tmp_path, head, load, strain):
+    path = tmp_path / "test.csv"
+    lines = [head]
+    for ratio, *numbers in ROWS[:30]:
+        values = np.array(numbers) * [load, load, strain, strain]
+        lines.append(";".join([ratio, *(f"{v:.12g}".replace(".", ",") for v in values)]))
+    path.write_text("\n".join(lines) + "\n")
+    found = read_biaxial_table(path)
+    np.testing.assert_allclose(found.load, [row[1:3] for row in ROWS[:30]], rtol=1e-10)
+    wanted = 0.01 * np.array([row[3:] for row in ROWS[:30]])
+    np.testing.assert_allclose(found.strain, wanted, rtol=1e-9)
+
+
+def test_what_a_file_does_not_say_has_to_be_said(tmp_path):
+    bare = write_rows(tmp_path / "bare.csv", ROWS[:5], "ratio,a,b,c,d")
+    complaint_with(["bare.csv", "header row", "columns"], read_biaxial_table, bare)
+    names = {"warp_load": "a", "fill_load": "b", "warp_strain": "c", "fill_strain": "d"}
+    complaint_with(["load_unit"], read_biaxial_table, bare, columns=names)
+    complaint_with(["strain_unit"], read_biaxial_table, bare, columns=names, load_unit="kN/m")
+    found = read_biaxial_table(bare, columns=names, load_unit="N/m", strain_unit="‰")
+    assert found.load[3, 0] == pytest.approx(1e-3 * ROWS[3][1])
+    assert found.strain[3, 1] == pytest.approx(1e-3 * ROWS[3][4])
+    complaint_with(["'warp'", "warp_load"], read_biaxial_table, bare, columns={"warp": "a"})
+    said = write_rows(tmp_path / "said.csv", ROWS[:5])
+    complaint_with(["kN/m", "N/m"], read_biaxial_table, said, load_unit="N/m")
+    wrong = write_rows(tmp_path / "wrong.csv", [("12:30 h", *ROWS[0][1:])])
+    complaint_with(["line 2", "'ratio'", "2:1", "12:30 h"], read_biaxial_table, wrong)
+
+
+def test_ratios_have_one_name_each():
+    for name in ("2:1", "2/1", " 4 : 2 ", "1:0.5", "1:0,5", "30:15"):
+        assert plain_ratio(name) == "2:1"
+    assert [plain_ratio(name) for name in ("0:3", "2:0", "5:5", "1:5")] == [
+        "0:1",
+        "1:0",
+        "1:1",
+        "1:5",
+    ]
+    assert plain_ratio("1:0.37") == "1:0.37"
+    assert shares("1:2") == (0.5, 1.0) and shares("0:1") == (0.0, 1.0)
+    for wrong in ("", "one to two", "0:0", "-1:2", "1:2:3"):
+        complaint_with(["2:1"], plain_ratio, wrong)
+
+
+@given(st.sampled_from(KNOWN), st.floats(0.5, 500.0))
+def test_loads_have_the_ratio_that_is_nearest(name, size):
+    assert nearest_ratio([size * x for x in shares(name)]) == name
+
+
+def test_loads_between_the_ratios_have_their_own_numbers():
+    assert nearest_ratio([30.0, 27.0]) == "1:1" and nearest_ratio([30.0, 24.7]) == "1:0.82"
+    assert nearest_ratio([20.0, -0.1]) == "1:0" and nearest_ratio([0.5, 30.0]) == "0:1"
+
+
+def test_cycles_are_told_apart_and_begin_and_end_where_the_loads_turn(table):
+    cycles = find_cycles(table.load, table.ratio)
+    assert [(c.ratio, c.phase, c.number) for c in cycles] == [
+        (ratio, k + 1, n) for k, ratio in enumerate(FIVE) for n in (1, 2, 3)
+    ]
+    length = len(cycle())
+    for count, one in enumerate(cycles):
+        assert one.count == count + 1
+        assert one.first == count * length and one.last == count * length + 29
+
+
+def test_cycles_without_names_have_the_ratio_of_their_loads(table):
+    load = np.maximum(table.load, 0.4)  # a prestress that is kept on both yarns
+    cycles = find_cycles(load)
+    assert [c.ratio for c in cycles] == [ratio for ratio in FIVE for _ in range(3)]
+    assert [c.number for c in cycles] == [1, 2, 3] * 5 and cycles[-1].phase == 5
+
+
+def test_holds_and_noise_are_no_cycles():
+    hold = [np.full(20, 2.0), np.linspace(2, 30, 40), np.full(15, 30.0), np.linspace(30, 2, 40)]
+    s = np.concatenate(hold * 2)
+    s += 0.1 * np.random.default_rng(1).standard_normal(len(s))
+    cycles = find_cycles(np.column_stack([s, s]))
+    assert len(cycles) == 2
+    for one in cycles:
+        # The loading alone: not the holds at both ends, in which the fabric creeps.
+        assert one.last - one.first <= 42
+        assert s[one.first] < 2.6 and s[one.last] > 29.4
+    assert find_cycles(np.full((10, 2), 3.0)) == []
+
+
+def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
+    cycles = cycles_of([table], [None])
+    last = evaluated_paths([table], cycles)
+    assert [(p.ratio, p.cycle.number, p.cycles) for p in last] == [(r, 3, 3) for r in FIVE]
+    first = evaluated_paths([table], cycles, 1)
+    assert [p.cycle.number for p in first] == [1] * 5
+    # The first three cycles are conditioning, and the only ones of 1:1.
+    later = evaluated_paths([table], cycles, 1, conditioning=3)
+    assert [p.ratio for p in later] == list(FIVE[1:])
+    few = evaluated_paths([table], cycles, ratios=["1:2", "1:1"])
+    assert [p.ratio for p in few] == ["1:1", "1:2"]
+    asked = lambda *a, **k: evaluated_paths([table], cycles, *a, **k)  # noqa: E731
+    complaint_with(["ratio 1:1", "3 cycles", "number 4"], asked, 4)
+    complaint_with(["3:1", "the ratios there: 1:1, 2:1"], asked, ratios=["1:1", "3:1"])
+    complaint_with(["any", "after the conditioning"], asked, conditioning=15)
+
+
+def test_a_path_is_counted_from_its_beginning_and_tells_what_was_kept_before(table):
+    path = evaluated_paths([table], cycles_of([table], [None]))[1]
+    assert path.ratio == "2:1" and len(path.load) == 30
+    np.testing.assert_array_equal(path.since[0], [0.0, 0.0])
+    np.testing.assert_allclose(path.since, path.strain - path.strain[0])
+    # Five cycles of 0.02 % came before; 2:1 begins at another load along the fill.
+    assert path.residual[0] == pytest.approx(path.strain[0, 0] - table.strain[0, 0])
+    inside = path.between(5.0, 20.0)
+    assert inside.load.max() <= 20.0 and inside.load[0].max() >= 5.0
+    assert len(path.between(2.0, 30.0).load) == 30
+    complaint_with(["ratio 2:1", "2 to 30"], path.between, 40.0, 50.0)
+    thin = path.thinned(7)
+    assert len(thin.load) == 7
+    np.testing.assert_array_equal(thin.load[[0, -1]], path.load[[0, -1]])
+    assert path.thinned(30) is path
+
+
+def test_a_file_listed_for_a_ratio_is_of_that_ratio(tmp_path):
+    path = write_rows(tmp_path / "x.csv", rows_of(BENT, ["1:2"], cycles=2))
+    table = read_biaxial_table(path)
+    (cycles,) = cycles_of([table], ["2:1"])
+    assert [c.ratio for c in cycles] == ["2:1", "2:1"]
+    flat = write_rows(
+        tmp_path / "flat.csv", [("1:1", 2.0, 2.0, 0.1 * k, 0.2) for k in range(5)], HEAD
+    )
+    complaint_with(["flat.csv", "no loading"], cycles_of, [read_biaxial_table(flat)], [None])
