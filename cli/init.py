@@ -19,6 +19,7 @@ KINDS = {
     "known": ("bubble-known-solution", "bubblefit bubble {}", "project.toml"),
     "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
     "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
+    "biaxial": ("biaxial-computed", "bubblefit biaxial {}", "project.toml"),
     "bend": ("bend-valmex7318", "bubblefit bend {}", "project.toml"),
     "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
 }
@@ -34,8 +35,8 @@ COUNT = click.IntRange(0, 99)
 @click.option(
     "--example",
     type=click.Choice(list(KINDS)),
-    help="A bubble from a known solution; from measured DIC files; strip tests; bending;"
-    " bubble and strips together. [known]",
+    help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
+    " test; bending; bubble and strips together. [known]",
 )
 @click.option(
     "--own",
@@ -44,6 +45,7 @@ COUNT = click.IntRange(0, 99)
 )
 @click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
 @click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
+@click.option("--biaxial", type=COUNT, metavar="N", help="Biaxial tests of a cruciform.")
 @click.option("--cylinder", type=COUNT, metavar="N", help="Inflated cylinders to predict.")
 @click.option("--name", help="Of the fabric.")
 @click.option("--thickness", type=float, metavar="MM", help="Of the fabric [0.8].")
@@ -85,7 +87,7 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     write_project(path, tests, **said)
     write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
-    fitted = tests["bubble"] or tests["strips"]
+    fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
     then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
     click.echo(f"next: bubblefit {then}")
 
@@ -106,11 +108,12 @@ def _asked() -> dict[str, Any]:
         said["radius"] = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
         said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
     said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
+    said["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
     said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
     if said["cylinder"]:
         said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
         said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
-    if said["bubble"] or said["strips"]:
+    if said["bubble"] or said["strips"] or said["biaxial"]:
         said["form"] = click.prompt("Form of the moduli", default="cubic")
     return said
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ...data.biaxial.paths import BiaxialPath, evaluated_paths
 from ...errors import InputError
 from ...materials.designers.linear import (
@@ -15,7 +13,7 @@ from ...materials.designers.linear import (
     LinearPath,
     Options,
     evaluate,
-    every_option,
+    evaluate_others,
     line_of,
 )
 from ...notes import Note, NoteKind
@@ -95,7 +93,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
         chosen = evaluate(lines, options)
     except InputError as error:
         raise test.place.error("data", error.problem) from None
-    others = [found for o in every_option(lines) if o != options if (found := _settled(lines, o))]
+    others = evaluate_others(lines, options)
     return BiaxialEvaluation(
         test.name,
         paths,
@@ -133,9 +131,3 @@ def _of_cycle(test: BiaxialTest, which: int | str, options: Options) -> Evaluati
             return None
     found = _settled(_lines(paths), options)
     return None if found is None else replace(found, options=options)
-
-
-def spread_percent(low: float, high: float) -> float:
-    """Half the width of a spread over its middle, %."""
-    middle = 0.5 * (low + high)
-    return float(50.0 * (high - low) / middle) if middle else float(np.inf)

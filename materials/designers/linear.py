@@ -10,6 +10,7 @@ yarns of 1:0 and 0:1 are the usual choice.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -140,6 +141,16 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
         count += int(which.sum())
         rms[path.ratio] = float(np.sqrt(np.mean(off**2)))
     return Evaluation(options, constants, count, squares, rms)
+
+
+def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
+    """What every other choice gives; those that settle no constants are left out."""
+    found = []
+    for other in every_option(paths):
+        with suppress(InputError):
+            if other != options:
+                found.append(evaluate(paths, other))
+    return found
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:

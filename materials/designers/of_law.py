@@ -12,7 +12,7 @@ from ...errors import InputError
 from ..biaxial_response import biaxial_response
 from ..law import HypoelasticLaw
 from .constants import DesignersConstants
-from .linear import USUAL, Evaluation, Options, evaluate, every_option, line_of
+from .linear import USUAL, Evaluation, Options, evaluate, evaluate_others, line_of
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def constants_of_law(
     mean = float(np.trapezoid(shear, gammas) / shear_strain)
     asked = evaluate(lines, options)
     asked = replace(asked, constants=replace(asked.constants, shear=mean))
-    others = tuple(evaluate(lines, o) for o in every_option(lines) if o != options)
+    others = tuple(evaluate_others(lines, options))
     lost, largest = {}, {}
     for name, (load, strain) in curves.items():
         off = (strain - strain[0]) - asked.constants.strain(load - load[0])

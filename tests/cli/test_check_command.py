@@ -8,6 +8,7 @@ import re
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.experiments.biaxial import doubts as biaxial_doubts
 from bubblefit.experiments.bubble.doubts import place, size
 from bubblefit.experiments.doubts import ROUGH
 from bubblefit.experiments.registry import kinds
@@ -19,6 +20,7 @@ from bubblefit.fits.setup import prepare_fit
 from ..camera import camera_project
 from ..commands import in_process, one_line, result_in
 from ..complaints import complaint
+from ..experiments.biaxial.test_biaxial_doubts import TRAPS as BIAXIAL_TRAPS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
 from ..places import EXAMPLES, ROOT
@@ -124,6 +126,7 @@ def test_the_document_lists_every_doubt_and_its_limits():
         assert f"{value:g}" in told["length-unit"][1]
     assert f"{place.FAR_OFF:g} radii" in told["off-centre"][0]
     assert f"{place.STEEP:g} degrees" in told["tilted"][0]
+    strips, biaxial = strips.split("## Biaxial tests")
     told = {name: (severity, seen) for name, severity, seen in row.findall(strips)}
     assert set(told) == set(kinds()["strips"].doubts)
     for _, _, (name, sure, _) in STRIP_TRAPS.values():
@@ -132,4 +135,14 @@ def test_the_document_lists_every_doubt_and_its_limits():
         assert f"{value:g}" in told["elongation-unit"][1]
     assert f"{doubts.FAILED:g}" in told["after-failure"][1]
     assert f"{doubts.PRELOAD:g}" in told["preload"][1]
+    of_biaxial = {name: (severity, seen) for name, severity, seen in row.findall(biaxial)}
+    assert set(of_biaxial) == set(kinds()["biaxial"].doubts)
+    for _, traps in BIAXIAL_TRAPS.values():
+        for name, (sure, _) in traps.items():
+            assert ("error" if sure else "warning") in of_biaxial[name][0], name
+    for value in (100 * biaxial_doubts.LEAST_END, 100 * biaxial_doubts.MOST_END):
+        assert f"{value:g} %" in of_biaxial["strain-unit"][1]
+    for value in (biaxial_doubts.LEAST_LOAD, biaxial_doubts.MOST_LOAD):
+        assert f"{value:g}" in of_biaxial["load-unit"][1]
+    assert f"{biaxial_doubts.OFF:g} degrees" in of_biaxial["ratio"][1]
     assert ROUGH == 4.0 and "four times" in told["load-unit"][1]

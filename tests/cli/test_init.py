@@ -100,6 +100,7 @@ def own(*options: object, cwd: Path, code: int = 0):
         (["--bubble", 1], ["bubble"]),
         (["--strips", 1, "--form", "spline"], ["strips"]),
         (["--cylinder", 1], ["cylinder"]),
+        (["--biaxial", 2], ["biaxial 1", "biaxial 2"]),
         (["--bubble", 2, "--strips", 2, "--cylinder", 2, "--form", "trilinear"],
          ["bubble 1", "bubble 2", "strips 1", "strips 2", "cylinder 1", "cylinder 2"]),
     ],
@@ -174,7 +175,7 @@ def test_numbers_of_own_tests(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ([], "--own: name at least one test: --bubble, --strips, --cylinder"),
+        ([], "--own: name at least one test: --biaxial, --bubble, --strips, --cylinder"),
         (["--bubble", 1, "--form", "quartic"], "--form: 'quartic' is not one of: constant"),
         (["--bubble", 1, "--pressures", "1,b"], "--pressures: expected numbers"),
         (["--bubble", 1, "--pressures", "2,1"], "pressures must increase"),
@@ -197,7 +198,7 @@ def test_questions_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     from bubblefit.cli import init
 
     monkeypatch.setattr(init, "on_a_terminal", lambda: True)
-    answers = "Sail\n0.7\n1\n120\n10,20\n1\n1\n150\n90\nspline\n"
+    answers = "Sail\n0.7\n1\n120\n10,20\n1\n0\n1\n150\n90\nspline\n"
     done = CliRunner().invoke(init.command, [str(tmp_path / "mine"), "--own"], input=answers)
     assert done.exit_code == 0, done.output
     project = read_project(tmp_path / "mine" / "project.toml", need_data=False)

@@ -22,11 +22,13 @@ THING = Kind()
 
 
 def test_ours_are_the_folders_fitted_ones_first():
-    assert list(kinds())[:3] == ["bubble", "strips", "cylinder"]
+    assert list(kinds())[:4] == ["biaxial", "bubble", "strips", "cylinder"]
     for name, kind in kinds().items():
         assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED)
         assert kind_named(name) is kind
-    assert "'bubbel' is not one of: bubble, cylinder, strips" in complaint(kind_named, "bubbel")
+    assert "'bubbel' is not one of: biaxial, bubble, cylinder, strips" in complaint(
+        kind_named, "bubbel"
+    )
 
 
 def test_a_plug_ins_kind_is_one_of_them(packages):
