@@ -3,7 +3,7 @@
 Usage: biaxial_t2.py FILE. FILE: a table of ratio, n_w, n_f, eps_w, eps_f (kN/m, %) of test T2 of
 Uhlemann, Stranghoener, Schmidt and Saxe, "Effects on elastic constants of technical membranes
 applying the evaluation methods of MSAJ/M-02-1995", Structural Membranes 2011. Its curves are not
-part of this repository. Printed: E_x t / E_y t (kN/m), nu_xy / nu_yx and S by five choices of what is
+part of this repository. Printed: E_x t, E_y t (kN/m), nu_xy, nu_yx and S by five choices of what is
 evaluated from 2 to 30 kN/m, published and ours; exit code 1 where an E is off by more than 4 % or a
 nu by more than 0.02.
 """

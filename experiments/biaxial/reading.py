@@ -26,7 +26,7 @@ class BiaxialData:
 
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
-    """The data of a section.
+    """The data of a section; none where a file is not there and none is needed.
 
     Raises
     ------
@@ -39,6 +39,8 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
     tables, named = [], []
     for path, field, ratio in _listed(place, data, folder):
         if not path.is_file():
+            if not place.need_data:
+                return BiaxialData((), (), ())
             problem = f"there is no file {path}; --data DIR names another folder"
             raise place.error(field, problem)
         tables.append(_table(place, data, path))

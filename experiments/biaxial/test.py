@@ -44,6 +44,8 @@ class BiaxialTest:
     @property
     def reach(self) -> Reach:
         """The largest strains along warp and fill; of the shear it tells nothing."""
+        if not self.data.paths:
+            return Reach()
         ends = np.max([path.strain.max(axis=0) for path in self.data.paths], axis=0)
         warp, fill = (float(np.log1p(end)) if end > LEAST_STRAIN else None for end in ends)
         return Reach((warp, fill, None))
