@@ -115,7 +115,8 @@ def test_own_tests(options: list, tests: list[str], tmp_path: Path, schema) -> N
     schema.validate(tomllib.loads(text))
     assert "next: bubblefit" in done.stdout
     for test in project.tests.values():
-        assert test.models()
+        # The loads of a biaxial test are its data, which are not there yet.
+        assert bool(test.models()) == (test.kind != "biaxial")
     # Moduli are bounded, not coefficients: that serves every form.
     assert ("E1 = [" in text) == any("cylinder" not in name for name in tests)
     longest = max(map(len, text.splitlines()))
