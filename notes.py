@@ -56,6 +56,7 @@ class NoteKind(StrEnum):
     ALONE = "undetermined alone"
     INVERSE_CRIME = "inverse crime"
     ABOVE_NOISE = "above the noise"
+    DISCREPANCY = "wrong form"
     SURFACES = "unfaithful surfaces"
     FLAT_SHEET = "sheet taken for flat"
     UNMATCHED = "unmatched direction"

@@ -16,6 +16,7 @@ from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_wo
 from ..identification.assessment import pinned_by
 from ..identification.noise import notes_of_misfits
 from ..notes import Note, NoteKind, as_note, rows
+from .mesh_error import TAKEN_OUT, TOLD
 from .store import PROVENANCE
 
 if TYPE_CHECKING:
@@ -89,6 +90,10 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),
             "largest_relative_total": _largest(sure.total),
+            "mesh_error": TAKEN_OUT if sure.taken_out else TOLD,
+            "smooth_beyond_noise": {
+                name: {**asdict(d), "told": d.told} for name, d in sure.discrepancy.items()
+            },
         }
     if fit.record is not None:
         result["provenance"] = PROVENANCE

@@ -12,6 +12,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .bands import bands_of
+from .discrepancy import Discrepancy, discrepancies, notes_of_discrepancies
 from .discretisation import Limit
 from .noise import Noise
 from .posterior import Posterior
@@ -48,7 +49,8 @@ class Certainty:
     those of ever finer meshes, with what may be left of their error; None as `mesh`. rows : (m,)
     of each residual the noise that as many independent ones would have. band : (2, n) MPa by
     modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
-    whether the law reported is that of ever finer meshes.
+    whether the law reported is that of ever finer meshes. discrepancy : by comparison of a sheet,
+    what of its residual is too smooth for noise.
     """
 
     noise: dict[str, float]
@@ -62,6 +64,7 @@ class Certainty:
     rows: Array | None = None
     band: dict[str, Array] = field(default_factory=dict)
     taken_out: bool = False
+    discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
 
     @property
     def total(self) -> dict[str, Array]:
@@ -121,7 +124,9 @@ def certainty(
         for name, relative in sigmas.items()
         if relative.max() > UNCERTAIN
     ]
-    told = (*words, *_limited(problem, best))
+    left = best.residual if limit is None else limit.residual
+    wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
+    told = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)
@@ -138,6 +143,7 @@ def certainty(
         fine,
         noise.rows,
         bands_of(fine or posterior, law, strains),
+        discrepancy=wrong,
     )
 
 

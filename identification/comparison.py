@@ -31,7 +31,8 @@ class Objective(Protocol):
     sizes : length of each block, together m; scale (m,): `unit`s in one unit of each residual;
     least_noise in `unit`s, to reckon with at least (its `noise_is`, a `NoiseIs`, is "assumed"
     where the objective has none); data: all that was measured. One whose neighbouring values may
-    err as one also has `places`, (n, 2) mm of each block's values.
+    err as one also has `places`, (n, 2) mm on a sheet or (n, 1) along a curve, of each block's
+    values.
     """
 
     @property

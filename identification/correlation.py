@@ -4,7 +4,7 @@ A facet of a camera's correlation is wider than the step between two of its poin
 model cannot follow is smooth: neighbouring residuals are alike, and say less than as many
 independent ones. Where the derivatives vary slowly over such a neighbourhood, the variance of what
 is fitted grows by  1 + sum of rho(d) over the neighbours of a point,  rho the correlation at the
-distance d; the sum is broken off where rho is first no longer positive.
+distance d; the sum is broken off where rho is first no more than chance.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 RINGS = 60
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
+#: Standard deviations of a correlation of independent values, which are no correlation.
+CHANCE = 2.0
 #: Of the largest extent: beyond, there are no neighbours any more.
 REACH = 0.5
 
@@ -44,7 +46,8 @@ def alike(residuals: Sequence[Array], places: Sequence[Array]) -> float:
 
     Parameters
     ----------
-    residuals : blocks (n,), each of one quantity in one frame. places : (n, 2) mm of each.
+    residuals : blocks (n,), each of one quantity in one frame. places : (n, 2) mm or (n, 1) of
+        each.
     """
     products, pairs, asked = np.zeros(RINGS), np.zeros(RINGS), 0
     random = np.random.default_rng(0)
@@ -70,5 +73,7 @@ def alike(residuals: Sequence[Array], places: Sequence[Array]) -> float:
     known = pairs > 0
     rho = products[known] / pairs[known]
     neighbours = pairs[known] / asked
-    positive = int(np.argmax(rho <= 0)) if (rho <= 0).any() else len(rho)
+    # Every pair was met twice, at most; of few pairs a correlation is chance.
+    chance = rho <= CHANCE / np.sqrt(np.maximum(pairs[known] / 2, 1.0))
+    positive = int(np.argmax(chance)) if chance.any() else len(rho)
     return float(1.0 + (rho * neighbours)[:positive].sum())

@@ -125,6 +125,9 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.ABOVE_NOISE: (
         (fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N\)"),
     ),
+    K.DISCREPANCY: (
+        (fits.notes_of_form, r"0\.036 mm of what the fit leaves is smooth over the whole sheet"),
+    ),
     K.SURFACES: ((fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),
     K.FLAT_SHEET: ((fits.notes_of_bubble, "the sheet is taken for flat and taut"),),
     K.UNMATCHED: ((fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),),

@@ -69,6 +69,11 @@ class LoadObjective:
         """Everything measured that the residual depends on."""
         return self.elongation, self.load
 
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """(n, 1) mm, the elongation of every reading: neighbours may err as one."""
+        return (self.elongation[:, None],)
+
     def shifted(self, here: History, there: History) -> LoadObjective:
         """The objective of a model that carries `here` where this one carries `there`."""
         other = copy.copy(self)

@@ -77,6 +77,8 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},
             "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
+            "mesh_error": "told",
+            "smooth_beyond_noise": {},
         },
         "weights": {"one": 1.0, "two": 3.0},
     }

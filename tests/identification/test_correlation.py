@@ -106,3 +106,20 @@ def test_a_misfit_below_the_noise_does_not_tell() -> None:
     )
     point = problem.evaluate(problem.unknowns.at(cases.LAW.beta), True)
     assert certainty(problem, point, cases.LAW, np.full(3, 0.08)).alike == {"bubble": 1.0}
+
+
+def test_along_a_curve() -> None:
+    """Readings that follow each other by 0.6: (1 + 0.6) / (1 - 0.6) = 4 err as one; or by chance
+    alone: of ten or a hundred white ones each counts."""
+    random = np.random.default_rng(2)
+    places = np.arange(2000.0)[:, None]
+    white = random.standard_normal((6, 2000))
+    follow = np.zeros_like(white)
+    for k in range(1, 2000):
+        follow[:, k] = 0.6 * follow[:, k - 1] + white[:, k]
+    fine = places[:60]
+    pieces = [piece for one in follow for piece in np.split(one[:1980], 33)]
+    assert alike(pieces, [fine] * len(pieces)) == pytest.approx(4.0, rel=0.15)
+    for count in (10, 100):
+        found = [alike([random.standard_normal(count)], [places[:count]]) for _ in range(60)]
+        assert np.median(found) == 1.0 and np.mean(found) < 1.15

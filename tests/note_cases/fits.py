@@ -21,6 +21,7 @@ from bubblefit.experiments.bubble.sheet_report import sheet_warnings
 from bubblefit.fits import mesh_error
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.identification.assessment import Certainty, certainty
+from bubblefit.identification.discrepancy import Discrepancy, notes_of_discrepancies
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
@@ -91,6 +92,12 @@ def notes_of_mesh(*_: Any) -> Iterable[Note]:
     sigma = {name: np.full(2, 0.01) for name in COMPONENTS}
     mesh = {name: np.array([0.0, 0.04 * (name == "E1")]) for name in COMPONENTS}
     return mesh_error.notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
+
+
+def notes_of_form(*_: Any) -> Iterable[Note]:
+    """Of what a fit leaves, much is smooth."""
+    found = Discrepancy(ratio=22.6, largest=1.25, rms=0.036, unit="mm")
+    return notes_of_discrepancies({"bubble": found})
 
 
 def notes_of_limit(*_: Any) -> Iterable[Note]:
