@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option(
     "--leave",
     metavar="SORT",
-    help="Left out in turn: tests, frames, specimens or directions.  [tests]",
+    help="Left out in turn: tests, frames, specimens, directions or ratios.  [tests]",
 )
 @click.option(
     "--weights",
@@ -56,10 +56,10 @@ def command(
 ) -> None:
     """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
 
-    With --leave single frames of bubbles, specimens or directions of strips instead; with --card
-    cards at the tests, without a fit. Writes validation.csv and result.json, and a folder for each
-    fit, into the output folder. With --weights moduli and errors over the weight of a kind of test:
-    weights.csv, weights.png, result.json.
+    With --leave single frames of bubbles, specimens or directions of strips, or ratios of biaxial
+    tests instead; with --card cards at the tests, without a fit. Writes validation.csv and
+    result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
+    over the weight of a kind of test: weights.csv, weights.png, result.json.
 
     \b
         bubblefit validate PROJECT.toml --form cubic --form spline:6

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel
 
 from ...materials.card import MaterialCard
 from ..base import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..candidates import Candidate, Planning
 from .section import BiaxialSection
 from .test import BiaxialTest, read
 
@@ -32,6 +33,12 @@ class Biaxial:
         InputError : naming the file and the dotted key, or a data file.
         """
         return read(section, place, name)
+
+    def candidates(self, planning: Planning) -> Sequence[Candidate]:
+        """Single ratios, up to the strains that the law is known for."""
+        from .candidates import candidates
+
+        return candidates(planning)
 
     def simulate(
         self,

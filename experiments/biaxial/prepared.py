@@ -17,7 +17,7 @@ from ..data_files import DataFile
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of_biaxial
 from .objective import StrainObjective
-from .test import BiaxialTest
+from .test import BiaxialTest, reach_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,23 @@ class PreparedBiaxial:
         """None: a ratio is no specimen of another."""
         return {}
 
+    @property
+    def parts(self) -> Mapping[str, Mapping[str, Masks]]:
+        """Its ratios, where it has several."""
+        paths = self.test.data.paths
+        whole = {self.part(p.ratio): np.ones(len(p.load), dtype=bool) for p in paths}
+        ratios = {p.ratio: {**whole, self.part(p.ratio): ~whole[self.part(p.ratio)]} for p in paths}
+        return {"ratios": ratios} if len(paths) > 1 else {}
+
     def reach(self, masks: Masks) -> Reach:
-        """As the test's own: no point is left out."""
-        return self.test.reach
+        """What the ratios say of which masks leave anything."""
+        return reach_of(self.kept(masks))
+
+    def kept(self, masks: Masks | None) -> tuple[BiaxialPath, ...]:
+        """The ratios of which masks leave anything to match: they are matched whole."""
+        known = masks or {}
+        paths = self.test.data.paths
+        return tuple(p for p in paths if known.get(self.part(p.ratio), np.True_).any())
 
     def part(self, ratio: str) -> str:
         """The name of the comparison of a ratio."""
@@ -59,16 +73,18 @@ class PreparedBiaxial:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """One a ratio. They lead in: a patch has no mesh, and hardly ever fails.
+        """One a ratio of which anything is left.
+
+        They lead in: a patch has no mesh, and hardly ever fails.
 
         Raises
         ------
         InputError : no strain at all along a path.
         """
         test, models = self.test, self.test.models()
-        share = weighting.weight / (2 * len(models)) if weighting.relative else 1.0
-        found = []
-        for path in test.data.paths:
+        kept, found = self.kept(masks), []
+        share = weighting.weight / (2 * max(1, len(kept))) if weighting.relative else 1.0
+        for path in kept:
             largest = float(np.abs(path.since).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...data.biaxial.paths import BiaxialPath
 from ...materials.law import HypoelasticLaw
 from ...models.patch import PatchModel
 from ..base import MakeSolver, Place, Reach, Refined
@@ -43,12 +44,8 @@ class BiaxialTest:
 
     @property
     def reach(self) -> Reach:
-        """The largest strains along warp and fill; of the shear it tells nothing."""
-        if not self.data.paths:
-            return Reach()
-        ends = np.max([path.strain.max(axis=0) for path in self.data.paths], axis=0)
-        warp, fill = (float(np.log1p(end)) if end > LEAST_STRAIN else None for end in ends)
-        return Reach((warp, fill, None))
+        """The largest strains along warp and fill."""
+        return reach_of(self.data.paths)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
@@ -69,6 +66,15 @@ class BiaxialTest:
         from .prepared import PreparedBiaxial
 
         return PreparedBiaxial(self)
+
+
+def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
+    """The largest strains along warp and fill; of the shear a test tells nothing."""
+    if not paths:
+        return Reach()
+    ends = np.max([path.strain.max(axis=0) for path in paths], axis=0)
+    warp, fill = (float(np.log1p(end)) if end > LEAST_STRAIN else None for end in ends)
+    return Reach((warp, fill, None))
 
 
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
