@@ -65,7 +65,15 @@ def test_every_place_says_the_same_objective(fitted: bf.Fit, tmp_path: Path):
 def test_tables(fitted: bf.Fit, tmp_path: Path):
     moduli = fitted.moduli()
     sigma = ["sigma_relative", "noise_relative", "mesh_relative"]
-    assert list(moduli.columns) == ["modulus", "strain", "MPa", *sigma]
+    band = ["lower_MPa", "upper_MPa"]
+    assert list(moduli.columns) == ["modulus", "strain", "MPa", *band, *sigma]
+    sure = fitted.best.certainty
+    assert sure is not None
+    for name, ends in sure.band.items():
+        own = moduli[moduli["modulus"] == name]
+        for column, end in zip(band, ends, strict=True):
+            expected = np.interp(own["strain"], sure.strain[name], end)
+            assert own[column].to_numpy() == pytest.approx(expected)
     e1 = moduli[moduli["modulus"] == "E1"]
     assert e1["strain"].max() == pytest.approx(fitted.best.valid[0])
     assert e1["MPa"].to_numpy() == pytest.approx(fitted.law.E1(e1["strain"]))
