@@ -313,3 +313,10 @@ def test_columns_whose_meaning_is_unclear_are_named(tmp_path: Path) -> None:
     )
     (frame,) = read_frames([path], FrameOptions(valid_column="state", flag_column="Mask"))
     assert frame.source.notes == () and len(frame.points) == 1
+
+
+def test_numbers_are_no_names_whatever_the_columns_are_called(tmp_path: Path) -> None:
+    """A project may call columns 1, 2, ...: the first row of numbers is not their header."""
+    named = dict(zip(WANTED, "12345", strict=True))
+    said = complaint(layout, tmp_path, "1 2 3 4 5\n7 8 9 10 11\n", **named)
+    assert "no row of names" in said

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from bubblefit.experiments.base import Fabric, Place
+from bubblefit.experiments.bubble import point_files
 from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.sources import KnownSolution
 from bubblefit.experiments.bubble.test import BubbleTest
@@ -193,3 +198,24 @@ def test_bad_input_names_file_and_field(edit, tmp_path: Path, old, new, words):
 )
 def test_bad_point_files(edit, old, new, words):
     complaint_with(words, edit, old, new, source=VALMEX / "test1-linear.toml", need_data=False)
+
+
+def test_files_that_cannot_be_had_are_named_with_what_to_do(tmp_path: Path) -> None:
+    """A pattern that nothing matches by itself, a file at fault by its path."""
+    advice = "give the folder of the measured data with --data DIR"
+    section = section_of("f*.csv")
+    place = Place(tmp_path / "p.toml", "bubble[0]", Fabric("a fabric", 0.8))
+    at = f"{tmp_path / 'p.toml'}: bubble[0].data.points.files"
+    found = complaint(point_files._files, section, place)
+    assert found == f"{at}: no file matches {str(tmp_path / 'f*.csv')!r}; {advice}"
+    (tmp_path / "f1.csv").write_text("")
+    section.files = ["f1.csv", "f*.csv"]
+    found = complaint(point_files._files, section, place)
+    assert found == f"{at}: {tmp_path / 'f1.csv'} is given twice; {advice}"
+    # A forward analysis does without a pattern's files, not without sense.
+    assert point_files._files(section_of("g*.csv"), replace(place, need_data=False)) == ()
+    complaint(point_files._files, section, replace(place, need_data=False))
+
+
+def section_of(*files: str) -> Any:
+    return SimpleNamespace(files=list(files), pattern=None, indices=None, folder="")

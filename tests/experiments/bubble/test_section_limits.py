@@ -175,6 +175,15 @@ def test_heights_of_a_reference_picture(field: DisplacementField, words: str) ->
         assert "sheet.rim: points go out to 85 %" in complaint(measured_sheet, rim, *asked[1:])
 
 
+def test_points_none_of_which_lies_on_the_disk() -> None:
+    far = measured(2.0)
+    far = replace(far, points=far.points[np.hypot(*far.points.T) > 101.0], z=None,
+                  displacement=far.displacement[np.hypot(*far.points.T) > 101.0])  # fmt: skip
+    assert complaint(measured_sheet, Sheet(moving_rim=True), Outline.circle(100.0), [far]) == (
+        "sheet.rim: points go out to 0 % of the radius; at least 85 % are needed to know the rim"
+    )
+
+
 def test_priors_of_a_sheet_weigh_as_twenty_points() -> None:
     model: Any = SimpleNamespace(modes={"z0_1": None, "z0_x": None})
     scale = np.array([1.0, 4.0, 100.0])
