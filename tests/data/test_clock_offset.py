@@ -121,14 +121,14 @@ def test_what_cannot_be_told_is_refused(change, words):
     assert all(word in said for word in ["offset" if "log" not in words[0] else "", *words]), said
 
 
-@pytest.mark.parametrize("cut", [slice(300, None), slice(None, 760)])
-def test_no_offset_is_looked_at_for_which_there_is_no_log(cut):
-    """Also where the best is the first or the last that there is: closer together, not beyond."""
+def test_no_offset_is_looked_at_for_which_there_is_no_log():
+    """Also where the best is the last that there is: closer together, not beyond."""
     times, heights, clock, pressures = recorded(steps, "flat", 37.3, 5e-4, count=100)
-    clock, pressures = clock[cut], pressures[cut]
+    clock, pressures = clock[:646], pressures[:646]
     offsets, misfits = offset_misfits(times, heights, clock, pressures)
     assert len(offsets) == len(misfits) > 100 and (np.diff(offsets) >= 0).all()
-    assert min(offsets[np.argmin(misfits)] - offsets[0], np.ptp(offsets)) >= 0
+    best = offsets[np.argmin(misfits)]
+    assert offsets[-1] - best < 1.0
     ends = [np.isfinite(log_at(s, times, clock, pressures)).mean() for s in offsets]
     assert min(ends) >= 0.8 - 1e-9
 
