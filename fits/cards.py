@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -134,8 +134,7 @@ def _of_file(place: Place, at: str, section: CardSection) -> MaterialCard:
     assert section.file is not None
     source = place.path.parent / section.file
     card = read_card(source)
-    return MaterialCard(card.law, card.thickness, section.name or card.name or source.stem,
-                        card.source)  # fmt: skip
+    return replace(card, name=section.name or card.name or source.stem)
 
 
 def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:

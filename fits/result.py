@@ -20,6 +20,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .best import BestFit
+from .card_certainty import card_certainty
 from .project import Project
 from .record import Record
 from .setup import FitSetup
@@ -89,7 +90,8 @@ class Fit:
         if self.best.certainty is not None and self.best.certainty.taken_out:
             source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
-        return MaterialCard(law, self.project.fabric.thickness, self.project.title, source)
+        sure = card_certainty(self.problem, self.best, law, list(self.tests))
+        return MaterialCard(law, self.project.fabric.thickness, self.project.title, source, sure)
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:

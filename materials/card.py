@@ -1,6 +1,7 @@
 """The material card `material.toml`: a law, the thickness it was fitted for, where it came from.
 
 Format 2 names its form (`form = "cubic"`), and beside it what the form needs (`breaks`, `knots`).
+Format 3 also has `[certainty]`: laws one standard deviation off, and what they are of.
 A file without `format` is of format 1, which knew cubics, and tri-linear laws by their breaks.
 """
 
@@ -23,13 +24,14 @@ from ..errors import InputError
 from ..section_errors import first_error
 from ..sections import MODULUS_UNITS, ModulusUnit, Section
 from ..writing import replacing
+from .certainty import CardCertainty
 from .forms.base import STRAIN_NAMES, UNLIMITED
 from .forms.registry import form_named, form_names, form_settings
 from .law import HypoelasticLaw, ThicknessChange
 
 #: MPa per unit.
 UNITS = MODULUS_UNITS
-FORMAT = 2
+FORMAT, WITH_CERTAINTY = 2, 3
 LAW = "hypoelastic orthotropic"
 HELD = "Outside valid_strain a modulus keeps its end value."
 #: What the key `law` of a tri-linear card of format 1 holds.
@@ -40,12 +42,16 @@ SAME_THICKNESS = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MaterialCard:
-    """A law with the thickness it was fitted for (mm), a name, and where it came from."""
+    """A law with the thickness it was fitted for (mm), a name, and where it came from.
+
+    certainty : how sure the law is, None where nobody knows.
+    """
 
     law: HypoelasticLaw
     thickness: float
     name: str = ""
     source: str = ""
+    certainty: CardCertainty | None = None
 
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         """Write the card with its moduli in `unit`; `read_card` reads it."""
@@ -71,8 +77,9 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
     law, scale = card.law, UNITS[unit]
     named = zip(STRAIN_NAMES, law.strain_range, strict=True)
+    sure = card.certainty
     content: dict[str, Any] = {
-        "format": FORMAT,
+        "format": FORMAT if sure is None else WITH_CERTAINTY,
         "name": card.name,
         "source": card.source,
         "law": LAW,
@@ -85,6 +92,9 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
         **law.form.to_card(),
     }
+    if sure is not None:
+        directions = (sure.directions / scale).tolist()
+        content["certainty"] = {"of": sure.words, "directions": directions}
     words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
     header = "".join(f"# {line}\n" for line in words)
     with replacing(path) as temporary:
@@ -130,10 +140,17 @@ class ValidStrain(Section):
     shear: End = UNLIMITED
 
 
+class CertaintyFile(Section):
+    """`certainty`: steps of the free coefficients, one standard deviation each, in `unit`."""
+
+    of: str = ""
+    directions: list[Numbers]
+
+
 class CardFile(Section):
     """The keys of a card that do not depend on its form."""
 
-    format: Literal[1, 2] = 1
+    format: Literal[1, 2, 3] = 1
     name: str = ""
     source: str = ""
     law: str = ""
@@ -144,10 +161,11 @@ class CardFile(Section):
     thickness_mm: Thickness
     thickness_change: ThicknessChange = "constant"
     valid_strain: ValidStrain = Field(default_factory=ValidStrain)
+    certainty: CertaintyFile | None = None
 
 
 def read_card(path: Path) -> MaterialCard:
-    """Read a card of either format.
+    """Read a card of any format.
 
     Raises
     ------
@@ -185,7 +203,23 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
     ends = np.array([file.valid_strain.warp, file.valid_strain.fill, file.valid_strain.shear])
     law = HypoelasticLaw(np.array(mpa), file.nu12, ends, file.thickness_change, form)
-    return MaterialCard(law, file.thickness_mm, file.name, file.source)
+    return MaterialCard(law, file.thickness_mm, file.name, file.source, _certainty(file, law))
+
+
+def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
+    if file.certainty is None:
+        return None
+    if file.format < WITH_CERTAINTY:
+        raise InputError(None, "certainty", f"a card that has it is of format = {WITH_CERTAINTY}")
+    free = len(law.form.free)
+    for k, row in enumerate(file.certainty.directions):
+        if len(row) != free:
+            problem = f"expected {free} numbers, one a coefficient that is fitted, got {len(row)}"
+            raise InputError(None, f"certainty.directions[{k}]", problem)
+    directions = np.array(file.certainty.directions).reshape(-1, free) * UNITS[file.unit]
+    if not np.isfinite(directions).all():
+        raise InputError(None, "certainty.directions", f"too large for {file.unit}")
+    return CardCertainty(directions, file.certainty.of)
 
 
 def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

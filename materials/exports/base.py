@@ -12,6 +12,7 @@ from ... import __version__
 from ...errors import InputError
 from ...notes import Note, NoteKind
 from ..card import MaterialCard
+from ..certainty import LEVEL, strains_of
 from ..forms.base import COMPONENTS, UNLIMITED
 
 #: t/mm3, that of water: where a program must have a density and the user gave none.
@@ -19,6 +20,9 @@ DENSITY = 1e-9
 #: Strains a modulus at which a card is looked at.
 CHECKED = 501
 WIDTH = 70
+#: What the file of a card's band ends in, beside an export.
+BAND_FILE = ".band.csv"
+BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
 
 
 @dataclass(frozen=True)
@@ -87,8 +91,43 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
         words = " ".join(text.split())
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
     lines += [f"units: mm, N, MPa; thickness {card.thickness:g} mm", *says.lines()]
+    lines += band_lines(card)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
+
+
+def band_lines(card: MaterialCard) -> list[str]:
+    """How sure the moduli are, at a few strains; that it is not known where the card has nothing.
+
+    The program that reads the export takes the moduli as they are: this is for people.
+    """
+    sure, law = card.certainty, card.law
+    if sure is None:
+        return ["band of the moduli: not known, the card says nothing of it"]
+    lines = textwrap.wrap(
+        f"band of the moduli ({100 * LEVEL:g} %, more in {BAND_FILE}): {sure.words}",
+        WIDTH,
+        subsequent_indent="    ",
+    )
+    for name, strain in strains_of(law).items():
+        at = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
+        ends = zip(at, *sure.band(law, name, at), strict=True)
+        told = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
+        lines.append(f"  - {name}, MPa: {told}")
+    return lines
+
+
+def band_table(card: MaterialCard) -> str:
+    """Every modulus over the strain that the card holds for, with the ends of its band, as CSV."""
+    sure, law = card.certainty, card.law
+    assert sure is not None
+    words = " ".join(f"{sure.words}".split()).encode("ascii", "replace").decode()
+    rows = [f"# {100 * LEVEL:g} % band of the moduli: {words}", BAND_COLUMNS]
+    for name, strain in strains_of(law).items():
+        values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
+        for row in zip(*values, strict=True):
+            rows.append(f"{name}," + ",".join(f"{value:.9g}" for value in row))
+    return "\n".join(rows) + "\n"
 
 
 def density_remarks(density: float | None) -> tuple[str, ...]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ...errors import InputError
 from ..card import MaterialCard
 from ..tables import POINTS, REACH
-from .base import Export, check_positive
+from .base import BAND_FILE, Export, band_table, check_positive
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Format:
     options: type = NoOptions
 
     def export(self, card: MaterialCard, **given: Any) -> Export:
-        """The files of a card, with the options that are given.
+        """The files of a card, with the options that are given, and of its band where it has one.
 
         Raises
         ------
@@ -85,7 +85,10 @@ class Format:
         """
         self.check(given)
         check_positive(card)
-        return self.write(card, self.options(**given))
+        export = self.write(card, self.options(**given))
+        if card.certainty is None:
+            return export
+        return replace(export, files={**export.files, BAND_FILE: band_table(card)})
 
     def check(self, names: Iterable[str]) -> None:
         """Raise InputError for the name of an option that this format does not take."""

@@ -302,7 +302,7 @@ NAMED = {**GOOD, "format": 2, "form": "cubic", "law": "hypoelastic orthotropic"}
 KNOTS = {"warp": [0.0, 0.05, 0.13], "fill": [0.0, 0.12], "shear": [0.0, 0.05, 0.11]}
 SPLINE = {**NAMED, "form": "spline", "beta": [0.01] * 3 + [0.1] * 2 + [0.8] * 3, "knots": KNOTS}
 BAD += [
-    ({**NAMED, "format": 3}, "format"),
+    ({**NAMED, "format": 4}, "format"),
     ({**NAMED, "format": "2"}, "format"),
     ({**GOOD, "form": "cubic"}, "format"),
     ({k: v for k, v in NAMED.items() if k != "form"}, "form"),
