@@ -35,6 +35,12 @@ def prediction_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of every series of predictions; the command gets them by name."""
     decorators: list[Decorator] = [
         out_option(),
+        click.option(
+            "--samples",
+            type=click.IntRange(min=0),
+            metavar="N",
+            help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
+        ),
         JOBS,
         solver_choice,
         click.option(
@@ -78,6 +84,7 @@ def run_predictions(
             project,
             tests,
             cards,
+            samples=options["samples"],
             jobs=options["jobs"],
             out=folder,
             resume=options["resume"],

@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # a module of types: whoever reads a project need not wait fo
     from ..materials.law import HypoelasticLaw, ThicknessChange
     from ..reports import Table
     from ..solvers.base import BandEnd, History, Solver
+    from .spread import Around
 
 Array = NDArray[np.float64]
 #: Makes a solver of its own for a model, so that what it prepares for the model is not shared:
@@ -322,7 +323,8 @@ class RunRecord:
 class PredictedRun:
     """One test with one card: what was run, how it ended, what a reader should know of it.
 
-    end : of the band that the solver gives for the model, None where it has one answer.
+    end : of the band that the solver gives for the model, None where it has one answer. around :
+    runs with laws around the card's, None where there are none.
     """
 
     test: Any
@@ -332,6 +334,7 @@ class PredictedRun:
     record: RunRecord
     notes: Sequence[Note] = ()
     end: BandEnd | None = None
+    around: Around | None = None
 
     @property
     def wall(self) -> str:

@@ -14,6 +14,7 @@ from ..experiments.base import Predicted, PredictedRun, RunRecord, Test
 from ..experiments.notes import notes_of_record, other_thickness
 from ..experiments.records import record_of
 from ..experiments.registry import kind_named
+from ..experiments.spread import laws_around
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import BandedSolver, BandEnd, Solver
@@ -52,6 +53,7 @@ def predict(
     tests: str | Sequence[str] | None = None,
     cards: Cards = None,
     *,
+    samples: int | None = None,
     jobs: int | None = None,
     out: Path | str | None = None,
     resume: bool = False,
@@ -61,13 +63,17 @@ def predict(
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
-    Where the solver's answer is a band, both its ends are run (`PredictedRun.end`).
+    Where the solver's answer is a band, both its ends are run (`PredictedRun.end`). What is
+    predicted is also run with laws around the card's, where the card says how sure it is, so that
+    its spread is known (`PredictedRun.around`).
 
     Parameters
     ----------
     tests : names of tests, or a kind of test; every test that is not fitted unless given.
     cards : by name; or names of the project's cards and files of others. The project's unless
         given; where it has none, the one that its fit left in the usual folder.
+    samples : laws drawn from the certainty of each card; unless given, steps along its few least
+        certain directions are run instead. 0: the spread is not asked for.
     jobs : processes; as the project says unless given, else all cores.
     out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
         nothing is written without it.
@@ -99,7 +105,10 @@ def predict(
             record = record.after(Path(out))
         record.write(Path(out))
     with failure_page(None if out is None else Path(out), project.title) as said:
-        runs = _run(project, pairs, records, jobs, progress or _nobody)
+        others = _around(project, pairs, samples)
+        every = [*pairs, *(run for _, run in others)]
+        ended = _run(project, every, records, jobs, progress or _nobody)
+        runs = _with_others(ended, [number for number, _ in others])
         if all(run.record.failure for run in runs):
             said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
             failure = f"no run ended well: {runs[0].record.failure}"
@@ -182,6 +191,37 @@ def _pairs(
             waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
             pairs += [replace(waiting, end=end) for end in _ends(solver, model)]
     return pairs
+
+
+def _around(
+    project: Project, pairs: Sequence[PredictedRun], samples: int | None
+) -> list[tuple[int, PredictedRun]]:
+    """Runs with other laws, each with the number of the prediction around which it lies."""
+    others = []
+    for number, pair in enumerate(pairs):
+        if not pair.predicted:
+            continue
+        try:
+            around, laws = laws_around(pair.material, samples)
+        except ValueError as error:
+            raise InputError(project.path, f"card {pair.card!r}", str(error)) from None
+        for k, law in enumerate(laws):
+            card, own = replace(pair.material, law=law), f"{pair.card}, law {k + 1} around it"
+            others.append((number, replace(pair, card=own, material=card, around=around)))
+    return others
+
+
+def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[PredictedRun]:
+    """The predictions, each with the records of the runs around it; `numbers` of the last runs."""
+    count = len(ended) - len(numbers)
+    runs = list(ended[:count])
+    for number in dict.fromkeys(numbers):
+        own = [run for n, run in zip(numbers, ended[count:], strict=True) if n == number]
+        around = own[0].around
+        assert around is not None
+        records = tuple(run.record for run in own)
+        runs[number] = replace(runs[number], around=replace(around, records=records))
+    return runs
 
 
 def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:

@@ -27,6 +27,8 @@ KNEE: dict[str, Any] = {"marker": "D", "markersize": 5.5, "markerfacecolor": "wh
 LIMIT: dict[str, Any] = {"marker": "^", "markersize": 7.0, "markerfacecolor": "white"}
 #: How much of its card's colour a band has.
 BETWEEN = 0.22
+#: How it is drawn how far a curve may be off.
+DOTTED: dict[str, Any] = {"linestyle": (0, (1, 1.2)), "linewidth": 1.2}
 MM3_PER_LITRE = 1e6
 
 
@@ -41,6 +43,7 @@ class BendLine:
     knee, limit : where they are, mm and N.
     rms : N, against what was measured.
     other : deflection (mm) and load (N) of the other end of a band that begins at the curve.
+    off : (frames,) N, how far the load may be off to either side by what the card leaves open.
     """
 
     name: str
@@ -53,6 +56,7 @@ class BendLine:
     limit: Point | None = None
     rms: float | None = None
     other: tuple[ArrayLike, ArrayLike] | None = None
+    off: ArrayLike | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +71,15 @@ class BendReadings:
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: what it is called, a curve a card, what was measured, what a band goes between."""
+    """One case: what it is called, a curve a card, what was measured, what a band goes between,
+    and what the curves may be off by.
+    """
 
     title: str
     lines: Sequence[BendLine] = ()
     measured: BendReadings | None = None
     band: str = ""
+    spread: str = ""
 
 
 def plot_bending(path: Path | str, panel: BendPanel) -> Path:
@@ -174,6 +181,7 @@ def _loads(axes: Axes, panel: BendPanel) -> None:
         look = named_look(line.rank)
         _to_other_end(axes, line)
         drawn.append(axes.plot(line.deflection, line.load, linewidth=1.6, **look)[0])
+        _spread(axes, line)
         for point, marker in ((line.knee, KNEE), (line.limit, LIMIT)):
             if point is not None:
                 axes.plot(*point, color=look["color"], linestyle="", zorder=6, **marker)
@@ -201,9 +209,24 @@ def _to_other_end(axes: Axes, line: BendLine) -> None:
     axes.fill_between(grid, *both, color=color, alpha=BETWEEN, linewidth=0, zorder=1)
 
 
+def _spread(axes: Axes, line: BendLine) -> None:
+    """Between what the curve may lie: dotted, so that it is told from the band of the walls."""
+    if line.off is None:
+        return
+    off, load = np.asarray(line.off, dtype=float), np.asarray(line.load, dtype=float)
+    color = named_look(line.rank)["color"]
+    for end in (load - off, load + off):
+        axes.plot(line.deflection, end, color=color, zorder=2, **DOTTED)
+
+
 def _highest(panel: BendPanel) -> float:
     """The largest load drawn, N."""
     loads = [np.asarray(x.load, dtype=float) for x in panel.lines]
+    loads += [
+        np.nan_to_num(np.asarray(x.load, dtype=float) + np.asarray(x.off, dtype=float))
+        for x in panel.lines
+        if x.off is not None
+    ]
     loads += [np.asarray(x.other[1], dtype=float) for x in panel.lines if x.other is not None]
     if panel.measured is not None:
         loads += [np.asarray(y, dtype=float) for _, y in panel.measured.readings]
@@ -239,6 +262,9 @@ def _entries(panels: Sequence[BendPanel]) -> dict[str, Any]:
     banded = [(p.band, x.rank) for p in panels for x in p.lines if x.other is not None]
     for words, rank in reversed(banded):  # of the first card's colour
         entries[words] = Patch(color=named_look(rank)["color"], alpha=BETWEEN)
+    sure = [(p.spread, x.rank) for p in panels for x in p.lines if x.off is not None]
+    for words, rank in reversed(sure):
+        entries[words] = Line2D([], [], color=named_look(rank)["color"], **DOTTED)
     if any(p.measured for p in panels):
         entries["measured"] = Line2D([], [], **DOTS)
         entries["mean"] = Line2D([], [], **MEAN)

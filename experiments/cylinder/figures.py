@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.bending_scatter import scatter
+from ...materials.certainty import BAND, LEVEL
 from ...reports import (
     BendLine,
     BendPanel,
@@ -124,7 +125,9 @@ def _panel(
         curves = run.deflection, run.load, run.pressure, run.volume
         other = outcome.other_end(i)
         band = None if other is None else (other.deflection, other.load)
-        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms, band))
+        sure = outcome.spreads.get(i)
+        off = None if sure is None or np.isnan(sure).all() else BAND * sure
+        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms, band, off))
     measured = None
     if test.measured:
         s = scatter(test.measured)
@@ -138,4 +141,5 @@ def _panel(
             np.where(whole, s.deviation, np.nan),
         )
     names = [end.name for end in outcome.band]
-    return BendPanel(test.name, lines, measured, f"from {' to '.join(names)}" if names else "")
+    walls = f"from {' to '.join(names)}" if names else ""
+    return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card")

@@ -7,14 +7,18 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ...solvers.base import BandEnd
 from ..base import Exhibit, Output, PredictedRun, band_of
-from .measures import BendingMeasures, Point, bending_measures
+from .measures import BendingMeasures, Point, bending_measures, loads_at
 from .record import BendingRun, run_of
 from .tables import columns_of, curve_of, terminal_table
 from .test import CylinderTest
+
+Array = NDArray[np.float64]
 
 FINISHED = "finished"
 
@@ -52,6 +56,44 @@ class CylinderOutcome:
                 return self.bent.get(i)
         return None
 
+    @cached_property
+    def spreads(self) -> Mapping[int, Array]:
+        """(frames,) N, one standard deviation of the load by what the card leaves open.
+
+        Of the runs with laws around the card's, by number; NaN where that is not known.
+        """
+        found = {}
+        for i, bent in self.bent.items():
+            around = self.runs[i].around
+            if around is not None:
+                others = [run_of(record) for record in around.records]
+                loads = [None if other is None else other.load for other in others]
+                found[i] = around.sigma(bent.load, loads)
+        return found
+
+    def sigma(self, number: int) -> dict[str, float | None]:
+        """N, of the load at each place that is read; None where it is not known."""
+        own = self.spreads.get(number)
+        if own is None:
+            return dict.fromkeys(self.measures[number].loads)
+        places = self.runs[number].test.reading.places
+        known = loads_at(self.bent[number].deflection, own, places)
+        return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
+
+    def _around(self, number: int) -> str | None:
+        """What was run around a run."""
+        around = self.runs[number].around if number in self.spreads else None
+        return None if around is None else around.words
+
+    @property
+    def unsure(self) -> Sequence[str]:
+        """What is to be said of cards of which no spread is known."""
+        cards = [run.card for run in self.runs if run.material.certainty is None]
+        names = ", ".join(dict.fromkeys(cards))
+        return [f"no spread of loads with {names}: the card does not say how sure it is"] * bool(
+            names
+        )
+
     def ended(self, number: int) -> str:
         """How a run ended: "finished", how far it came, or why it failed."""
         record = self.runs[number].record
@@ -79,6 +121,8 @@ class CylinderOutcome:
             "limit_point": _point(m.limit),
             "wrinkle_onset": _point(m.wrinkles),
             "load_N": dict(m.loads),
+            "load_sigma_N": self.sigma(number),
+            "spread": self._around(number),
             "inflation_strain": {
                 "body": dict(zip(names, m.body_strain, strict=True)),
                 "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
@@ -93,11 +137,18 @@ class CylinderOutcome:
     def columns(self, number: int) -> Mapping[str, object]:
         """A row of the table of runs."""
         places = self.runs[number].test.reading.places
-        return columns_of(self.measures.get(number), tuple(places))
+        row = dict(columns_of(self.measures.get(number), tuple(places)))
+        if number in self.spreads:
+            sigma = self.sigma(number)
+            row |= {f"load_at_{p.replace(' ', '_')}_sigma_N": sigma[p] for p in places}
+        return row
 
     def curve(self, number: int) -> pd.DataFrame:
         """Frame by frame: deflection, load, gauge pressure, volume, wrinkled share."""
-        return curve_of(self.bent.get(number))
+        curve = curve_of(self.bent.get(number))
+        if number in self.spreads:
+            curve["load_sigma_N"] = self.spreads[number]
+        return curve
 
     def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
         """What a cylinder is, for result.json."""
@@ -118,7 +169,8 @@ class CylinderOutcome:
     def lines(self) -> Sequence[str]:
         """A table for the terminal."""
         ended = [self.ended(i) for i in range(len(self.runs))]
-        return terminal_table(self.runs, self.measures, ended)
+        sigma = {i: self.sigma(i) for i in self.spreads}
+        return [*terminal_table(self.runs, self.measures, ended, sigma), *self.unsure]
 
     def show(self, out: Output) -> Exhibit:
         """Write figures, tables and beams."""

@@ -12,7 +12,7 @@ from ...reports import Table, percent
 from ...writing import replacing
 from ..base import Exhibit, Output, Shown
 from .figures import draw_figures, tests_of, write_beams
-from .tables import measured_table, place_names
+from .tables import load_words, measured_table, place_names
 from .test import CylinderTest
 
 if TYPE_CHECKING:
@@ -97,7 +97,11 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         loads = [m.loads.get(place) for place in places]
         strain, rise = f"{max(m.body_strain):.3f}", f"{m.pressure_rise:+.2f}"
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
-        listed = [None if load is None else f"{load:.0f}" for load in loads]
+        spread = outcome.sigma(i)
+        listed = [
+            None if load is None else load_words(load, spread.get(place))
+            for place, load in zip(places, loads, strict=True)
+        ]
         rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
     header = [
         "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
@@ -112,6 +116,13 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
         " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
     )
+    if outcome.spreads:
+        how = sorted({run.around.words for run in outcome.runs if run.around is not None})
+        note += (
+            " ±: one standard deviation of the load by what the card leaves open of its law "
+            f"({'; '.join(how)} around it), which is no part of the band of the walls."
+        )
+    note += "".join(f" {words.capitalize()}." for words in outcome.unsure)
     note += "".join(f" {end.name.capitalize()}: {end.meaning}." for end in outcome.band)
     named = range(1, header.index("stiffness, N/mm"))
     text = (*named, header.index("ended"), header.index("marked"))

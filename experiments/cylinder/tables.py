@@ -64,12 +64,23 @@ def place_names(tests: Sequence[CylinderTest]) -> list[str]:
     return list(dict.fromkeys(name for test in tests for name in test.reading.places))
 
 
+def load_words(load: float | None, sigma: float | None, unit: str = "") -> str:
+    """A load (N), with one standard deviation where it is known."""
+    if load is None:
+        return "-"
+    return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
+
+
 def terminal_table(
-    runs: Sequence[PredictedRun], measures: Mapping[int, BendingMeasures], ended: Sequence[str]
+    runs: Sequence[PredictedRun],
+    measures: Mapping[int, BendingMeasures],
+    ended: Sequence[str],
+    sigma: Mapping[int, Mapping[str, float | None]] | None = None,
 ) -> list[str]:
-    """Stiffness, buckling, loads and errors, run by run."""
+    """Stiffness, buckling, loads and errors, run by run; sigma : of the loads, N, by number."""
+    spreads = sigma or {}
     places = place_names([run.test for run in runs])
-    widths = [max(len(p), 7) + 2 for p in places]
+    widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
     compared = any(m.error is not None for m in measures.values())
     count = 3 if any(run.wall for run in runs) else 2
     rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
@@ -88,7 +99,7 @@ def terminal_table(
         text = f"{start} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6} {at:>13}"
         for place, width in zip(places, widths, strict=True):
             load = m.loads.get(place)
-            text += f"{'-' if load is None else f'{load:.0f} N':>{width}}"
+            text += f"{load_words(load, spreads.get(i, {}).get(place), ' N'):>{width}}"
         if compared:
             text += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
         words = [ended[i]] if run.record.early else []

@@ -51,7 +51,8 @@ def run(
     notes = tuple(Note(kind, "words") for kind in kinds)
     return SimpleNamespace(
         test=test, card=card, notes=notes, record=said, end=end, wall=end.name if end else "",
-        predicted=end is None or end.predicted,
+        predicted=end is None or end.predicted, around=None,
+        material=SimpleNamespace(certainty="known"),
     )  # fmt: skip
 
 

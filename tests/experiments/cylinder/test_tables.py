@@ -56,6 +56,8 @@ def test_numbers_for_result_json() -> None:
         "limit_point": {"deflection_mm": 120.0, "load_N": 502.6},
         "wrinkle_onset": {"deflection_mm": 33.0, "load_N": 140.0},
         "load_N": {"20 mm": 86.4, "a long way": None},
+        "load_sigma_N": {"20 mm": None, "a long way": None},
+        "spread": None,
         "inflation_strain": {
             "body": {"warp": 0.011, "fill": 0.022},
             "with_seam_and_ends": {"warp": 0.033, "fill": 0.044},
