@@ -106,11 +106,11 @@ def test_the_best_start_of_a_fold_counts(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(room, "feasible_start", feasible_start)
     monkeypatch.setattr(room, "fit_from", fit_from)
     problem: Any = SimpleNamespace(reset=lambda: reset.append(1))
-    assert room._best(setup_of(), problem, 5) == "of start 3"
+    assert room.best_of(setup_of(), problem, 5) == "of start 3"
     assert drawn == [(3, number) for number in range(5)] and len(reset) == 5
-    assert room._best(setup_of(), problem, 3) == "of start 0"
+    assert room.best_of(setup_of(), problem, 3) == "of start 0"
     ends[0] = None
-    assert room._best(setup_of(), problem, 3) is None
+    assert room.best_of(setup_of(), problem, 3) is None
 
 
 def test_a_fold_without_a_fit_or_an_analysis(monkeypatch: pytest.MonkeyPatch) -> None:

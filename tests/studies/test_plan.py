@@ -182,7 +182,7 @@ def test_strains_at_which_moduli_are_asked_for(tmp_path: Path, few: None) -> Non
     [
         ({"rank": "G23"}, "--rank: expected one of worst, E1, E2, G12, got 'G23'"),
         ({"noise": {"strips": 0.0}}, "--noise: expected KIND=VALUE above 0, KIND of: "),
-        ({"noise": {"biaxial": 1.0}}, "got biaxial=1"),
+        ({"noise": {"torsion": 1.0}}, "got torsion=1"),
         ({"card": None}, "fit first"),
     ],
 )

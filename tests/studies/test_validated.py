@@ -53,9 +53,9 @@ def test_means() -> None:
 def test_table_and_result(tmp_path: Path) -> None:
     columns = [
         "law", "test", "compared", "unit", "foretold_rms", "fitted_rms", "foretold_relative",
-        "fitted_relative",
+        "fitted_relative", "foretold_words",
     ]  # fmt: skip
-    wanted = [dict(zip(columns, (*row[:3], "N", *row[3:]), strict=True)) for row in ROWS]
+    wanted = [dict(zip(columns, (*row[:3], "N", *row[3:], ""), strict=True)) for row in ROWS]
     table = FOUND.table()
     assert list(table.columns) == columns
     pd.testing.assert_frame_equal(table, pd.DataFrame(wanted, dtype=None), check_dtype=False)
@@ -63,7 +63,8 @@ def test_table_and_result(tmp_path: Path) -> None:
         "command": "validate",
         "title": "made",
         "version": __version__,
-        "error": "mean relative RMS error of a test",
+        "left_out": "tests",
+        "error": "mean relative RMS error of a test, or of its part",
         "mean_foretold": {
             "cubic": pytest.approx(0.1), "constant": pytest.approx(0.065), "spline": None
         },
@@ -74,7 +75,7 @@ def test_table_and_result(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "new" / "folder" / "result.json").read_text()) == FOUND.result
     text = (tmp_path / "new" / "folder" / "validation.csv").read_text().splitlines()
     assert text[0] == ",".join(columns)
-    assert text[1] == "cubic,one,one: warp,N,12.5,5,0.05,0.02"
+    assert text[1] == "cubic,one,one: warp,N,12.5,5,0.05,0.02,"
     with pytest.raises(OutputError):
         (tmp_path / "file").write_text("")
         FOUND.write(tmp_path / "file")
