@@ -111,6 +111,21 @@ def tell(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> Non
         sys.exit(WORSE)
 
 
+def band_lines(fit: Fit) -> list[str]:
+    """How far a modulus may be off, where that is most; nothing where it is not known."""
+    from ..fits.page import sigma_words
+
+    sure = fit.best.certainty
+    if sure is None or not sure.band:
+        return []
+    parts = []
+    for name, (lower, upper) in sure.band.items():
+        own = fit.law.modulus(name, sure.strain[name])
+        below, above = float((1 - lower / own).max()), float((upper / own - 1).max())
+        parts.append(f"{name} -{sigma_words(below)} to +{sigma_words(above)}")
+    return [f"95 % bands (noise and mesh), where they are widest: {', '.join(parts)}"]
+
+
 def lines_of(fit: Fit, folder: Path) -> list[str]:
     """How good the fit is, what its tests say, what to know, where it is."""
     import numpy as np
@@ -135,6 +150,7 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
         for name, m in fit.misfits.items()
     )
     lines.append(f"RMS residual beside the noise: {left}")
+    lines += band_lines(fit)
     for source, sigmas in result.get("pinned", {}).items():
         parts = ", ".join(
             f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"

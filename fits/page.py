@@ -25,6 +25,7 @@ from ..reports import (
     write_report,
 )
 from ..writing import replacing
+from .coefficients import coefficients_table
 from .store import RESULT, Store
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
+COEFFICIENTS = "coefficients.csv"
 #: Strains at which curves are drawn.
 SMOOTH = 121
 #: A modulus is said to be unknown from here on: as uncertain as it was before, but for rounding.
@@ -40,7 +42,8 @@ UNKNOWN = 0.999 * PRIOR
 FILES = (
     (RESULT, "all numbers of this page, for programs"),
     (CARD, "the material card"),
-    (MODULI, "tangent moduli along their strains"),
+    (MODULI, "tangent moduli along their strains, with their bands"),
+    (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
     (RESIDUALS, "every matched value beside the model's"),
     (NOTES, NOTES_ARE),
     ("history.csv", "one row an analysis"),
@@ -54,7 +57,8 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     if fit.record is not None:
         fit.record.write(folder)
     write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
-    for name, table in ((MODULI, fit.moduli()), (RESIDUALS, fit.residuals())):
+    tables = {MODULI: fit.moduli(), COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
+    for name, table in tables.items():
         with replacing(folder / name) as path:
             table.to_csv(path, index=False, float_format="%.9g")
     write_notes(folder, fit.notes)
@@ -119,6 +123,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             _left(fit),
             *_pinned_table(pins),
             *(t for exhibit in shown for t in exhibit.tables),
+            *coefficients_table(fit),
             *record,
         ],
         starts=[StartRow(r.number, r.objective, r.status, r.analyses) for r in best.records],
@@ -170,22 +175,24 @@ def _moduli(fit: Fit, folder: Path) -> tuple[str, str]:
     strains = _strains(fit)
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
-    sigma, sure = None, fit.best.certainty
-    if sure is not None:
-        sigma = curves[0] * np.array(
+    band, sure = None, fit.best.certainty
+    if sure is not None and sure.band:
+        band = np.array(
             [
-                np.interp(x, sure.strain[name], sure.total[name])
+                [np.interp(x, sure.strain[name], end) for end in sure.band[name]]
                 for name, x in zip(COMPONENTS, strains, strict=True)
             ]
-        )
+        ).transpose(1, 0, 2)
     plot_moduli(
         folder / "moduli.png",
         strains,
         curves,
         None if known is None else modulus_curves(known, strains),
-        sigma=None if known is not None else sigma,
+        band=None if known is not None else band,
     )
-    words = "" if known is not None or sigma is None else ", with one standard deviation"
+    words = ""
+    if known is None and band is not None:
+        words = ", where a dot ends them; with their bands (95 %, noise and mesh together)"
     return "moduli.png", f"Tangent moduli of the best fits over the strains reached{words}"
 
 

@@ -166,6 +166,16 @@ class Fit:
             )
         return pd.concat(rows, ignore_index=True)
 
+    def coefficients(self) -> pd.DataFrame:
+        """Every unknown: value, one standard deviation, bounds, correlations with the others.
+
+        Columns unknown, unit, value, sigma, lower_bound, upper_bound, and one by the name of each
+        unknown.
+        """
+        from .coefficients import coefficients_of
+
+        return coefficients_of(self)
+
     def residuals(self) -> pd.DataFrame:
         """Every matched value of every test: test, part, where, measured, modelled, difference."""
         import pandas as pd

@@ -22,7 +22,7 @@ PANELS = (
 )
 #: Deviation (%) below which curves are the same to machine precision.
 SMALLEST = 1e-10
-SIGMA = r"$\pm$ 1 $\sigma$"
+BAND = "95 % band"
 
 
 def plot_moduli(
@@ -31,7 +31,7 @@ def plot_moduli(
     moduli: ArrayLike,
     known: ArrayLike | None = None,
     names: Sequence[str] | None = None,
-    sigma: ArrayLike | None = None,
+    band: ArrayLike | None = None,
 ) -> Path:
     """Draw E1, E2 and G12 over the strain range reached.
 
@@ -43,8 +43,8 @@ def plot_moduli(
     moduli : (fits, 3, k) MPa, best fit first, in the same order.
     known : (3, k) MPa; a second row of panels then shows the deviation from it in percent.
     names : of the fits, where they are laws to be told apart and not one's best and the next.
-    sigma : (3, k) MPa, one standard deviation of the first fit, drawn as a band about it and
-        left out where it is not finite.
+    band : (2, 3, k) MPa, lower and upper end of the band of the first fit; left out where they
+        are not finite. A dot then ends each of its curves, and the band with it.
 
     Raises
     ------
@@ -68,14 +68,16 @@ def plot_moduli(
         if truth is not None:
             # Wide and pale beneath, so that a fit that lies on it is seen to do so.
             top.plot(given[m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
-        if sigma is not None:
-            s = np.asarray(sigma, dtype=float)[m]
+        if band is not None:
+            lower, upper = np.asarray(band, dtype=float)[:, m]
             top.fill_between(
-                x[0, m], fits[0, m] - s, fits[0, m] + s, where=np.isfinite(s),
-                color=looks[0]["color"], alpha=0.18, linewidth=0, label=SIGMA,
+                x[0, m], lower, upper, where=np.isfinite(lower) & np.isfinite(upper),
+                color=looks[0]["color"], alpha=0.18, linewidth=0, label=BAND,
             )  # fmt: skip
         for i in range(len(fits) - 1, -1, -1):
             top.plot(x[i, m], fits[i, m], **looks[i])
+        if band is not None:
+            top.plot(x[0, m, -1:], fits[0, m, -1:], "o", color=looks[0]["color"], markersize=4.5)
         drawn = fits[:, m] if truth is None else np.vstack([fits[:, m], truth[m : m + 1]])
         # By the curves alone: a band may be as wide as it likes, and is then cut off.
         top.set_ylim(min(0.0, float(drawn.min())), 1.08 * float(drawn.max()))
@@ -85,7 +87,7 @@ def plot_moduli(
             _deviation(axes[1, m], given[m], fits[:, m], truth[m], strain, looks, first=m == 0)
     lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
     order = [look["label"] for look in looks]
-    shown = {n: lines[n] for n in dict.fromkeys([*order, "known", SIGMA]) if n in lines}
+    shown = {n: lines[n] for n in dict.fromkeys([*order, "known", BAND]) if n in lines}
     figure.legend(
         list(shown.values()), list(shown), loc="outside upper right", ncols=4, frameon=False
     )

@@ -9,8 +9,10 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.cli.fitting import lines_of
 from bubblefit.experiments.base import Exhibit
 from bubblefit.fits import page
+from bubblefit.fits.coefficients import TITLE, two_digits
 from bubblefit.fits.numbers import versions
 from bubblefit.reports import Report, StartRow, Table, percent
 
@@ -138,7 +140,8 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
     assert found.files == [
         ("result.json", "all numbers of this page, for programs"),
         ("material.toml", "the material card"),
-        ("moduli.csv", "tangent moduli along their strains"),
+        ("moduli.csv", "tangent moduli along their strains, with their bands"),
+        ("coefficients.csv", "every unknown with its standard deviation and its correlations"),
         ("residuals.csv", "every matched value beside the model's"),
         ("notes.csv", "what a reader of the numbers should know, note by note"),
         ("one-loads.csv", "load curves of the best fit"),
@@ -155,7 +158,8 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
         ("optima.png", f"Optimum of every start: {objective_is}, from worst to best"),
         (
             "moduli.png",
-            "Tangent moduli of the best fits over the strains reached, with one standard deviation",
+            "Tangent moduli of the best fits over the strains reached, where a dot ends them; with "
+            "their bands (95 %, noise and mesh together)",
         ),
         ("pinned.png", "What each test pins down: one standard deviation of the moduli"),
         *((f"{test}-{name}.png", words) for test in ("one", "two") for name, words in strips),
@@ -239,10 +243,14 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
     assert known is None and len(curves) == 2
     assert strains == pytest.approx(np.linspace(0, fit.best.valid, len(strains[0])).T)
     assert curves[0][0] == pytest.approx(np.full(121, fit.law.beta[11]))
-    assert drawn["sigma"][0] == pytest.approx(np.full(121, e1 * fit.law.beta[11]))
-    assert drawn["sigma"][1] == pytest.approx(
-        np.full(121, pinned["one"]["E2"]["median"] * fit.law.beta[7]), rel=1e-4
-    )
+    lower, upper = drawn["band"]
+    for k, (place, sigma) in enumerate(((11, e1), (7, pinned["one"]["E2"]["median"]))):
+        half = 1.96 * sigma * fit.law.beta[place]
+        assert fit.law.beta[place] - lower[k] == pytest.approx(np.full(121, half), rel=0.15)
+        assert upper[k] - fit.law.beta[place] == pytest.approx(np.full(121, half), rel=0.15)
+    # Of shear nothing is known: 95 % of what lies between its bounds is its band.
+    assert lower[2] == pytest.approx(np.full(121, 5.0 + 0.025 * 195.0), rel=0.25)
+    assert upper[2] == pytest.approx(np.full(121, 200.0 - 0.025 * 195.0), rel=0.03)
     (strains, sigma), _ = told.calls["plot_pinned"]
     assert strains[:, -1] == pytest.approx(fit.best.valid) and strains[:, 0].tolist() == [0, 0, 0]
     assert list(sigma) == ["one", "two", "all together"]
@@ -252,7 +260,7 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
 def test_misfit_by_strip(together: bf.Fit, written: tuple[Report, Told]) -> None:
     fit, (found, _) = together, written
     one = found.tables[3]
-    assert [table.title for table in found.tables[3:]] == ["Misfit by strip"] * 2
+    assert [table.title for table in found.tables[3:]] == ["Misfit by strip"] * 2 + [TITLE]
     assert one.header == [
         "strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial", "its RMSE, N",
         "points matched", "load at the end, N",
@@ -296,10 +304,11 @@ def test_starts_that_failed_other_programs_and_no_certainty(
     assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
     assert [table.title for table in found.tables] == ["Residual beside the noise"]
-    assert told.calls["plot_moduli"][1] == {"sigma": None}
+    assert told.calls["plot_moduli"][1] == {"band": None}
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
     assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
+    assert fit.coefficients()["sigma"].isna().all()
     assert fit.moduli().index.tolist() == list(range(3 * 61))
     assert fit.residuals().index.tolist() == list(range(len(fit.residuals())))
 
@@ -319,7 +328,7 @@ def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) 
     assert [name for name, _ in found.figures] == names
     assert found.files[-1] == ("loads.csv", "load curves of the best fit")
     assert [t.title for t in found.tables] == [
-        "What the data determine", "Residual beside the noise", "Misfit by strip"
+        "What the data determine", "Residual beside the noise", "Misfit by strip", TITLE
     ]  # fmt: skip
     said = f"objective {alone.objective:.4g}, RMS errors in N: warp {alone.objective:.4g}"
     assert alone.card.source == f"bubblefit {bf.__version__} strips, project.toml, {said}"
@@ -332,7 +341,7 @@ def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Pa
     found = reported(together, tmp_path, monkeypatch)
     (_, curves, known), drawn = told.calls["plot_moduli"]
     np.testing.assert_array_equal(known, curves[0])
-    assert drawn == {"sigma": None}
+    assert drawn == {"band": None}
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
 
 
@@ -345,8 +354,8 @@ def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: 
     page._moduli(fit, tmp_path)
     (_, curves, _), drawn = told.calls["plot_moduli"]
     assert curves[1][0] == pytest.approx(1.5 * curves[0][0])
-    share = fit.best.certainty.total["E1"][0]
-    assert drawn["sigma"][0] == pytest.approx(np.full(121, share * fit.law.beta[11]))
+    own = fit.best.certainty.band["E1"]
+    assert drawn["band"][:, 0] == pytest.approx(np.tile(own[:, :1], 121))
     # Of many, those of the five best.
     many = replace(fit, best=replace(best, ranked=[one, *[two] * 7]))
     assert len(many.laws) == 5
@@ -356,3 +365,40 @@ def test_a_modulus_known_no_better_than_before_is_unknown() -> None:
     """Before the tests each is known to 1000 %, less a thousandth for rounding."""
     said = [page.sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]
     assert said == ["1.2 %", "100 %", "998 %", "unknown", "unknown"]
+
+
+def test_every_unknown_with_its_sigma_and_correlations(
+    together: bf.Fit, written: tuple[Report, Told]
+) -> None:
+    """In the project's unit, GPa; in the file and on the page alike."""
+    fit, (found, _) = together, written
+    table = fit.coefficients()
+    assert table["unknown"].tolist() == ["beta_3", "beta_7", "beta_11"]
+    assert table["unit"].tolist() == ["GPa"] * 3
+    assert table["value"].to_numpy() == pytest.approx(1e-3 * fit.law.beta[[3, 7, 11]])
+    assert table["lower_bound"].tolist() == [0.005, 0.03, 0.02]
+    assert table["upper_bound"].tolist() == [0.2, 1.0, 2.0]
+    sure = fit.best.certainty
+    assert sure is not None and sure.posterior is not None
+    # A modulus that is one coefficient is as sure as that.
+    for place, name in enumerate(("G12", "E2", "E1")):
+        relative = table["sigma"][place] / table["value"][place]
+        assert relative == pytest.approx(sure.sigma[name][0])
+    assert table[["beta_3", "beta_7", "beta_11"]].to_numpy() == pytest.approx(
+        sure.posterior.correlations
+    )
+    (shown,) = [t for t in found.tables if t.title == TITLE]
+    assert shown.header == ["unknown", "value", "1 sigma", "unit", "beta_3", "beta_7", "beta_11"]
+    warp = shown.rows[2]
+    assert warp[:4] == ["beta_11", table["value"][2], table["sigma"][2], "GPa"]
+    assert warp[4:] == ["0.00", "0.00", "1.00"] == [two_digits(value) for value in (-1e-9, 0, 1)]
+
+
+def test_the_terminal_says_how_far_off_a_modulus_may_be(together: bf.Fit, tmp_path: Path) -> None:
+    (line,) = [line for line in lines_of(together, tmp_path) if line.startswith("95 % bands")]
+    sure = together.best.certainty
+    assert sure is not None
+    lower, upper = sure.band["E1"]
+    own = together.law.beta[11]
+    words = f"E1 -{percent(1 - lower.min() / own)} to +{percent(upper.max() / own - 1)}, E2 -"
+    assert line.startswith(f"95 % bands (noise and mesh), where they are widest: {words}")

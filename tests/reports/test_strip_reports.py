@@ -172,11 +172,11 @@ def test_measured_loads(tmp_path: Path, drawn: list[Figure], shared_data: Path) 
 
 
 def test_named_laws_with_their_own_ranges(tmp_path: Path, drawn: list[Figure]) -> None:
-    sigma = np.full((3, 20), 5.0)
-    sigma[2, 15:] = np.inf
+    band = np.array([MODULI - 5.0, MODULI + 5.0])
+    band[1, 2, 15:] = np.inf
     plot_moduli(
         tmp_path / "m.png", np.array([STRAINS, 0.4 * STRAINS]), np.array([MODULI, 2 * MODULI]),
-        names=["uniaxial", "bubble"], sigma=sigma,
+        names=["uniaxial", "bubble"], band=band,
     )  # fmt: skip
     shear = drawn[0].axes[2]
     assert lines(shear, NAMED[0])[0] == pytest.approx(np.array([STRAINS[2], MODULI[2]]))
@@ -185,7 +185,7 @@ def test_named_laws_with_their_own_ranges(tmp_path: Path, drawn: list[Figure]) -
     band = shear.collections[0].get_paths()[0].vertices
     assert band[:, 0].max() == pytest.approx(STRAINS[2, 14])
     assert band[:, 1].min() == pytest.approx(MODULI[2, 0] - 5.0)
-    assert legend(drawn[0]) == ["uniaxial", "bubble", r"$\pm$ 1 $\sigma$"]
+    assert legend(drawn[0]) == ["uniaxial", "bubble", "95 % band"]
 
 
 def test_best_and_next_are_drawn_as_before(tmp_path: Path, drawn: list[Figure]) -> None:
