@@ -114,6 +114,8 @@ def tell(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> Non
 def band_lines(fit: Fit) -> list[str]:
     """How far a modulus may be off, where that is most; nothing where it is not known."""
     from ..fits.page import sigma_words
+    from ..identification.bands import LEVEL
+    from ..reports import percent
 
     sure = fit.best.certainty
     if sure is None or not sure.band:
@@ -123,7 +125,7 @@ def band_lines(fit: Fit) -> list[str]:
         own = fit.law.modulus(name, sure.strain[name])
         below, above = float((1 - lower / own).max()), float((upper / own - 1).max())
         parts.append(f"{name} -{sigma_words(below)} to +{sigma_words(above)}")
-    return [f"95 % bands (noise and mesh), where they are widest: {', '.join(parts)}"]
+    return [f"{percent(LEVEL)} bands (noise and mesh), where they are widest: {', '.join(parts)}"]
 
 
 def lines_of(fit: Fit, folder: Path) -> list[str]:

@@ -60,14 +60,9 @@ def coefficients_table(fit: Fit) -> list[Table]:
         return []
     found = coefficients_of(fit)
     names = found["unknown"].tolist()
+    own = ["unknown", "value", "sigma", "unit"]
     rows: list[list[object]] = [
-        [
-            row["unknown"],
-            row["value"],
-            row["sigma"],
-            row["unit"],
-            *(two_digits(row[n]) for n in names),
-        ]
+        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
         for _, row in found.iterrows()
     ]
     note = (

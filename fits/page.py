@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identification.bands import LEVEL
 from ..identification.propagation import PRIOR
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
@@ -192,7 +193,9 @@ def _moduli(fit: Fit, folder: Path) -> tuple[str, str]:
     )
     words = ""
     if known is None and band is not None:
-        words = ", where a dot ends them; with their bands (95 %, noise and mesh together)"
+        words = (
+            f", where a dot ends them; with their bands ({percent(LEVEL)}, noise and mesh together)"
+        )
     return "moduli.png", f"Tangent moduli of the best fits over the strains reached{words}"
 
 

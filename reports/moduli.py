@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
+from ..identification.bands import LEVEL
 from .style import BLACK, SKY, VERMILION, named_look, new_figure, quiet, save
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ PANELS = (
 )
 #: Deviation (%) below which curves are the same to machine precision.
 SMALLEST = 1e-10
-BAND = "95 % band"
+BAND = f"{100 * LEVEL:.0f} % band"
 
 
 def plot_moduli(
