@@ -144,6 +144,8 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
         f"{len(best.ranked)} starts, {len(best.records)} asked), {result['analyses']} "
         f"analyses{external}, {result['wall_s']:.0f} s"
     ]
+    if fit.stages:
+        lines.append(f"coarse to fine: {fit.stages}")
     several = len(fit.findings) > 1
     for name, findings in fit.findings.items():
         lines += [f"{name}: {line}" if several else line for line in findings.lines]

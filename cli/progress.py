@@ -17,7 +17,7 @@ from rich.progress import (
 )
 
 from ..fits.analyses import Step
-from ..fits.start import EvaluationRecord, StartRecord
+from ..fits.start import EvaluationRecord, Stage, StartRecord
 
 if TYPE_CHECKING:
     from ..fits.predictions import RunEvent
@@ -109,18 +109,34 @@ class StudyProgress(CountProgress):
 
     def __init__(self, total: int, quiet: bool) -> None:
         super().__init__("starts", total, 0, quiet)
+        self.starts = total
         self.best: float | None = None
         self.analyses = 0
 
     def saw(self, record: object) -> None:
-        """Take note of a record, or of time passing."""
-        if isinstance(record, EvaluationRecord):
+        """Take note of a record, of a stage that begins, or of time passing."""
+        if isinstance(record, Stage):
+            self.begin(record)
+        elif isinstance(record, EvaluationRecord):
             self.analyses += 1
         elif isinstance(record, StartRecord):
             self.done += 1
             if record.objective is not None:
                 self.best = min(self.best or record.objective, record.objective)
         self.show()
+
+    def begin(self, stage: Stage) -> None:
+        """Count anew: objectives of another mesh are another sum."""
+        self.what, self.total, self.done, self.already, self.best = (
+            stage.what,
+            stage.total,
+            0,
+            0,
+            None,
+        )
+        self.begun = time.monotonic()
+        if self.bar is not None:
+            self.bar.update(self.task, description=stage.what)
 
     def note(self) -> str:
         """Best objective so far, analyses, time left."""
@@ -141,7 +157,7 @@ class FitsProgress(StudyProgress):
     def saw(self, record: object) -> None:
         """Take note of a fit that begins, of a start or a fold that ended, or of time passing."""
         if isinstance(record, str):
-            self.done, self.best = 0, None
+            self.begin(Stage("starts", self.starts))
             if not self.quiet:
                 print(self.said_of_fit.format(record), file=sys.stderr, flush=True)
         super().saw(record)

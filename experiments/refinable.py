@@ -1,4 +1,4 @@
-"""What a prepared test offers beside its protocol so that the error of its mesh can be told."""
+"""What a prepared test offers beside its protocol: the same data beside another mesh."""
 
 from __future__ import annotations
 
@@ -12,13 +12,18 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A prepared test whose fit can be asked what a finer model would have shown."""
+    """A prepared test whose fit can be asked what a finer, or a coarser, model would have shown."""
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Its comparisons with elements and increments divided by a factor.
+        """Its comparisons with edges of elements and increments divided by a factor.
 
         Every residual is of the same measured value as that of `comparisons`. Where the data were
-        computed with the fit's own model there is nothing finer: the same comparisons.
+        computed with the fit's own model there is nothing finer: the same comparisons. A factor
+        below one makes larger elements, and leaves the increments as they are.
+
+        Raises
+        ------
+        InputError : there is no such mesh.
         """

@@ -84,13 +84,20 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
         said = f"the best fit does not run again: {problem.failure}"
         raise SolverFailure(f"{said}; its starts are kept, --resume goes on", problem.solver.name)
     first = _repeated(problem, ranked[0], point, tolerance)
-    ranked = [first, *ranked[1:]]
-    again = [first if r.number == first.number else r for r in records]
+    ranked = [_like(r, first) for r in ranked]
+    again = [_like(r, first) for r in records]
     strains = [strains_of(h) for h in point.histories]
     reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
     law = problem.law.with_beta(problem.unknowns.beta(unknowns))
     slopes = point if leading is problem else leading.evaluate(unknowns, True, warm=False)
     return BestFit(point, slopes, law, ranked, again, reached)
+
+
+def _like(record: StartRecord, first: StartRecord) -> StartRecord:
+    """A record as it is; that of the best start, or with its fit, as it was run again."""
+    if record.number == first.number:
+        return first
+    return replace(record, objective=first.objective) if record.same_as == first.number else record
 
 
 def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:

@@ -15,18 +15,19 @@ from .budget import with_certainty
 from .doubts import judge
 from .facts import facts_of, solver_facts
 from .failure_page import failure_page
-from .processes import run_starts
-from .project import Project, cores
+from .project import Project
 from .record import Record, data_rows, this_run
 from .result import Fit
 from .running_files import HISTORY, STARTS, RunningFiles
 from .setup import FitSetup, fingerprints, prepare_fit
-from .start import EvaluationRecord, StartRecord
+from .stages import every_start
+from .start import EvaluationRecord, Stage, StartRecord
 from .store import Store
 from .written import settings_of
 
-Event = EvaluationRecord | StartRecord
-#: Is told of every analysis and every start as it ends, and of time passing (None).
+Event = EvaluationRecord | StartRecord | Stage
+#: Is told of every analysis and every start as it ends, of a stage of several as it begins, and of
+#: time passing (None).
 Progress = Callable[[Event | None], None]
 
 
@@ -82,7 +83,7 @@ def fit(
         judgement.demand(project.path)
     record = _record(setup, problem, command_line)
     files = None
-    done: dict[int, StartRecord] = {}
+    done: list[StartRecord] = []
     if out is not None:
         store = Store(Path(out))
         facts = facts_of(setup, problem.solver, record.data)
@@ -127,29 +128,24 @@ def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project)
 def _records(
     setup: FitSetup,
     files: RunningFiles | None,
-    done: dict[int, StartRecord],
+    done: Sequence[StartRecord],
     progress: Progress,
 ) -> list[StartRecord]:
     """Every start: those that are finished already, and the others side by side."""
-    fit = setup.project.fit
-    ended = {n: r for n, r in done.items() if n < fit.starts}
-    for already in ended.values():
-        progress(already)
-    missing = [n for n in range(fit.starts) if n not in ended]
-    jobs = fit.jobs or cores()
+
+    def ran(record: EvaluationRecord | StartRecord | None) -> None:
+        if record is not None and files is not None:
+            files.add(record)
+        progress(record)
+
     try:
-        for record in run_starts(setup.problem, setup.options, fit.seed, missing, jobs):
-            if record is not None and files is not None:
-                files.add(record)
-            if isinstance(record, StartRecord):
-                ended[record.number] = record
-            progress(record)
+        records = every_start(setup, done, ran, progress)
     finally:
         if files is not None:
             files.close()
     if files is not None:
         files.finish()
-    return [ended[n] for n in sorted(ended)]
+    return records
 
 
 def _nobody(record: Any) -> None:

@@ -17,6 +17,7 @@ from ..identification.assessment import pinned_by
 from ..identification.noise import notes_of_misfits
 from ..notes import Note, NoteKind, as_note, rows
 from .mesh_error import TAKEN_OUT, TOLD
+from .start import coarse_columns
 from .store import PROVENANCE
 
 if TYPE_CHECKING:
@@ -68,9 +69,11 @@ def result_of(fit: Fit) -> dict[str, Any]:
                 "status": r.status,
                 "analyses": r.analyses,
                 "external_runs": r.external_runs,
+                **({} if fit.coarse_to_fine is None else coarse_columns(r)),
             }
             for r in records
         ],
+        "coarse_to_fine": None if fit.coarse_to_fine is None else fit.coarse_to_fine.to_json(),
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
         "warnings": [],

@@ -99,6 +99,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             ("method", f"{project.fit.method} on {project.fit.solver}"),
             ("form of the moduli", fit.law.form.name),
             ("starts", f"{len(best.ranked)} feasible of {len(best.records)}"),
+            *([("coarse to fine", fit.stages)] if fit.stages else []),
             ("analyses", result["analyses"]),
             *external,
             ("wall time, s", result["wall_s"]),
@@ -168,7 +169,10 @@ def _coefficients(fit: Fit) -> list[tuple[str, float, float, float]]:
 def _optima(fit: Fit, folder: Path) -> tuple[str, str]:
     values = [np.nan if r.objective is None else r.objective for r in fit.best.records]
     plot_optima(folder / "optima.png", values)
-    return "optima.png", f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
+    words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
+    if fit.coarse_to_fine is not None:
+        words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
+    return "optima.png", words
 
 
 def _moduli(fit: Fit, folder: Path) -> tuple[str, str]:

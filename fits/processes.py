@@ -18,7 +18,7 @@ from ..errors import BubblefitError
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem
 from ..solvers.scratch import remove_interrupted
-from .start import EvaluationRecord, StartRecord, run_start
+from .start import EvaluationRecord, MeshName, StartRecord, run_start
 
 log = logging.getLogger(__name__)
 Record = EvaluationRecord | StartRecord
@@ -42,6 +42,7 @@ def run_starts(
     seed: int,
     numbers: Sequence[int],
     jobs: int,
+    mesh: MeshName = "full",
 ) -> Iterator[Record | None]:
     """Fit every start; yield records as they come, None now and then while nothing does.
 
@@ -49,17 +50,20 @@ def run_starts(
     ----------
     build : makes the problem; called once in every process.
     jobs : processes beside this one, which only listens.
+    mesh : of the problem, for the records.
 
     Raises
     ------
     BubblefitError : a process died (exit code 4: nothing is lost but its current start).
     """
-    return run_tasks(functools.partial(_starting, build, options, seed), numbers, jobs)
+    return run_tasks(functools.partial(_starting, build, options, seed, mesh), numbers, jobs)
 
 
-def _starting(build: Callable[[], FitProblem], options: FitOptions, seed: int) -> Task:
+def _starting(
+    build: Callable[[], FitProblem], options: FitOptions, seed: int, mesh: MeshName
+) -> Task:
     problem = build()
-    return lambda number, tell: run_start(problem, options, seed, number, tell)
+    return lambda number, tell: run_start(problem, options, seed, number, tell, mesh)
 
 
 def run_tasks(

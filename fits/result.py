@@ -21,9 +21,11 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from .best import BestFit
 from .card_certainty import card_certainty
+from .coarse import CoarseToFine
 from .project import Project
 from .record import Record
 from .setup import FitSetup
+from .start import coarse_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,6 +131,19 @@ class Fit:
 
         return pinned(self)
 
+    @cached_property
+    def coarse_to_fine(self) -> CoarseToFine | None:
+        """What ran on which mesh; None where every start ran on its own."""
+        return CoarseToFine.of(self.setup, self.best.records)
+
+    @property
+    def stages(self) -> str:
+        """The same in a line; empty where nobody asked for it."""
+        if self.coarse_to_fine is not None:
+            return self.coarse_to_fine.words
+        asked = self.project.fit.coarse_to_fine
+        return "no test has a coarser mesh: every start ran on the full one" if asked else ""
+
     def moduli(self) -> pd.DataFrame:
         """E1, E2 and G12 (MPa) along their strains, with one standard deviation.
 
@@ -189,7 +204,11 @@ class Fit:
         return pd.concat(frames, ignore_index=True)
 
     def starts(self) -> pd.DataFrame:
-        """How every start ended: start, objective, status, analyses, external_runs, seconds."""
+        """How every start ended: start, objective, status, analyses, external_runs, seconds.
+
+        Of starts that ran coarse to fine also coarse_objective and coarse_analyses, on the coarse
+        mesh, and same_as, the start that had the same optimum there and alone went on.
+        """
         import pandas as pd
 
         return pd.DataFrame(
@@ -201,6 +220,7 @@ class Fit:
                     "analyses": r.analyses,
                     "external_runs": r.external_runs,
                     "seconds": r.wall_s,
+                    **({} if self.coarse_to_fine is None else coarse_columns(r)),
                 }
                 for r in self.best.records
             ]
@@ -208,9 +228,10 @@ class Fit:
 
     @property
     def laws(self) -> list[HypoelasticLaw]:
-        """The laws of the best starts, best first."""
+        """The laws of the best starts that have a fit of their own, best first."""
         unknowns = self.problem.unknowns
-        others = [unknowns.beta(np.array(r.unknowns)) for r in self.best.ranked[1:BEST]]
+        own = [r for r in self.best.ranked[1:] if r.same_as is None]
+        others = [unknowns.beta(np.array(r.unknowns)) for r in own[: BEST - 1]]
         return [self.law, *map(self.law.with_beta, others)]
 
     def report(self, folder: Path | str) -> Path:

@@ -17,6 +17,9 @@ from .start import EvaluationRecord, StartRecord
 from .store import Store
 
 STARTS, HISTORY = "starts.jsonl", "history.csv"
+#: What every history begins with; the mesh is "full", or "coarse" where it leads to the full one.
+HEADER = ("start", "analysis", "solver", "mesh", "objective", "status")
+MESH = HEADER.index("mesh")
 
 
 class RunningFiles:
@@ -33,21 +36,22 @@ class RunningFiles:
         self._rows: FileIO | None = None
         self._starts: FileIO | None = None
 
-    def begin(self, resume: bool) -> dict[int, StartRecord]:
+    def begin(self, resume: bool) -> list[StartRecord]:
         """Open the files; the starts that are finished already (none unless going on).
 
-        One that the solver's failure ended is not.
+        One that the solver's failure ended is not. A start that runs coarse to fine can be finished
+        on either mesh.
 
         Raises
         ------
         InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
         """
-        done = self._finished() if resume else {}
-        rows = [r for r in self._read() if r[:1] and r[0] in map(str, done)] if resume else []
-        lines = [json.dumps(record.to_json()) + "\n" for record in done.values()]
+        done = self._finished() if resume else []
+        ended = {(str(record.number), record.mesh) for record in done}
+        rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
+        lines = [json.dumps(record.to_json()) + "\n" for record in done]
         self.store.write(STARTS, "".join(lines))
-        header = ["start", "analysis", "solver", "objective", "status", *self.columns]
-        self.store.write(HISTORY, _table([header, *rows]))
+        self.store.write(HISTORY, _table([[*HEADER, *self.columns], *rows]))
         with telling(self.store.path):
             # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
             self._starts = open(self.store.path / STARTS, "ab", buffering=0)
@@ -70,8 +74,8 @@ class RunningFiles:
             values = (*record.coefficients, *record.nuisance)
             numbers = [repr(v / s) for v, s in zip(values, self.scale, strict=True)]
             value = "" if record.objective is None else repr(record.objective)
-            row = [record.start, record.analysis, record.solver, value, record.status, *numbers]
-            _append(self._rows, _table([row]))
+            said = record.start, record.analysis, record.solver, record.mesh, value, record.status
+            _append(self._rows, _table([[*said, *numbers]]))
 
     def finish(self) -> None:
         """Close the files and put history.csv in order of start and analysis."""
@@ -87,9 +91,9 @@ class RunningFiles:
                 stream.close()
         self._rows = self._starts = None
 
-    def _finished(self) -> dict[int, StartRecord]:
+    def _finished(self) -> list[StartRecord]:
         path = self.store.path / STARTS
-        done: dict[int, StartRecord] = {}
+        done: dict[tuple[int, str], StartRecord] = {}
         # A crash can leave bytes that are no text where the last line should be.
         text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
         lines = text.splitlines()
@@ -101,14 +105,14 @@ class RunningFiles:
                     break  # cut off by a kill: that start is run again
                 problem = "is damaged; use --overwrite"
                 raise InputError(path, f"line {i + 1}", problem) from None
-            done[record.number] = record
-        return {number: record for number, record in done.items() if not record.failure}
+            done[record.number, record.mesh] = record
+        return [record for record in done.values() if not record.failure]
 
     def _read(self) -> list[list[str]]:
         path = self.store.path / HISTORY
         text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
         whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
-        return [row for row in csv.reader(io.StringIO(whole)) if row]
+        return [row for row in csv.reader(io.StringIO(whole)) if len(row) > MESH]
 
 
 def _append(stream: FileIO, text: str) -> None:

@@ -81,6 +81,7 @@ class FitSection(Section):
     solver: Name = "membrane"
     max_analyses: Annotated[int, Field(ge=1)] | None = None
     tolerance: Positive = 1e-7
+    coarse_to_fine: bool = False
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
     mesh_error: Literal["told", "taken out"] = "told"

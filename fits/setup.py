@@ -66,6 +66,11 @@ class FitSetup:
             for test, weighting in zip(self.tests, self.weightings, strict=True)
             for comparison in test.comparisons(self.make_solver, weighting, masks)
         ]
+        return self.problem_of(comparisons)
+
+    def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
+        """The fit of comparisons of its tests, whatever the models: the law's unknowns and theirs,
+        and what leads where the solver that counts gives no derivatives."""
         law, ends = self.law, self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
         problem = FitProblem(tuple(comparisons), self.law, unknowns)

@@ -1,4 +1,4 @@
-"""What a bubble's fit compares, of a finer mesh and increments: the same points, row by row."""
+"""What a bubble's fit compares, of another mesh and increments: the same points, row by row."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...identification.comparison import Comparison
 from ...meshes.mesh import Mesh
 from ...meshes.smooth_reading import SmoothReading
@@ -20,22 +21,32 @@ from .test import PART
 
 Array = NDArray[np.float64]
 
+#: Quads of the full disk: with fewer it is no disk any more.
+LEAST_QUADS = 48
 #: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
-INWARD = (1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.9)
+INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 
 
 def finer_bubble(
     prepared: PreparedBubble, make_solver: MakeSolver, weighting: Weighting, factor: float
 ) -> tuple[Comparison, ...]:
-    """Its one comparison, of quads and increments divided by a factor.
+    """Its one comparison, of quads and increments divided by a factor; only of quads below one.
 
     What lies between nodes is read as the fit reads it: what that does is part of the
     difference.
+
+    Raises
+    ------
+    InputError : the mesh would be too coarse for a disk, or for the places of the data.
     """
     test = prepared.test
     (own,) = prepared.comparisons(make_solver, weighting)
     finer = test.models(what="elements", factor=factor)[PART]
-    steps = test.models(what="increments", factor=round(factor))[PART].increments
+    whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
+    if whole < LEAST_QUADS and factor < 1:
+        problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
+        raise InputError(None, "elements", problem)
+    steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
     model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, prepared.sheet)
     objective = own.objective
     assert isinstance(objective, FieldObjective)
@@ -60,10 +71,11 @@ def resampled(targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh) -> tuple
 
 
 def _sample(reading: SmoothReading, places: Array) -> sp.csr_matrix:
-    at = places.copy()
+    at, inside = places.copy(), np.zeros(len(places), dtype=bool)
     for share in INWARD:
+        at[~inside] = share * places[~inside]
         matrix, inside = reading.matrix(at)
         if inside.all():
-            break
-        at[~inside] = share * places[~inside]
-    return matrix
+            return matrix
+    problem = f"{(~inside).sum()} places of the data lie outside of it"
+    raise InputError(None, "mesh", problem)

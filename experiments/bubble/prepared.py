@@ -140,10 +140,10 @@ class PreparedBubble:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same places on a finer mesh with finer increments."""
+        """The same places on a finer mesh with finer increments, or on a coarser mesh."""
         from .finer import finer_bubble
 
-        if self.by_this_model:
+        if self.by_this_model and factor > 1:
             return self.comparisons(make_solver, weighting)
         return finer_bubble(self, make_solver, weighting, factor)
 

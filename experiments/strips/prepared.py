@@ -126,7 +126,7 @@ class PreparedStrips:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same loads on finer quads; the increments hardly matter (a bar has their limit)."""
+        """The same loads on other quads; the increments hardly matter (a bar has their limit)."""
         models = self.test.models(what="elements", factor=factor)
         own = self.comparisons(make_solver, weighting)
         return tuple(

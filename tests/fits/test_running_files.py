@@ -48,7 +48,7 @@ def begin(
     going_on = folder.store.begin(
         {"law": project, "data": "d"}, resume, overwrite, (STARTS, HISTORY)
     )
-    return folder.begin(going_on)
+    return {record.number: record for record in folder.begin(going_on)}
 
 
 def test_a_start_that_the_solvers_failure_ended_is_run_again(tmp_path: Path) -> None:
