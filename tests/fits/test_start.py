@@ -28,8 +28,8 @@ class Problem:
 
 Y = np.array([0.5, 0.25, -3.0])
 OPTIMUM = SimpleNamespace(
-    value=0.75, status="converged", failure="", best=SimpleNamespace(unknowns=Y),
-    coefficients=np.array([5.0, 25.0]),
+    value=0.75, status="converged", failure="", coefficients=np.array([5.0, 25.0]),
+    best=SimpleNamespace(unknowns=Y, histories=("a short one", "a long one")),
 )  # fmt: skip
 
 
@@ -38,8 +38,8 @@ def started(
 ) -> tuple[StartRecord, list[EvaluationRecord]]:
     """Two analyses by the surrogate, and one of each of the program's, one of which failed."""
 
-    def fit_from(problem: Any, begun: Any, options: Any) -> Any:
-        assert (begun, options) == ("at start 4 of 7", "options")
+    def fit_from(problem: Any, begun: Any, options: Any, near: bool) -> Any:
+        assert (begun, options, near) == ("at start 4 of 7", "options", False)
         problem.surrogate.watch(Y, 0.9, "ok", "membrane")
         problem.surrogate.watch(Y, 0.8, "ok", "membrane")
         problem.watch(Y, None, "no licence", "calculix")
@@ -47,6 +47,8 @@ def started(
         problem.watch(Y, 0.75, "ok", "calculix")
         return optimum
 
+    strains = {"a short one": [0.1, 0.3, 0.0], "a long one": [0.2, 0.1, 0.0]}
+    monkeypatch.setattr(room, "strains_of", strains.__getitem__)
     monkeypatch.setattr(room, "feasible_start", lambda p, s, n: f"at start {n} of {s}")
     monkeypatch.setattr(room, "fit_from", fit_from)
     told: list[EvaluationRecord] = []
@@ -71,8 +73,9 @@ def test_what_is_told_and_counted(monkeypatch: pytest.MonkeyPatch, problem: Prob
         )
     ]  # fmt: skip
     assert record == StartRecord(
-        4, (7, 4), 0.75, "converged", 5, (0.5, 0.25, -3.0), (5.0, 25.0), record.wall_s, 3, ""
-    )
+        4, (7, 4), 0.75, "converged", 5, (0.5, 0.25, -3.0), (5.0, 25.0), record.wall_s, 3, "",
+        (0.2, 0.3, 0.0),
+    )  # fmt: skip
     assert problem.resets == 1
     assert problem.watch is None and problem.surrogate.watch is None
 
@@ -118,11 +121,35 @@ def test_no_feasible_start_is_no_failure(monkeypatch, problem: Problem) -> None:
     assert problem.watch is None
 
 
+def test_from_the_optimum_of_the_coarse_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Analyses, time and runs of other programs are counted on; nothing is drawn."""
+    coarse = StartRecord(
+        4, (7, 4), 0.5, "converged", 6, (1.0, 2.0, 3.0), (), 100.0, 0, mesh="coarse"
+    )
+
+    def fit_from(problem: Any, begun: Any, options: Any, near: bool) -> Any:
+        assert begun.tolist() == [1.0, 2.0, 3.0] and near
+        problem.watch(Y, 0.75, "ok", "membrane")
+        return OPTIMUM
+
+    monkeypatch.setattr(room, "strains_of", lambda history: [0.0] * 3)
+    monkeypatch.setattr(room, "fit_from", fit_from)
+    told: list[EvaluationRecord] = []
+    problem: Any = Problem("membrane", False)
+    record = run_start(problem, None, 7, 4, told.append, coarse=coarse)  # type: ignore[arg-type]
+    assert [(e.analysis, e.mesh) for e in told] == [(7, "full")]
+    assert (record.analyses, record.coarse_analyses, record.coarse_objective) == (7, 6, 0.5)
+    assert record.objective == 0.75 and record.mesh == "full" and record.wall_s > 100.0
+    assert StartRecord.from_json(record.to_json()) == record
+
+
 def test_a_record_of_an_older_version() -> None:
-    """It knows neither of external runs nor of failures."""
+    """It knows neither of external runs nor of failures, nor of meshes and what was reached."""
     record = StartRecord(1, (7, 1), 0.5, "ok", 3, (1.0,), (2.0,), 0.25)
     said = record.to_json()
     assert (said.pop("external_runs"), said.pop("failure")) == (0, "")
+    later = ("reached", "mesh", "coarse_objective", "coarse_analyses", "same_as")
+    assert [said.pop(name) for name in later] == [(), "full", None, 0, None]
     assert StartRecord.from_json(said) == record
     for key in said:
         with pytest.raises(KeyError):
