@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.finer import INWARD, _sample, finer_bubble, resampled
 from bubblefit.experiments.bubble.objective import FieldTarget
@@ -57,7 +58,11 @@ def test_places_beyond_the_polygon_are_looked_for_farther_and_farther_in() -> No
     assert matrix(99.95) == pytest.approx([100.0, 99.99, 99.9])
     assert matrix(99.5) == pytest.approx([100.0, 99.99, 99.9, 99.0])
     assert all(at[0, 0] == 50.0 for at in asked)
-    assert matrix(0.0)[-1] >= 100 * INWARD[-1]
+    # Where the polygon has few edges (the sag of four in a quarter is 2 % of the radius).
+    assert matrix(97.0) == pytest.approx([100.0, 99.99, 99.9, 99.0, 95.0])
+    assert matrix(91.0)[-1] == pytest.approx(100 * INWARD[-1])
+    with pytest.raises(InputError, match="1 places of the data lie outside"):
+        matrix(90.0)
 
 
 @pytest.mark.parametrize("factor", [2.0, 1.6])
