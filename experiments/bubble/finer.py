@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...identification.comparison import Comparison
+from ...meshes.facet_reading import FacetReading
 from ...meshes.mesh import Mesh
 from ...meshes.smooth_reading import SmoothReading
 from ..base import MakeSolver, Weighting
 from .objective import FieldObjective, FieldTarget
+from .places import reading_of
 from .prepared import PreparedBubble
 from .sheet import with_sheet
 from .test import PART
@@ -51,17 +53,27 @@ def finer_bubble(
     objective = own.objective
     assert isinstance(objective, FieldObjective)
     moved = copy.copy(objective)
-    moved.targets = resampled(objective.targets, own.model.mesh, model.mesh)
+    reading = reading_of(test, model.mesh)
+    moved.targets = resampled(objective.targets, own.model.mesh, model.mesh, reading)
     return (replace(own, model=model, objective=moved),)
 
 
-def resampled(targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh) -> tuple[FieldTarget, ...]:
-    """The same targets at the same places, from the nodes of another mesh."""
-    reading = SmoothReading.of(other)
+def resampled(
+    targets: tuple[FieldTarget, ...],
+    own: Mesh,
+    other: Mesh,
+    reading: SmoothReading | FacetReading | None = None,
+) -> tuple[FieldTarget, ...]:
+    """The same targets at the same places, from the nodes of another mesh.
+
+    reading : of that mesh, smooth unless given.
+    """
+    reading = reading or SmoothReading.of(other)
     found: list[tuple[Array, sp.csr_matrix]] = []
     moved = []
     for target in targets:
-        places = np.ascontiguousarray(target.at(own.points)[:, :2])
+        rest = target.at(own.points)[:, :2] if target.at_rest is None else target.at_rest
+        places = np.ascontiguousarray(rest)
         sample = next((s for p, s in found if np.array_equal(p, places)), None)
         if sample is None:
             sample = _sample(reading, places)
@@ -70,7 +82,7 @@ def resampled(targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh) -> tuple
     return tuple(moved)
 
 
-def _sample(reading: SmoothReading, places: Array) -> sp.csr_matrix:
+def _sample(reading: SmoothReading | FacetReading, places: Array) -> sp.csr_matrix:
     at, inside = places.copy(), np.zeros(len(places), dtype=bool)
     for share in INWARD:
         at[~inside] = share * places[~inside]

@@ -12,6 +12,7 @@ from scipy.interpolate import CloughTocher2DInterpolator
 from ...data.fields import DisplacementField
 from ...data.surfaces import DisplacementSurface
 from ...errors import InputError
+from ...meshes.facet_reading import FacetReading
 from ...meshes.mesh import Mesh
 from ...meshes.smooth_reading import SmoothReading
 from .objective import FieldTarget
@@ -79,6 +80,12 @@ def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
     return np.asarray(between)
 
 
+def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
+    """How displacements of the nodes are read at points: as the camera does, if that is known."""
+    reading = SmoothReading.of(mesh)
+    return reading if test.facet is None else FacetReading(reading, test.facet)
+
+
 def at_points(
     test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
@@ -89,7 +96,7 @@ def at_points(
     InputError : next to no point lies on the disk, or all of them near its centre.
     """
     targets, outside = [], 0
-    reading, before = SmoothReading.of(mesh), None
+    reading, before = reading_of(test, mesh), None
     for field in fields:
         # Frames of one camera mostly have the same places.
         if before is None or not np.array_equal(before, field.points):

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
+from .filter_section import FilterSection
 from .outline_section import EllipseSection
 from .pressure_section import PressureSection
 from .registration_section import RegistrationSection
@@ -57,6 +58,7 @@ class PointsSection(Section):
     length_unit: LengthUnit | None = None
     pressure: PressureSection | None = None
     registration: RegistrationSection | None = None
+    filter: FilterSection | None = None
 
 
 class DataSection(Section):

@@ -13,8 +13,10 @@ from ...data.outline import Outline
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...meshes.elliptic_disk import elliptic_disk_mesh
+from ...meshes.facet_reading import Facet
 from ...models.bubble import BubbleModel, default_increments
 from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
+from .filter_section import facet_of
 from .increments import merge_increments
 from .outline_section import outline_of
 from .point_files import PointFiles, measured_files
@@ -34,7 +36,8 @@ class BubbleTest:
     """A clamped disk that is inflated. Lengths mm, pressures MPa.
 
     `pressures` are reported and matched, `increments` are the load steps and contain them.
-    `noise` (mm) of one measured displacement, None where it is not given.
+    `noise` (mm) of one measured displacement, None where it is not given. `facet` : by which the
+    camera reads displacements, None for those of points.
     """
 
     name: str
@@ -54,6 +57,7 @@ class BubbleTest:
     pressure_offset: bool
     sheet: Sheet
     noise: float | None = None
+    facet: Facet | None = None
     kind: str = "bubble"
 
     @property
@@ -128,6 +132,8 @@ class BubbleTest:
         )  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
         said["outline"] = asdict(self.outline)
+        if self.facet is not None:
+            said["filter"] = asdict(self.facet)
         if self.sheet != Sheet():
             said["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
@@ -185,6 +191,13 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         noise=None if section.noise is None else section.noise * scales.length,
+        facet=facet_of(
+            None if section.data.points is None else section.data.points.filter,
+            place,
+            scales.length,
+            section.symmetry,
+            section.match.by,
+        ),
         sheet=sheet_of(
             section.sheet,
             place,
