@@ -155,6 +155,11 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
     )
     lines.append(f"RMS residual beside the noise: {left}")
     lines += band_lines(fit)
+    lines += [
+        f"{verdict.name}: {verdict.words}"
+        for verdict in fit.verdicts
+        if verdict.shared or verdict.prior is None
+    ]
     for source, sigmas in result.get("pinned", {}).items():
         parts = ", ".join(
             f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"

@@ -88,7 +88,7 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     again = [_like(r, first) for r in records]
     strains = [strains_of(h) for h in point.histories]
     reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
-    law = problem.law.with_beta(problem.unknowns.beta(unknowns))
+    law = problem.unknowns.law(problem.law, unknowns)
     slopes = point if leading is problem else leading.evaluate(unknowns, True, warm=False)
     return BestFit(point, slopes, law, ranked, again, reached)
 

@@ -31,7 +31,7 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     if limit is None and out:
         notes.append(Note(NoteKind.MESH, NOT_TAKEN_OUT))
     elif limit is not None and out:
-        law = law.with_beta(problem.unknowns.beta(slopes.unknowns + limit.step))
+        law = problem.unknowns.law(law, slopes.unknowns + limit.step)
     sure = certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
     if sure.mesh is not None:
         notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)

@@ -13,6 +13,7 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind
 from .best import BestFit
 from .setup import FitSetup
+from .shared import with_shared
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,7 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
         if isinstance(test, Refinable)
         for comparison in test.finer(setup.make_solver, weighting, FINER)
     ]
+    finer = [*with_shared(finer, problem.unknowns.nuisance.shared)]
     residual = residual_of(problem, finer, best.differentiated, best.law)
     return limit_of(problem, best.differentiated, residual, FINER)
 

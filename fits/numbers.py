@@ -15,6 +15,7 @@ from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
 from ..identification.assessment import pinned_by
 from ..identification.noise import notes_of_misfits
+from ..identification.verdicts import notes_of_verdicts
 from ..notes import Note, NoteKind, as_note, rows
 from .mesh_error import TAKEN_OUT, TOLD
 from .start import coarse_columns
@@ -98,6 +99,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
                 name: {**asdict(d), "told": d.told} for name, d in sure.discrepancy.items()
             },
         }
+    if fit.verdicts:
+        result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
     if fit.record is not None:
         result["provenance"] = PROVENANCE
     result["tests"] = {name: f.numbers for name, f in fit.findings.items()}
@@ -173,6 +176,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     """
     best, several = fit.best, len(fit.problem.comparisons) > 1
     notes = list(best.certainty.undetermined) if best.certainty is not None else []
+    notes += notes_of_verdicts(fit.verdicts)
     cut = [record for record in best.records if record.failure]
     if cut:
         said = (

@@ -103,8 +103,11 @@ def _page(fit: Fit, folder: Path) -> Report:
             ("analyses", result["analyses"]),
             *external,
             ("wall time, s", result["wall_s"]),
-            ("Poisson's ratio nu12 (fixed)", fit.law.nu12),
-            ("thickness", f"{project.fabric.thickness:g} mm, {project.fabric.thickness_change}"),
+            (f"Poisson's ratio nu12 ({_fixed(fit, 'nu12')})", fit.law.nu12),
+            (
+                f"thickness ({_fixed(fit, 'thickness')})",
+                f"{fit.thickness:.4g} mm, {project.fabric.thickness_change}",
+            ),
             *own,
         ],
         coefficients=_coefficients(fit),
@@ -122,6 +125,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         ],
         tables=[
             *_determined(fit),
+            *_beside(fit),
             _left(fit),
             *_pinned_table(pins),
             *(t for exhibit in shown for t in exhibit.tables),
@@ -132,6 +136,25 @@ def _page(fit: Fit, folder: Path) -> Report:
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
         versions=result["versions"],
     )
+
+
+def _fixed(fit: Fit, name: str) -> str:
+    return "fitted" if getattr(fit.project.fit.unknowns, name) is not None else "fixed"
+
+
+def _beside(fit: Fit) -> list[Table]:
+    """What the data say of every unknown beside the moduli."""
+    rows: list[list[object]] = [
+        [v.name, v.unit, v.value, v.sigma if v.determined else "not determined", v.lower, v.upper,
+         v.prior, v.words]
+        for v in fit.verdicts
+    ]  # fmt: skip
+    header = ["unknown", "unit", "value", "1 sigma", "least", "largest", "known to", "verdict"]
+    note = (
+        "Known to: one standard deviation before the tests. Correlation: with a modulus in the "
+        "middle of its strains, where it is above one half."
+    )
+    return [Table("Unknowns beside the moduli", header, rows, note, text=(1, 7))] if rows else []
 
 
 def _left(fit: Fit) -> Table:

@@ -14,7 +14,9 @@ from .. import __version__
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
 from ..experiments.doubts import Judgement
 from ..identification.noise import Misfit, misfits
+from ..identification.posterior import Posterior
 from ..identification.problem import FitProblem
+from ..identification.verdicts import Verdict, verdicts
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
@@ -93,7 +95,30 @@ class Fit:
             source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
         sure = card_certainty(self.problem, self.best, law, list(self.tests))
-        return MaterialCard(law, self.project.fabric.thickness, self.project.title, source, sure)
+        return MaterialCard(law, self.thickness, self.project.title, source, sure)
+
+    @property
+    def thickness(self) -> float:
+        """mm before the test: the fabric's, or as it was fitted."""
+        places = {n.name: k for k, n in enumerate(self.problem.unknowns.nuisance.shared)}
+        if "thickness" not in places:
+            return self.project.fabric.thickness
+        known = self.best.point.unknowns if self._known is None else self._known.best
+        return float(known[self.problem.unknowns.size + places["thickness"]])
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What the data say of every unknown beside the moduli; empty where it is not known."""
+        known = self._known
+        return () if known is None else verdicts(known, self.best.valid)
+
+    @property
+    def _known(self) -> Posterior | None:
+        """Of the law that is reported: of ever finer meshes where their error is taken out."""
+        sure = self.best.certainty
+        if sure is None:
+            return None
+        return sure.fine if sure.taken_out else sure.posterior
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
@@ -231,8 +256,8 @@ class Fit:
         """The laws of the best starts that have a fit of their own, best first."""
         unknowns = self.problem.unknowns
         own = [r for r in self.best.ranked[1:] if r.same_as is None]
-        others = [unknowns.beta(np.array(r.unknowns)) for r in own[: BEST - 1]]
-        return [self.law, *map(self.law.with_beta, others)]
+        others = [np.array(r.unknowns) for r in own[: BEST - 1]]
+        return [self.law, *(unknowns.law(self.law, y) for y in others)]
 
     def report(self, folder: Path | str) -> Path:
         """Write the card, tables, figures, report.html and, last, result.json into a folder.

@@ -70,6 +70,20 @@ class LawSection(Section):
     margin: MarginSection | None = None
 
 
+class UnknownSection(Section):
+    """[fit.unknowns.NAME]: between what it is looked for, and what is known of it before."""
+
+    bounds: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    prior: Positive | None = None
+
+
+class UnknownsSection(Section):
+    """[fit.unknowns]: what is fitted beside the moduli, one value for all tests."""
+
+    nu12: UnknownSection | None = None
+    thickness: UnknownSection | None = None
+
+
 class FitSection(Section):
     """[fit]: how it is looked for."""
 
@@ -84,6 +98,7 @@ class FitSection(Section):
     coarse_to_fine: bool = False
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
+    unknowns: UnknownsSection = UnknownsSection()
     mesh_error: Literal["told", "taken out"] = "told"
 
 

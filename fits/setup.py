@@ -17,6 +17,7 @@ from ..solvers.registry import solver_named, usable_solver
 from .content import digest_of
 from .law import bounds_of, law_of
 from .project import Project
+from .shared import shared_unknowns, with_shared
 
 #: Leads the fit where the solver that counts gives no derivatives.
 SURROGATE = "membrane"
@@ -71,6 +72,7 @@ class FitSetup:
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
         """The fit of comparisons of its tests, whatever the models: the law's unknowns and theirs,
         and what leads where the solver that counts gives no derivatives."""
+        comparisons = with_shared(comparisons, shared_unknowns(self.project))
         law, ends = self.law, self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
         problem = FitProblem(tuple(comparisons), self.law, unknowns)
@@ -106,6 +108,7 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
     options = project.solver_options.get(fit.solver, {})
     # Once here, in one line, rather than as the failure of every analysis.
     usable_solver(fit.solver, options, project.path, SOLVER_KEY)
+    shared_unknowns(project)  # says now what is wrong with them
     law = law_of(project, [test.reach for test in tests])
     bounds = bounds_of(project, law.form)
     make = functools.partial(make_solver, project)

@@ -77,7 +77,7 @@ class Comparison:
     model : what its solver runs.
     solver : its own, so that what the solver prepares for the model is kept.
     objective : what the model should show.
-    nuisance : unknowns of this comparison alone.
+    nuisance : unknowns beside the moduli, of this comparison alone or shared with others.
     stage : those of lower stages lead into a fit of several (see `approach`).
     contracts : the sheet is free to contract under tension, so that the law has to be positive
         definite there.
@@ -121,7 +121,7 @@ class Comparison:
         values = self._model_values(nuisance)
         model = self._model(values)
         if isinstance(self.solver, DifferentiatingSolver):
-            guess = self._guess(_point(law, free, values)) if warm else None
+            guess = self._guess(self._point(law, free, values)) if warm else None
             return self.solver.run(model, law, guess=guess)
         return self.solver.run(model, law)
 
@@ -142,11 +142,11 @@ class Comparison:
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
         values = self._model_values(nuisance)
-        point = _point(law, free, values)
+        point = self._point(law, free, values)
         history, slope = self.solver.run_with_sensitivity(
             self._model(values),
             law,
-            [*(f"beta_{i}" for i in free), *values],
+            [*(f"beta_{i}" for i in free), *values, *self._of_law],
             guess=self._guess(point) if warm else None,
         )
         if history.path is not None and history.path_slope is not None:
@@ -156,7 +156,7 @@ class Comparison:
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
         """What the model knows of, by its names and in its units."""
         return {
-            n.model_parameter: n.scale * nuisance[n.name]
+            n.model_parameter: n.scale * (nuisance[n.name] - n.start)
             for n in self.nuisance
             if n.model_parameter is not None
         }
@@ -177,14 +177,29 @@ class Comparison:
 
     def _chain(self, by_solver: Array, free: int) -> Array:
         """Columns in the order of the unknowns, from those in the order of the model's names."""
-        own = [n.name for n in self.nuisance if n.model_parameter is None]
-        by_objective = iter(self.objective.nuisance_columns(own).T if own else ())
-        rest = iter(by_solver.T[free:])
-        columns = [
-            next(by_objective) if n.model_parameter is None else n.scale * next(rest)
-            for n in self.nuisance
-        ]
-        return np.column_stack([by_solver[:, :free], *columns])
+        of_model = [n for n in self.nuisance if n.model_parameter is not None]
+        of_law = [n for n in self.nuisance if n.law_parameter is not None]
+        by = {n.name: n.scale for n in (*of_model, *of_law)}
+        own = [n.name for n in self.nuisance if n.name not in by]
+        by_objective = self.objective.nuisance_columns(own).T if own else ()
+        columns = dict(zip(own, by_objective, strict=True))
+        columns |= {
+            name: scale * column
+            for (name, scale), column in zip(by.items(), by_solver.T[free:], strict=True)
+        }
+        return np.column_stack([by_solver[:, :free], *(columns[n.name] for n in self.nuisance)])
+
+    @property
+    def _of_law(self) -> list[str]:
+        """Numbers of the law beside its beta that are unknown, by its names."""
+        return [n.law_parameter for n in self.nuisance if n.law_parameter is not None]
+
+    def _point(
+        self, law: HypoelasticLaw, free: Sequence[int], values: Mapping[str, float]
+    ) -> Array:
+        """The parameters that vary, in the order in which the solver differentiates by them."""
+        of_law = [float(getattr(law, name)) for name in self._of_law]
+        return np.concatenate([law.beta[list(free)], list(values.values()), of_law])
 
     def _guess(self, point: Array) -> Array | None:
         if self._last is None:
@@ -196,8 +211,3 @@ class Comparison:
         if np.abs(change).max() > NEAR * np.abs(path).max():
             return None
         return np.asarray(path + change)
-
-
-def _point(law: HypoelasticLaw, free: Sequence[int], values: Mapping[str, float]) -> Array:
-    """The parameters that vary, in the order in which the solver differentiates by them."""
-    return np.concatenate([law.beta[list(free)], list(values.values())])

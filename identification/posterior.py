@@ -86,4 +86,4 @@ class Posterior:
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
         """`count` laws as the data leave them, all within the bounds: `law` with other numbers."""
-        return [law.with_beta(self.unknowns.beta(y)) for y in self.sample(count, random)]
+        return [self.unknowns.law(law, y) for y in self.sample(count, random)]

@@ -53,7 +53,8 @@ class FitProblem:
 
     After the blocks of the comparisons comes one of the nuisance unknowns that have a prior.
 
-    `law` carries nu12, strain range and thickness option; its beta is replaced. `surrogate`: the
+    `law` carries nu12, strain range and thickness option; its beta is replaced, and nu12 where it
+    is an unknown. `surrogate`: the
     same problem for a solver that differentiates, where this one's does not.
 
     Raises
@@ -144,7 +145,7 @@ class FitProblem:
         `warm`: start each increment from the last differentiated solution and its slope.
         """
         self.analyses += 1
-        law = self.law.with_beta(self.unknowns.beta(y))
+        law = self.unknowns.law(self.law, y)
         free = self.unknowns.free
         warm = warm and self.warm_starts
         histories, residuals, jacobians = [], [], []
@@ -166,8 +167,9 @@ class FitProblem:
             histories.append(history)
             residuals.append(residual)
         places, cost = self.unknowns.nuisance.priors
+        away = y[self.unknowns.size :] - self.unknowns.nuisance.start
+        whole = np.concatenate([*residuals, cost * away[places]])
         places = self.unknowns.size + places
-        whole = np.concatenate([*residuals, cost * y[places]])
         value = self.blocks.value(whole)
         jacobian = None
         if with_jacobian:

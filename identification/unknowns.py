@@ -8,14 +8,16 @@ strains. Bounds on the coefficients and on the moduli are linear in either.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..materials.definite import definite_rows
 from ..materials.forms.base import SHEAR, Form, moduli_on_grid
+from ..materials.law import HypoelasticLaw
 from .bounds import LawBounds
 from .comparison import Comparison
 from .nuisance import NuisanceOf
@@ -32,7 +34,7 @@ class Unknowns:
     """What a fit may change, between which bounds, and how the optimisers see it.
 
     Unknowns y (count,) are moduli at control strains, each in units of its modulus' own size, then
-    the nuisance in its units, comparison by comparison.
+    the nuisance in its units: what comparisons share, then comparison by comparison.
 
     Parameters
     ----------
@@ -67,12 +69,15 @@ class Unknowns:
         """
         bounds.check(form)
         several = tuple(comparisons)
+        nuisance = NuisanceOf({c.name: c.nuisance for c in several})
+        # Where it is unknown, whatever it may be: the largest is the strictest.
+        most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
         return cls(
             form,
             tuple(np.asarray(strain_range, dtype=float).tolist()),
             bounds,
-            NuisanceOf({c.name: c.nuisance for c in several}),
-            nu12 if any(c.contracts for c in several) else None,
+            nuisance,
+            most if any(c.contracts for c in several) else None,
         )
 
     # Their places and names
@@ -106,10 +111,9 @@ class Unknowns:
         """The nuisance of a comparison by plain name at unknowns y, in its units."""
         return self.nuisance.values(comparison, y[self.size :])
 
-    def nuisance_places(self, comparison: str) -> slice:
+    def nuisance_places(self, comparison: str) -> NDArray[np.intp]:
         """Where the nuisance of a comparison lies among the unknowns."""
-        own = self.nuisance.places(comparison)
-        return slice(self.size + own.start, self.size + own.stop)
+        return self.size + self.nuisance.places(comparison)
 
     @cached_property
     def shear(self) -> Flags:
@@ -150,10 +154,15 @@ class Unknowns:
         full[list(self.free)] = self.to_coefficients @ y[: self.size]
         return full
 
+    def law(self, law: HypoelasticLaw, y: Array) -> HypoelasticLaw:
+        """A law with the numbers that unknowns y (count,) say, nu12 where it is one of them."""
+        numbers: dict[str, Any] = {"beta": self.beta(y), **self.nuisance.of_law(y[self.size :])}
+        return replace(law, **numbers)
+
     def at(self, coefficients: Array) -> Array:
-        """Unknowns (count,) of free coefficients (size,) MPa, nuisance zero."""
+        """Unknowns (count,) of free coefficients (size,) MPa, nuisance where a fit starts."""
         values = np.linalg.solve(self.to_coefficients, coefficients)
-        return np.concatenate([values, np.zeros(self.count - self.size)])
+        return np.concatenate([values, self.nuisance.start])
 
     # What is allowed
 

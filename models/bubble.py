@@ -23,7 +23,7 @@ RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
 
 #: Parameters of the stress-free sheet beside its modes.
 SLACK = ("slack_warp", "slack_fill")
-PRESSURE_OFFSET = "pressure_offset"
+PRESSURE_OFFSET, THICKNESS = "pressure_offset", "thickness"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +93,17 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What `with_parameters` changes: pressure_offset (MPa), slack_warp and slack_fill
-        (shares), and the modes (mm)."""
-        return (PRESSURE_OFFSET, *SLACK, *self.modes)
+        """What `with_parameters` changes: pressure_offset (MPa), thickness (mm), slack_warp and
+        slack_fill (shares), and the modes (mm)."""
+        return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)
 
     def with_parameters(self, values: Mapping[str, float]) -> BubbleModel:
         """The same model with `values` added to its `parameters`; itself where all are zero.
 
         Raises
         ------
-        InputError : no such parameter, or the first increment would not be positive.
+        InputError : no such parameter, or the first increment, or the thickness, would not be
+            positive.
         """
         unknown = [name for name in values if name not in self.parameters]
         if unknown:
@@ -119,6 +120,7 @@ class BubbleModel:
         return replace(
             self,
             mesh=replace(self.mesh, points=points),
+            thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
             increments=[p + offset for p in self.increments],
             slack=(warp, fill),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -73,6 +73,25 @@ class UniaxialModel:
             raise InputError(None, "supports", f"{self.pulled!r} is pulled along y and held there")
         object.__setattr__(self, "elongations", tuple(levels.tolist()))
         object.__setattr__(self, "warp", np.asarray(self.warp, float))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What `with_parameters` changes: thickness (mm)."""
+        return ("thickness",)
+
+    def with_parameters(self, values: Mapping[str, float]) -> UniaxialModel:
+        """The same model with `values` added to its `parameters`; itself where all are zero.
+
+        Raises
+        ------
+        InputError : no such parameter, or the thickness would not be positive.
+        """
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
+        if not any(values.values()):
+            return self
+        return replace(self, thickness=self.thickness + values["thickness"])
 
     @property
     def gauge_length(self) -> float:

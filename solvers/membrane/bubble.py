@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.rim import rim_form, rim_share
-from ...models.bubble import PRESSURE_OFFSET, BubbleModel
+from ...models.bubble import PRESSURE_OFFSET, THICKNESS, BubbleModel
 from ..base import History
 from .derivatives import Derivatives
 from .element import reference_elements
@@ -93,7 +93,8 @@ def _derivatives(
 ) -> Derivatives | None:
     if not parameters:
         return None
-    of_sheet = [name for name in parameters if name in model.parameters and name != PRESSURE_OFFSET]
+    not_of_sheet = (PRESSURE_OFFSET, THICKNESS)
+    of_sheet = [n for n in parameters if n in model.parameters and n not in not_of_sheet]
     slopes = {name: model.sheet_slope(name) for name in of_sheet}
     return Derivatives(membrane, parameters, model.stress_free, slopes)
 

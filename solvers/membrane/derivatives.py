@@ -23,8 +23,8 @@ class Derivatives:
 
     Parameters
     ----------
-    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", and those of
-        `sheet`.
+    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", "thickness" (of
+        a sheet of one thickness), and those of `sheet`.
     stress_free : (n, 3) mm, places of the nodes without stress; needed with `sheet` only.
     sheet : of the parameters that are of the sheet.
     """
@@ -44,6 +44,10 @@ class Derivatives:
         for j, name in enumerate(names):
             if name.startswith("beta_"):
                 self.rows[..., j] = of_beta[..., int(name.removeprefix("beta_"))]
+            elif name == "thickness":
+                # A membrane knows moduli times thickness only: a thicker sheet moves as a stiffer
+                # one does (its stress is another, but nothing here is told of stress).
+                self.rows[..., j] = of_beta @ law.beta / float(np.mean(membrane.thickness))
         self.by_nu = np.array([float(name == "nu12") for name in names])
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
         self.strain, self.stress, self.fresh = np.zeros(shape), np.zeros(shape), np.empty(shape)

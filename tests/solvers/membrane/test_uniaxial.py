@@ -334,6 +334,10 @@ def differences(
         for sign in (1.0, -1.0):
             if name == "nu12":
                 moved = replace(law, nu12=law.nu12 + sign * step)
+            elif name in model.parameters:
+                thick = model.with_parameters({name: sign * step})
+                ends.append(MembraneSolver(1e-12).run(thick, law))
+                continue
             else:
                 beta = law.beta.copy()
                 beta[int(name.removeprefix("beta_"))] += sign * step
@@ -373,7 +377,7 @@ def test_derivatives_of_the_straight_strips(direction: str, thickness_change: st
     # The load of an incompressible strip does not depend on its width.
     if thickness_change == "constant":
         own += ["nu12", "beta_11"] if direction == "fill" else ["nu12"]
-    check_derivatives(straight(direction, 10), law, own)
+    check_derivatives(straight(direction, 10), law, [*own, "thickness"])
 
 
 @pytest.mark.parametrize("name", PARAMETERS[:13])
