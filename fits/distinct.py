@@ -55,9 +55,7 @@ def _are_one(problem: FitProblem, a: StartRecord, b: StartRecord, tolerance: flo
 
 def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
     """Largest relative difference of a modulus between two optima, over the strains reached."""
-    one, other = (
-        problem.law.with_beta(problem.unknowns.beta(np.array(record.unknowns))) for record in (a, b)
-    )
+    one, other = (problem.unknowns.law(problem.law, np.array(record.unknowns)) for record in (a, b))
     ends = np.maximum(a.reached, b.reached)
     apart = []
     for name, component in COMPONENTS.items():

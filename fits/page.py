@@ -105,7 +105,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             ("wall time, s", result["wall_s"]),
             (f"Poisson's ratio nu12 ({_fixed(fit, 'nu12')})", fit.law.nu12),
             (
-                f"thickness ({_fixed(fit, 'thickness')})",
+                "thickness" if _fixed(fit, "thickness") == "fixed" else "thickness (fitted)",
                 f"{fit.thickness:.4g} mm, {project.fabric.thickness_change}",
             ),
             *own,

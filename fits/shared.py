@@ -26,7 +26,8 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
 
     Raises
     ------
-    InputError : bounds out of order, beyond what can be, or not around the value to start from.
+    InputError : bounds out of order, beyond what can be, or not around the value to start from; a
+        thickness without a prior, which no data could tell from the moduli.
     """
     asked, shared = project.fit.unknowns, []
     if asked.nu12 is not None:
@@ -47,8 +48,10 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
         if not low > 0:
             problem = f"expected thicknesses above 0, got {low / length:g}"
             raise InputError(project.path, "fit.unknowns.thickness.bounds", problem)
-        given = asked.thickness.prior
-        prior = None if given is None else given * length
+        if asked.thickness.prior is None:
+            problem = f"this key is missing; {PRODUCT}: say how well its thickness is known before"
+            raise InputError(project.path, "fit.unknowns.thickness.prior", problem)
+        prior = asked.thickness.prior * length
         shared.append(
             Nuisance("thickness", low, high, "mm", "thickness", 1.0, prior, start=start,
                      shared=True, why=PRODUCT)

@@ -76,7 +76,8 @@ def biaxial_response(
     ----------
     loads : (n, 2) N/mm (kN/m) along warp and fill, one increment of the law each.
     thickness : mm, before the test.
-    parameters : by which the strain is differentiated: "beta_i" (per MPa) and "nu12".
+    parameters : by which the strain is differentiated: "beta_i" (per MPa), "nu12" and
+        "thickness" (per mm).
     """
     asked = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
     of_beta = map_in_range(law.form, law.strain_range.tolist())
@@ -84,6 +85,9 @@ def biaxial_response(
     for j, name in enumerate(parameters):
         if name.startswith("beta_"):
             rows[..., j] = of_beta[..., int(name.removeprefix("beta_"))]
+        elif name == "thickness":
+            # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is.
+            rows[..., j] = of_beta @ law.beta / thickness
     by_nu = np.array([float(name == "nu12") for name in parameters])
     strain, stress = np.full((2, len(asked), 2), np.nan)
     slope = np.full((len(asked), 2, len(parameters)), np.nan)

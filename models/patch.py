@@ -53,6 +53,25 @@ class PatchModel:
         object.__setattr__(self, "loads", values)
         object.__setattr__(self, "thickness", float(thickness))
 
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What `with_parameters` changes: thickness (mm)."""
+        return ("thickness",)
+
+    def with_parameters(self, values: Mapping[str, float]) -> PatchModel:
+        """The same model with `values` added to its `parameters`; itself where all are zero.
+
+        Raises
+        ------
+        InputError : no such parameter, or the thickness would not be positive.
+        """
+        unknown = [name for name in values if name not in self.parameters]
+        if unknown:
+            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
+        if not any(values.values()):
+            return self
+        return PatchModel(self.loads, self.thickness + values["thickness"])
+
     @cached_property
     def mesh(self) -> Mesh:
         """One quad, for solvers that need a mesh."""

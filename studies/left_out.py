@@ -115,7 +115,7 @@ def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     if point is None:
         return not_judged(name, f"{NO_FIT}: {problem.failure}", units)
     reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
-    law = own.law.with_beta(problem.unknowns.beta(unknowns))
+    law = problem.unknowns.law(own.law, unknowns)
     # As of a card: known as far as the rest of the data has strained the fabric.
     law = replace(law, strain_range=np.minimum(reached, law.strain_range))
     nuisance = {

@@ -143,7 +143,7 @@ def _weighted(
     unknowns: np.ndarray,
     analyses: int,
 ) -> WeightedFit:
-    law = found.law.with_beta(problem.unknowns.beta(unknowns))
+    law = problem.unknowns.law(found.law, unknowns)
     moduli = {
         name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()
         for name, component in COMPONENTS.items()

@@ -66,7 +66,7 @@ def test_derivatives_by_beta_and_nu12_are_those_of_differences(e, nu, ratio, cha
     def law(b=beta, n=nu):
         return HypoelasticLaw(b, n, [0.1, 0.1, 0.1], change)
 
-    names = ("beta_6", "beta_7", "beta_10", "beta_11", "nu12", "beta_3")
+    names = ("beta_6", "beta_7", "beta_10", "beta_11", "nu12", "beta_3", "thickness")
     found = biaxial_response(law(), loads, T, names)
     if found.reached < len(loads):
         return
@@ -83,6 +83,9 @@ def test_derivatives_by_beta_and_nu12_are_those_of_differences(e, nu, ratio, cha
     slope = (ends[0] - ends[1]) / 2e-6
     np.testing.assert_allclose(found.slope[:, :, 4], slope, atol=1e-6 * np.abs(slope).max())
     assert (found.slope[:, :, 5] == 0).all()  # there is no shear
+    ends = [biaxial_response(law(), loads, T + step).strain for step in (1e-6, -1e-6)]
+    slope = (ends[0] - ends[1]) / 2e-6
+    np.testing.assert_allclose(found.slope[:, :, 6], slope, atol=1e-6 * np.abs(slope).max())
 
 
 def test_many_increments_change_nothing_but_by_the_coupling():
