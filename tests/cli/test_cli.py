@@ -84,7 +84,7 @@ def test_interrupted_and_resumed_ends_the_same(study, tmp_path, number):
     )
     assert ended.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL)
     rows = (tmp_path / "out" / "history.csv").read_text().splitlines()
-    assert rows[0].startswith("start,analysis,solver,objective,status") and len(rows) > 3
+    assert rows[0].startswith("start,analysis,solver,mesh,objective,status") and len(rows) > 3
     assert not (tmp_path / "out" / "result.json").exists()
     bubblefit(*arguments, "--resume", cwd=tmp_path)
     assert (tmp_path / "out/history.csv").read_text() == (folder / "out/history.csv").read_text()

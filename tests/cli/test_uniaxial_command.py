@@ -80,7 +80,8 @@ def test_the_files_of_a_study_agree(study):
 
     history = pd.read_csv(out / "history.csv")
     assert len(history) == result["analyses"]
-    assert list(history.columns[:5]) == ["start", "analysis", "solver", "objective", "status"]
+    first = ["start", "analysis", "solver", "mesh", "objective", "status"]
+    assert list(history.columns[:6]) == first
     assert list(history.columns[5:]) == [f"beta_{i}_GPa" for i in range(12)]
     for start in result["starts"]:
         rows = history[history["start"] == start["start"]]
