@@ -73,7 +73,8 @@ def predict(
     cards : by name; or names of the project's cards and files of others. The project's unless
         given; where it has none, the one that its fit left in the usual folder.
     samples : laws drawn from the certainty of each card; unless given, steps along its few least
-        certain directions are run instead. 0: the spread is not asked for.
+        certain directions are run instead, but not by another program. 0: the spread is not asked
+        for.
     jobs : processes; as the project says unless given, else all cores.
     out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
         nothing is written without it.
@@ -105,7 +106,9 @@ def predict(
             record = record.after(Path(out))
         record.write(Path(out))
     with failure_page(None if out is None else Path(out), project.title) as said:
-        others = _around(project, pairs, samples)
+        # Runs of another program, minutes each, are not made unasked.
+        some = 0 if samples is None and solver.external else samples
+        others = _around(project, pairs, some)
         every = [*pairs, *(run for _, run in others)]
         ended = _run(project, every, records, jobs, progress or _nobody)
         runs = _with_others(ended, [number for number, _ in others])

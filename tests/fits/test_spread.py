@@ -120,6 +120,12 @@ def test_the_spread_stands_wherever_the_load_does(
     assert "95 % by the card" in names
 
 
+def test_another_program_is_not_run_unasked(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(Formula, "external", True)
+    assert predictions(tmp_path, card()).each[0].around is None
+    assert predictions(tmp_path, card(), samples=2).each[0].around.words == "2 laws drawn"
+
+
 def test_the_command_asks_for_draws_or_none(tmp_path: Path) -> None:
     write_project(tmp_path)
     card().write(tmp_path / "sure.toml")
