@@ -82,13 +82,13 @@ def test_the_files_of_a_study_agree(study):
     assert len(history) == result["analyses"]
     first = ["start", "analysis", "solver", "mesh", "objective", "status"]
     assert list(history.columns[:6]) == first
-    assert list(history.columns[5:]) == [f"beta_{i}_GPa" for i in range(12)]
+    assert list(history.columns[6:]) == [f"beta_{i}_GPa" for i in range(12)]
     for start in result["starts"]:
         rows = history[history["start"] == start["start"]]
         assert rows["objective"].min() == pytest.approx(start["objective"], rel=1e-6)
     best = history.loc[history["objective"].idxmin()]
     np.testing.assert_allclose(
-        best[history.columns[5:]].astype(float), result["beta"]["values"], rtol=1e-2
+        best[history.columns[6:]].astype(float), result["beta"]["values"], rtol=1e-2
     )
 
     page = (out / "report.html").read_text()
