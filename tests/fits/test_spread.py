@@ -79,8 +79,8 @@ def test_draws_give_the_same_spread(tmp_path: Path) -> None:
     np.testing.assert_allclose(done.curves()["load_sigma_N"], steps, rtol=0.1, atol=1e-9)
     assert done.each[0].around.words == "300 laws drawn"
     # The same again: draws are not another every time.
-    again = predictions(tmp_path, card(), samples=300)
-    np.testing.assert_array_equal(again.curves()["load_sigma_N"], done.curves()["load_sigma_N"])
+    few = [predictions(tmp_path, card(), samples=5).curves()["load_sigma_N"] for _ in range(2)]
+    np.testing.assert_array_equal(*few)
 
 
 def test_the_spread_stands_wherever_the_load_does(
