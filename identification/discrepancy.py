@@ -10,7 +10,7 @@ Fisher and Snedecor if nothing but noise is left, whatever the noise's size and 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial.legendre import legval
@@ -43,18 +43,20 @@ class Discrepancy:
 
     ratio : of the power in a smooth shape to that in one of the next; largest : of those that noise
     alone exceeds in one of a hundred fits. rms : of what is smooth beyond the noise's share of it,
-    in `unit`s.
+    in `unit`s. least : of that, what the noise to reckon with leaves open of a mean of all values:
+    less is no matter beside the bands (what rounding leaves of computed data is smooth, too).
     """
 
     ratio: float
     largest: float
     rms: float
     unit: str
+    least: float = 0.0
 
     @property
     def told(self) -> bool:
-        """Whether it cannot be noise."""
-        return self.ratio > self.largest
+        """Whether it cannot be noise, and is more than what the noise leaves open anyway."""
+        return self.ratio > self.largest and self.rms > self.least
 
 
 def discrepancies(
@@ -78,7 +80,8 @@ def discrepancies(
         )
         one = discrepancy(blocks, of_mesh, places, problem.unknowns.count, objective.unit)
         if one is not None:
-            found[comparison.name] = one
+            least = objective.least_noise / float(np.sqrt(len(residual[rows])))
+            found[comparison.name] = replace(one, least=least)
     return found
 
 

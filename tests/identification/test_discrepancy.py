@@ -87,6 +87,7 @@ def test_the_words() -> None:
     found = {
         "bubble": Discrepancy(22.6, 1.25, 0.036, "mm"),
         "other": Discrepancy(1.2, 1.25, 0.001, "mm"),
+        "computed": Discrepancy(61.8, 1.66, 2e-8, "mm", least=4e-4),
     }
     (note,) = notes_of_discrepancies(found)
     assert (note.kind, note.of) == (NoteKind.DISCREPANCY, "bubble")
