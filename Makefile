@@ -20,7 +20,7 @@ demo: $(READY)
 test: $(READY)
 	@[ -n "$$BUBBLEFIT_CCX" ] || sh .ci/calculix || [ -z "$$CI" ]
 	@sh .ci/gfortran || [ -z "$$CI" ]
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .

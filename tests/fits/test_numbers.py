@@ -66,6 +66,7 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
             }
             for number, record in enumerate(fit.best.records)
         ],
+        "coarse_to_fine": None,
         "analyses": sum(record.analyses for record in fit.best.records),
         "external_runs": 0,
         "wall_s": fit.wall_s,

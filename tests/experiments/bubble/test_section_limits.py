@@ -240,7 +240,7 @@ def test_a_frame_shares_half_of_its_places() -> None:
 def test_points_that_lie_on_the_disk() -> None:
     """A tenth of them, and out to a tenth of its radius: less is another unit."""
     mesh = disk_mesh(100.0, 48)
-    test: Any = SimpleNamespace(outline=Outline.circle(100.0), place=PLACE)
+    test: Any = SimpleNamespace(outline=Outline.circle(100.0), place=PLACE, facet=None)
 
     def found(points: Any) -> tuple[int, int]:
         points = np.array(points, dtype=float)
