@@ -115,6 +115,9 @@ def test_residuals_and_their_derivatives(folder):
             slope = (ends[0] - ends[1]) / 2e-4
             least = 1e-6 * np.abs(jacobian[:, [7, 11]]).max()
             np.testing.assert_allclose(jacobian[:, place], slope, rtol=1e-5, atol=least)
+        larger = np.linspace(2, 30, 30)[1:, None]
+        assert [len(at) for at in objective.places] == list(objective.sizes)
+        np.testing.assert_allclose(objective.places[1], larger)
         # Weights of one test among others add up to that of the test.
     weighted = prepared.comparisons(setup.make_solver, Weighting(True, 3.0))
     history = comparisons[0].run(law, free, {}, False)
