@@ -31,9 +31,7 @@ def coefficients_of(fit: Fit) -> pd.DataFrame:
     size, nuisance = unknowns.size, unknowns.nuisance.all
     names = [*unknowns.labels, *unknowns.nuisance_names]
     scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
-    known = None
-    if sure is not None:
-        known = sure.fine if sure.taken_out else sure.posterior
+    known = None if sure is None else sure.reported
     y = fit.best.point.unknowns if known is None else known.best
     values = np.concatenate([fit.law.beta[list(unknowns.free)], y[size:]]) / scale
     ends = [

@@ -114,11 +114,8 @@ class Fit:
 
     @property
     def _known(self) -> Posterior | None:
-        """Of the law that is reported: of ever finer meshes where their error is taken out."""
-        sure = self.best.certainty
-        if sure is None:
-            return None
-        return sure.fine if sure.taken_out else sure.posterior
+        """Of the law that is reported."""
+        return None if self.best.certainty is None else self.best.certainty.reported
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:

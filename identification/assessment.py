@@ -67,6 +67,11 @@ class Certainty:
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
 
     @property
+    def reported(self) -> Posterior | None:
+        """Of the law that is reported: of ever finer meshes where their error is taken out."""
+        return self.fine if self.taken_out else self.posterior
+
+    @property
     def total(self) -> dict[str, Array]:
         """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma.
 

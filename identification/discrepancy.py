@@ -98,7 +98,6 @@ def discrepancy(
     doubt) is taken off its power in the smooth shapes. `unknowns` of the fit have taken as many
     smooth shapes out of what is left.
     """
-    smooth, following = np.zeros(2), np.zeros(2)  # power in units of each block's own, and shapes
     usable = [
         (block, doubt, at)
         for block, doubt, at in zip(blocks, doubts, places, strict=True)
@@ -106,7 +105,8 @@ def discrepancy(
     ]
     if not usable:
         return None
-    smooth, following, count = np.zeros(2), np.zeros(2), _shapes(SMOOTH)  # power, and shapes
+    # Power in units of each block's own, and shapes.
+    smooth, following, count = np.zeros(2), np.zeros(2), _shapes(SMOOTH)
     before, shapes, rest = np.zeros((0, 2)), np.zeros((0, 0)), []
     left, of_next, values = 0.0, 0.0, 0
     for block, doubt, at in usable:

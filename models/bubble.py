@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..meshes.mesh import Mesh
+from .parameters import THICKNESS, changes_anything
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
 
 #: Parameters of the stress-free sheet beside its modes.
 SLACK = ("slack_warp", "slack_fill")
-PRESSURE_OFFSET, THICKNESS = "pressure_offset", "thickness"
+PRESSURE_OFFSET = "pressure_offset"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +106,7 @@ class BubbleModel:
         InputError : no such parameter, or the first increment, or the thickness, would not be
             positive.
         """
-        unknown = [name for name in values if name not in self.parameters]
-        if unknown:
-            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
-        if not any(values.values()):
+        if not changes_anything(self.parameters, values):
             return self
         points = np.array(self.mesh.points, dtype=float)
         for name, mode in self.modes.items():

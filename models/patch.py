@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..meshes.mesh import Mesh
+from .parameters import OfThickness
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ FAR_CORNER = 2
 
 
 @dataclass(frozen=True, eq=False)
-class PatchModel:
+class PatchModel(OfThickness):
     """A square of the sheet, warp along x and fill along y, with loads per width on its edges.
 
     Parameters
@@ -42,35 +43,15 @@ class PatchModel:
     loads: Array
     thickness: float
 
-    def __init__(self, loads: ArrayLike, thickness: float) -> None:
-        values = np.array(loads, dtype=float)
+    def __post_init__(self) -> None:
+        values = np.array(self.loads, dtype=float)
         if values.ndim != 2 or values.shape[1:] != (2,) or not len(values):
             raise InputError(None, "loads", f"expected loads (n, 2), got shape {values.shape}")
         if not np.isfinite(values).all():
             raise InputError(None, "loads", "expected finite numbers")
-        if not thickness > 0:
-            raise InputError(None, "thickness", f"expected > 0, got {thickness}")
+        if not self.thickness > 0:
+            raise InputError(None, "thickness", f"expected > 0, got {self.thickness}")
         object.__setattr__(self, "loads", values)
-        object.__setattr__(self, "thickness", float(thickness))
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """What `with_parameters` changes: thickness (mm)."""
-        return ("thickness",)
-
-    def with_parameters(self, values: Mapping[str, float]) -> PatchModel:
-        """The same model with `values` added to its `parameters`; itself where all are zero.
-
-        Raises
-        ------
-        InputError : no such parameter, or the thickness would not be positive.
-        """
-        unknown = [name for name in values if name not in self.parameters]
-        if unknown:
-            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
-        if not any(values.values()):
-            return self
-        return PatchModel(self.loads, self.thickness + values["thickness"])
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..meshes.mesh import Mesh
 from ..meshes.strip import strip_mesh, yarn_direction
+from .parameters import OfThickness
 
 #: Rollers on the top and on the symmetry line; the pulled end is free to get narrower.
 ROLLERS: Mapping[str, tuple[int, ...]] = {"top": (1,), "symmetry_x": (0,)}
@@ -24,7 +25,7 @@ WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
 
 
 @dataclass(frozen=True, eq=False)
-class UniaxialModel:
+class UniaxialModel(OfThickness):
     """A strip in its plane whose lower end is pulled down until the gauge has a given length.
 
     The elongation of the gauge is prescribed, as it was measured; the displacement of the pulled
@@ -73,25 +74,6 @@ class UniaxialModel:
             raise InputError(None, "supports", f"{self.pulled!r} is pulled along y and held there")
         object.__setattr__(self, "elongations", tuple(levels.tolist()))
         object.__setattr__(self, "warp", np.asarray(self.warp, float))
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """What `with_parameters` changes: thickness (mm)."""
-        return ("thickness",)
-
-    def with_parameters(self, values: Mapping[str, float]) -> UniaxialModel:
-        """The same model with `values` added to its `parameters`; itself where all are zero.
-
-        Raises
-        ------
-        InputError : no such parameter, or the thickness would not be positive.
-        """
-        unknown = [name for name in values if name not in self.parameters]
-        if unknown:
-            raise InputError(None, "parameters", f"{unknown} not among {self.parameters}")
-        if not any(values.values()):
-            return self
-        return replace(self, thickness=self.thickness + values["thickness"])
 
     @property
     def gauge_length(self) -> float:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable
 from pathlib import Path
 
 from ..fits.project import cores
 from ..fits.result import Fit
 from ..fits.setup import FitSetup, fingerprints
-from ..fits.store import Store
 from .folds import FoldError, validate
+from .marked import mark_of, read_marked, write_marked
 
 VALIDATION = "validation.json"
 
@@ -30,7 +28,7 @@ def validated_folds(
     the errors are written; None where nothing is. tell : hears each fold that ended, and time pass.
     """
     parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
-    mark = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    mark = mark_of(parts)
     known = None if folder is None else written_folds(folder / VALIDATION, mark)
     if known is not None:
         return known
@@ -41,17 +39,10 @@ def validated_folds(
         tell(event)
     errors = tuple(ended[fold] for fold in sorted(ended))
     if folder is not None:
-        content = {"of": mark, "folds": [fold.to_json() for fold in errors]}
-        Store(folder).write(VALIDATION, json.dumps(content, indent=1) + "\n")
+        write_marked(folder, VALIDATION, mark, {"folds": [fold.to_json() for fold in errors]})
     return errors
 
 
 def written_folds(path: Path, mark: str) -> tuple[FoldError, ...] | None:
     """What an interrupted run has validated already; None when it is not of this fit."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["of"] != mark:
-            return None
-        return tuple(FoldError(**fold) for fold in content["folds"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    return read_marked(path, mark, lambda told: tuple(FoldError(**fold) for fold in told["folds"]))

@@ -12,16 +12,12 @@ from ..experiments.base import FittedTest, MakeSolver, Masks, PreparedTest, Weig
 from ..experiments.notes import beyond, strains_of, unstable_words
 from ..fits.best import LEAST_STRAIN
 from ..identification.blocks import Blocks
-from ..identification.bounds import LawBounds
-from ..identification.given_law import evaluate_law
+from ..identification.given_law import evaluate_law, problem_at
 from ..identification.problem import Evaluation, FitProblem
-from ..identification.unknowns import Unknowns
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .folds import errors
 
-#: MPa: the law is given and not looked for; bounds only size the unknowns.
-ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
 #: Values of what is no law, by comparison and name, in its units.
 NuisanceValues = Mapping[str, Mapping[str, float]]
 
@@ -51,12 +47,9 @@ def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolve
     """
     name = prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True))
-    ends = law.strain_range.tolist()
-    bounds = LawBounds.of_moduli(ANY)
-    unknowns = Unknowns.of(law.form, law.nu12, ends, bounds, comparisons)
-    problem = FitProblem(comparisons, law, unknowns)
+    problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
-    point = evaluate_law(problem, unknowns.at(law.beta[list(unknowns.free)]))
+    point = evaluate_law(problem, y)
     if point is None:
         return not_judged(name, f"no analysis: {problem.failure}", units)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
@@ -83,14 +76,11 @@ def held_out_part(
     name. name : of the test with its part.
     """
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
-    ends = law.strain_range.tolist()
-    unknowns = Unknowns.of(law.form, law.nu12, ends, LawBounds.of_moduli(ANY), comparisons)
-    problem = FitProblem(comparisons, law, unknowns)
+    problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
-    y = unknowns.at(law.beta[list(unknowns.free)])
     for comparison in comparisons:
         known = nuisance.get(comparison.name, {})
-        places = unknowns.nuisance_places(comparison.name)
+        places = problem.unknowns.nuisance_places(comparison.name)
         y[places] = [known.get(n.name, 0.0) for n in comparison.nuisance]
     point = problem.evaluate(y, False, warm=False)
     if point is None:

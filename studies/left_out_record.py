@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..fits.project import cores
 from ..fits.setup import FitSetup, fingerprints
-from ..fits.store import Store
 from ..notes import Note, NoteKind
 from .held_out import HeldOut
 from .left_out import Part, foretold, name_of
+from .marked import mark_of, read_marked, write_marked
 
 
 def recorded(
@@ -49,25 +47,18 @@ def _mark(setup: FitSetup, parts: Sequence[Part], starts: int) -> str:
     """Of everything that the errors depend on."""
     names = [name_of(setup, part) for part in parts]
     content = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return mark_of(content)
 
 
 def _write(folder: Path, file: str, mark: str, judged: Sequence[HeldOut]) -> None:
-    content = {"of": mark, "parts": [_plain(one) for one in judged]}
     folder.mkdir(parents=True, exist_ok=True)
-    Store(folder).write(file, json.dumps(content, indent=1) + "\n")
+    write_marked(folder, file, mark, {"parts": [_plain(one) for one in judged]})
 
 
 def _written(path: Path, mark: str) -> dict[str, HeldOut]:
     """By name of the part; nothing where it is of something else, or no record at all."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["of"] != mark:
-            return {}
-        judged = [_judged(row) for row in content["parts"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
-    return {one.test: one for one in judged}
+    judged = read_marked(path, mark, lambda told: [_judged(row) for row in told["parts"]])
+    return {one.test: one for one in judged or ()}
 
 
 def _plain(one: HeldOut) -> dict[str, Any]:

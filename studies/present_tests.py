@@ -12,17 +12,14 @@ from ..experiments.base import MakeSolver
 from ..experiments.candidates import Precision
 from ..experiments.notes import strains_of
 from ..fits.setup import SURROGATE, FitSetup
-from ..identification.bounds import LawBounds
-from ..identification.given_law import evaluate_law
+from ..identification.given_law import evaluate_law, problem_at
 from ..identification.information import Array, information
 from ..identification.noise import Noise
 from ..identification.problem import Evaluation, FitProblem
-from ..identification.unknowns import Unknowns
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import Solver
 from ..solvers.registry import solver_named
-from .held_out import ANY
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +66,8 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
         for test, weighting in zip(setup.tests, setup.weightings, strict=True)
         for comparison in test.comparisons(make, weighting)
     )
-    ends = law.strain_range.tolist()
-    unknowns = Unknowns.of(law.form, law.nu12, ends, LawBounds.of_moduli(ANY), comparisons)
-    problem = FitProblem(comparisons, law, unknowns)
-    point = evaluate_law(problem, unknowns.at(law.beta[list(unknowns.free)]), with_jacobian=True)
+    problem, y = problem_at(law, comparisons)
+    point = evaluate_law(problem, y, with_jacobian=True)
     if point is None:
         said = f"the present tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(said, problem.solver.name)

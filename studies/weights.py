@@ -15,9 +15,7 @@ from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import FitSetup
 from ..fits.store import Store
-from ..identification.correction import corrected_fit
-from ..identification.methods import method_named
-from ..identification.optimum import Optimum
+from ..identification.fit import fit_from
 from ..identification.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from .folds import errors
@@ -120,18 +118,11 @@ def refitted(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> W
     """The fit with tests that count so many times, from the unknowns y of a neighbour."""
     setup = replace(found.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()
-    optimum = _optimum(setup, problem, y)
+    optimum = fit_from(problem, y, setup.options, near=True)
     if optimum is None:
         return WeightedFit(count, {}, {}, {}, (), problem.analyses, problem.failure or "no fit")
     best = optimum.best
     return _weighted(setup, found, count, problem, best.residual, best.unknowns, optimum.analyses)
-
-
-def _optimum(setup: FitSetup, problem: FitProblem, y: np.ndarray) -> Optimum | None:
-    method = method_named(setup.options.method)
-    if problem.surrogate is not None and method.needs_slope:
-        return corrected_fit(problem, y, method, setup.options)
-    return method.minimise(problem, y, setup.options)
 
 
 def _weighted(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.rim import rim_form, rim_share
-from ...models.bubble import PRESSURE_OFFSET, THICKNESS, BubbleModel
+from ...models.bubble import PRESSURE_OFFSET, BubbleModel
+from ...models.parameters import THICKNESS
 from ..base import History
 from .derivatives import Derivatives
 from .element import reference_elements
