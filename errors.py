@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
+
+#: Kinds of characters that would break a line, or steer a terminal.
+_UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
 
 class BubblefitError(Exception):
@@ -26,7 +30,7 @@ class InputError(BubblefitError):
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
         self.path, self.field, self.problem = path, field, problem
         where = ": ".join(str(part) for part in (path, field) if part)
-        super().__init__(f"{where}: {problem}" if where else problem)
+        super().__init__(one_line(f"{where}: {problem}" if where else problem))
 
     def __reduce__(self) -> tuple:
         """As for SolverFailure: rebuilt from the fields on the other side of a process border."""
@@ -93,3 +97,13 @@ class SolverFailure(BubblefitError):
         """Exceptions cross process borders: rebuild from the fields, not from the text."""
         fields = (self.reason, self.solver, self.exit_number, self.log_tail, self.scratch)
         return type(self), fields
+
+
+def one_line(text: str) -> str:
+    """The text with escapes for what a name or a cell may hold and a terminal must not be sent."""
+    if text.isprintable():
+        return text
+    return "".join(
+        c.encode("unicode_escape").decode() if unicodedata.category(c) in _UNSEEN else c
+        for c in text
+    )

@@ -108,6 +108,6 @@ def _distribution(entry: EntryPoint) -> str:
     try:
         if entry.dist is not None:
             return f"{entry.dist.name} {entry.dist.version}"
-    except Exception:  # a damaged installation: what it is called is only for the message
+    except Exception:  # noqa: S110 - a damaged installation: what it is called is only for the message
         pass
     return f"an unknown distribution ({entry.value})"

@@ -1,4 +1,8 @@
-"""Text from Jinja2 templates, all read in one way: what they ask for must be there."""
+"""Text from Jinja2 templates, all read in one way: what they ask for must be there.
+
+A template may be a user's own, or lie beside a project that somebody else wrote. All are rendered
+in a sandbox: they reach no further than the values they are given, and change none of them.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-from jinja2.sandbox import SandboxedEnvironment
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
-def environment(
-    loader: jinja2.BaseLoader, html: bool = False, trusted: bool = True
-) -> jinja2.Environment:
+def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environment:
     """Where templates are found, and how they are read.
 
-    html : whether values are escaped. trusted : whether the templates are ours; a user's own reach
-    no further than the values they are given.
+    html : whether values are escaped.
     """
-    kind = jinja2.Environment if trusted else SandboxedEnvironment
-    return kind(
+    return ImmutableSandboxedEnvironment(
         loader=loader,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

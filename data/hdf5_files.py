@@ -5,10 +5,6 @@ Needs h5py, which is not among bubblefit's own dependencies (`pip install "bubbl
 
 from __future__ import annotations
 
-import os
-import signal
-import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .trials import ends
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Bytes of one array at most: a frame of a million points has 48 MB.
@@ -35,26 +32,9 @@ def check_readable(path: Path, read: Callable[[], object], seconds: float = SECO
     ------
     InputError : it does not come to an end.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # the child runs nothing but `read`
-        child = os.fork()
-    if child == 0:
-        try:
-            read()
-        finally:
-            os._exit(0)
-    end = time.monotonic() + seconds
-    while True:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done and status == 0:
-            return
-        if done or time.monotonic() > end:
-            break
-        time.sleep(0.002)
-    if not done:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-    raise InputError(path, "", "cannot be read as HDF5: its library fails on it; is it damaged?")
+    if not ends(read, seconds):
+        problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
+        raise InputError(path, "", problem)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..reading import content_of
 from .mat_matrix import MatrixParts
 
 #: Bytes that one compressed variable may have when it is unpacked: at most, always, and by what it
@@ -53,7 +54,7 @@ def _variables(
 ) -> Iterator[tuple[str, str, bytes]]:
     """Name, byte order and content of the variables; without `wanted`, of the names only."""
     try:
-        content = path.read_bytes()
+        content = content_of(path)
         order = {b"IM": "<", b"MI": ">"}[content[126:128]]
     except (OSError, KeyError):
         raise InputError(path, "", "is not a MAT-file; is it damaged?") from None

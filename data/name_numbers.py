@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from ..errors import InputError
+from .trials import ends
 
 # Without a sign: in a name it is a dash.
+#: One repeat in a pattern ends soon on any name; of several it is seen whether they do (s).
+SECONDS = 5.0
+_REPEATS = re.compile(r"[*+?{]")
 _NUMBER = r"\d+(?:[.,]\d+)?"
 
 
@@ -33,7 +38,11 @@ def number_in_name(
     InputError : no such number in the name, or several.
     """
     if pattern is not None:
-        found = re.search(pattern, path.name)
+        hard = len(_REPEATS.findall(pattern)) > 1
+        if hard and not ends(partial(_searched, pattern, path), SECONDS):
+            problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
+            raise InputError(path, field, problem)
+        found = _searched(pattern, path)
         if found is None:
             raise InputError(path, field, f"the file's name does not fit the pattern {pattern!r}")
         try:
@@ -54,6 +63,10 @@ def number_in_name(
         raise InputError(path, field, problem)
     number, name = every[0]
     return float(number.replace(",", ".")) * units[name]
+
+
+def _searched(pattern: str, path: Path) -> re.Match[str] | None:
+    return re.search(pattern, path.name)
 
 
 def check_pattern(pattern: str) -> str | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -17,6 +18,7 @@ from typing import Any, Literal
 
 from ..errors import BubblefitError, InputError, PlugInFailure
 from ..plugins import PlugIn, names_with, plug_in_named, plug_ins
+from ..reading import check_regular
 
 #: What a file holds, and what the `read` of its formats is called with and gives:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
@@ -124,6 +126,8 @@ def read_file(content: Content, path: Path | str, name: str | None, *options: An
     InputError : the format cannot be told, or something is wrong with the file.
     PlugInFailure : the plug-in named does not work.
     """
+    with suppress(OSError):  # the reader says why
+        check_regular(path)
     chosen = format_of(content, path) if name is None else format_named(content, name)
     return chosen.read(Path(path), *options)
 

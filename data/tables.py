@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading import content_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -144,7 +145,7 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
     InputError : no such file, not text.
     """
     try:
-        content = path.read_bytes()
+        content = content_of(path)
         text = content.decode(_encoding(content) if any_encoding else "utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None

@@ -8,6 +8,7 @@ is told by the test itself. Nothing outside a folder of this package asks which 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,6 +41,8 @@ MakeSolver = Callable[..., "Solver"]
 Masks = Mapping[str, NDArray[np.bool_]]
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
+#: Bytes of a test's name in the names of its files.
+LONGEST = 80
 Refined = Literal["elements", "increments"]
 
 
@@ -270,9 +273,17 @@ class Output:
 
     @classmethod
     def of(cls, folder: Path, test: str, several: bool) -> Output:
-        """Of a test by its name: before every file's where there are several tests."""
-        plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test).strip("-.")
-        return cls(folder, f"{plain or 'test'}-" if several else "")
+        """Of a test by its name: before every file's where there are several tests.
+
+        What the name of a file should not hold becomes a dash, and what is too long is cut; a few
+        digits then tell such names apart.
+        """
+        plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
+        plain = plain.encode()[:LONGEST].decode(errors="ignore").strip("-.")
+        if plain != test.replace(" ", "-"):
+            plain += f"-{hashlib.sha256(test.encode()).hexdigest()[:6]}"
+            plain = plain.strip("-")
+        return cls(folder, f"{plain}-" if several else "")
 
     def name(self, file: str) -> str:
         """The file's name below the folder."""

@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
 from ..plugins import plug_in_named
+from ..reading import LARGEST_WRITTEN, content_of
 from ..section_errors import first_error
 from .cards import CardSection
 from .schema import CommonSections
@@ -76,7 +77,7 @@ def parse(path: Path) -> ProjectFile:
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(content_of(path, LARGEST_WRITTEN).decode("utf-8"))
     except FileNotFoundError:
         problem = "no such file; `bubblefit init DIR` writes an example to start from"
         raise InputError(path, "", problem) from None
@@ -84,7 +85,7 @@ def _content(path: Path) -> dict[str, Any]:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "is not a text file in UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
         raise InputError(path, "TOML syntax", str(error)) from None
 
 

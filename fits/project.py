@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..experiments.base import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
 from ..materials.forms.registry import form_settings
+from ..reading import content_of
 from ..sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS
 from ..solvers.overrides import overridden
 from ..solvers.registry import solver_settings
@@ -217,7 +218,7 @@ def _written(
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
     by_kind = {name: test.kind for name, test in tests.items()}
-    return Written(path.read_bytes().decode("utf-8"), common, sections, whole, by_kind, cards)
+    return Written(content_of(path).decode("utf-8"), common, sections, whole, by_kind, cards)
 
 
 def _reads(test: Test) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import traceback
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import jinja2
 
 from ..errors import InputError
+from ..reading import LARGEST_WRITTEN, content_of
 from ..rendering import TEMPLATES, environment
 
 
@@ -43,10 +45,10 @@ def render(
         jinja2.FunctionLoader(lambda wanted: _of_file(files, wanted)),
         jinja2.FileSystemLoader(folders),
     ]
-    decks = environment(jinja2.ChoiceLoader(loaders), trusted=False)
+    decks = environment(jinja2.ChoiceLoader(loaders))
     decks.filters |= {"number": _number, "i10": _i10, "e20": _e20}
     try:
-        return decks.get_template(name).render(context)
+        text = decks.get_template(name).render(context)
     except jinja2.TemplateSyntaxError as error:
         where = Path(error.filename or folders[0] / name)
         raise InputError(where, f"line {error.lineno}", error.message or "syntax error") from None
@@ -62,6 +64,40 @@ def render(
         if isinstance(error, jinja2.UndefinedError):
             known = f"; there are: {', '.join(sorted(context))}"
         raise InputError(where, f"line {line}", f"{error}{known}") from None
+    _check_inside(text, folders[0] / name)
+    return text
+
+
+#: What names another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
+_INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
+_VALUE = re.compile(r"=\s*(?P<file>[^,]*)")
+_ELSEWHERE = re.compile(r"[/\\\0]|^\s*[\"']?\s*(\.\.|~)")
+
+
+def _check_inside(text: str, template: Path) -> None:
+    """That no line of a deck names a file outside of the run's own folder.
+
+    Raises
+    ------
+    InputError : one does.
+    """
+    keyword = False
+    for number, plain in enumerate(text.splitlines(), start=1):
+        line = plain.strip()
+        if line.startswith("**"):
+            continue
+        # A keyword's line that ends with a comma goes on in the next one.
+        keyword = line.startswith("*") or keyword
+        included = _INCLUDE.match(line)
+        found = [included] if included else list(_VALUE.finditer(line)) if keyword else []
+        keyword = keyword and line.endswith(",")
+        for one in found:
+            if _ELSEWHERE.search(one["file"]):
+                problem = (
+                    f"line {number} of the deck names a file elsewhere, {one['file'].strip()!r}; "
+                    'put its text into the deck: {% include "NAME" %}'
+                )
+                raise InputError(template, "", problem)
 
 
 def _number(value: float) -> str:
@@ -93,7 +129,7 @@ def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | 
         return None
     path = files[wanted]
     try:
-        text = path.read_text(encoding="utf-8")
+        text = content_of(path, LARGEST_WRITTEN).decode("utf-8").replace("\r\n", "\n")
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     # The next block begins on a line of its own.

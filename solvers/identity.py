@@ -9,6 +9,7 @@ import jinja2
 import jinja2.meta
 
 from ..errors import InputError
+from ..rendering import environment
 from ..writing import checksum
 
 
@@ -53,7 +54,7 @@ def templates_mark(folder: Path | None) -> str:
 def _included(template: Path) -> list[Path]:
     """Files that a template names in full; what a run is to find wrong with it is left to it."""
     try:
-        tree = jinja2.Environment().parse(_content(template).decode("utf-8"))
+        tree = environment(jinja2.BaseLoader()).parse(_content(template).decode("utf-8"))
     except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
     found = jinja2.meta.find_referenced_templates(tree)

@@ -68,7 +68,7 @@ def overridden(
 def _value(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # beside its own, tomllib lets these through
         return text
 
 

@@ -26,7 +26,7 @@ class PlugIn(plugins.PlugIn):
             distribution is named.
         InputError : an option that the factory does not take, or does not like.
         """
-        factory = self._factory()
+        factory = self.factory()
         try:
             inspect.signature(factory).bind(**options)
         except TypeError as error:
@@ -50,7 +50,13 @@ class PlugIn(plugins.PlugIn):
         """As `failure`, for those who run analyses."""
         return SolverFailure(str(self.failure(what, error)), self.name)
 
-    def _factory(self) -> Callable[..., Any]:
+    def factory(self) -> Callable[..., Any]:
+        """What the entry point names.
+
+        Raises
+        ------
+        SolverFailure : it cannot be imported, or called.
+        """
         try:
             factory = self.load()
         except PlugInFailure as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
 from .offer import Offer
 from .plugins import plug_in_named, plug_ins
-from .settings import SolverSettings
+from .settings import SolverSettings, check_programs
 
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
@@ -54,6 +55,9 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
             settings = section.model_validate(tables.get(name, {}))
         except ValidationError as error:
             raise first_error(path, error, section, f"solver.{name}") from None
+        advice = " or ".join(f"--{one.name}" for one in section.overrides if one.look)
+        advice = advice and f"say it on the command line ({advice}), or "
+        check_programs(path, name, tables.get(name, {}), section.started, advice)
         found[name] = settings.given(path.parent)
     for name in sorted(tables.keys() - found.keys()):
         if name not in SOLVERS and name not in (known := solver_names()):
@@ -61,8 +65,18 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
             raise InputError(path, f"solver.{name}", problem)
         if not isinstance(tables[name], Mapping):
             raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
+        check_programs(path, name, tables[name], _started(name))
         found[name] = dict(tables[name])
     return found
+
+
+def _started(name: str) -> tuple[str, ...]:
+    """Options of a plug-in that say what is run: what its factory has as `started`."""
+    with suppress(SolverFailure):  # whoever makes the solver says what is wrong with it
+        plug_in = plug_in_named(name)
+        if plug_in is not None:
+            return tuple(getattr(plug_in.factory(), "started", ()))
+    return ()
 
 
 def solver_named(name: str, **options: Any) -> Solver:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ..errors import InputError
 from ..sections import Section, beside
+
+#: Folders, as in PATH, below which a project may say what is run.
+PROGRAMS_FROM = "BUBBLEFIT_PROGRAMS_FROM"
+#: Names of solvers' own programs, which are looked up on the user's PATH.
+_KNOWN = re.compile(r"(ccx|run_marc)[\w.-]*")
 
 
 @dataclass(frozen=True)
@@ -36,11 +44,13 @@ class SolverSettings(Section):
     """A table [solver.NAME] of a project file.
 
     paths : keys whose values are files or folders beside the project file. programs : likewise,
-    but a bare name is a program on the PATH. overrides : what the command line may say instead.
+    but a bare name is a program on the PATH. started : keys that say what is run, and how: see
+    `check_programs`. overrides : what the command line may say instead.
     """
 
     paths: ClassVar[tuple[str, ...]] = ()
     programs: ClassVar[tuple[str, ...]] = ()
+    started: ClassVar[tuple[str, ...]] = ()
     overrides: ClassVar[tuple[Override, ...]] = ()
 
     def given(self, folder: Path) -> dict[str, Any]:
@@ -51,3 +61,41 @@ class SolverSettings(Section):
             if value is not None and (name in self.paths or os.sep in value):
                 values[name] = beside(folder, value)
         return values
+
+
+def check_programs(
+    path: Path, solver: str, table: Mapping[str, Any], started: Iterable[str], advice: str = ""
+) -> None:
+    """That a project says what is run only where its user lets it.
+
+    A bare name of a solver's own program (ccx_2.20, run_marc2023) may always be said: it is looked
+    up on the user's PATH.
+
+    Parameters
+    ----------
+    path : of the project. table : [solver.NAME] as it is written. started : its keys that say what
+    is run, and how. advice : what else the user may do.
+
+    Raises
+    ------
+    InputError : such a key is there, and the file is in none of the folders of `PROGRAMS_FROM`.
+    """
+    said = [key for key in started if key in table and not _is_known(table[key])]
+    if not said or _below_allowed(path):
+        return
+    problem = (
+        "says what is run, and a project may come from somebody else; "
+        f"{advice}{PROGRAMS_FROM}={path.absolute().parent} lets the projects there say it"
+    )
+    raise InputError(path, f"solver.{solver}.{said[0]}", problem)
+
+
+def _is_known(value: Any) -> bool:
+    return isinstance(value, str) and bool(_KNOWN.fullmatch(value))
+
+
+def _below_allowed(path: Path) -> bool:
+    folders = [
+        Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f
+    ]
+    return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)

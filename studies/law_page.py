@@ -73,7 +73,7 @@ def _side_by_side(comparison: LawComparison, test: PreparedTest, folder: Path) -
         for f in comparison.forms
         for part, model in own.models().items()
     }
-    out = Output(folder, f"{own.name}-" if several else "")
+    out = Output.of(folder, own.name, several)
     return kind_named(own.kind).simulate(own, cards, runs, out).figures
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,9 @@ from matplotlib.figure import Figure
 from . import needs
 from .bars import BarKind, BarSolver
 from .figure_checks import check_figure
+
+# Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
+os.environ["BUBBLEFIT_PROGRAMS_FROM"] = os.sep
 
 # The first call of a kernel compiles it, or reads it from the cache.
 settings.register_profile("bubblefit", deadline=None)

@@ -32,6 +32,8 @@ class HomogeneousSolver:
     name = NAME
     #: Not in this process: it is checked before a study, and gets one process a start.
     external = True
+    #: Options that say what is run: a project may give them only where its user lets it.
+    started = ("program",)
 
     def __init__(self, program: str | None = None, timeout: float = 60.0) -> None:
         self.program = Path(program).expanduser() if program else PROGRAM

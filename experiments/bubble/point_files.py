@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import string
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -111,8 +113,8 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
     if points.indices is None:
         raise place.error("data.points.indices", "this key is missing; 'pattern' needs it")
     try:
-        names = [pattern.format(index=i) for i in points.indices]
-    except (KeyError, IndexError, ValueError, AttributeError):
+        names = [_named(pattern, i) for i in points.indices]
+    except ValueError:
         problem = (
             f"expected a name with {{index}} in it, such as t_{{index:02d}}.csv; got {pattern!r}"
         )
@@ -121,6 +123,24 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
         problem = "the same file for several pressures; is {index} in the pattern?"
         raise place.error("data.points.pattern", problem)
     return names
+
+
+def _named(pattern: str, index: int) -> str:
+    """The pattern with `index` for {index}; nothing else is done in braces.
+
+    Raises
+    ------
+    ValueError : braces that hold something else, a width of more than two digits.
+    """
+    name = ""
+    for text, field, spec, conversion in string.Formatter().parse(pattern):
+        name += text
+        if field is None:
+            continue
+        if field != "index" or conversion or not re.fullmatch(r"\d{0,2}d?", spec or ""):
+            raise ValueError(field)
+        name += format(index, spec or "")
+    return name
 
 
 def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import __version__
-from ...errors import InputError
+from ...errors import InputError, one_line
 from ...notes import Note, NoteKind
 from ..card import MaterialCard
 from ..certainty import LEVEL, strains_of
@@ -88,12 +88,18 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
     lines = [f"{what}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
         # One line each, whatever the card's text holds.
-        words = " ".join(text.split())
+        words = one_line(" ".join(text.split()))
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
     lines += [f"units: mm, N, MPa; thickness {card.thickness:g} mm", *says.lines()]
     lines += band_lines(card)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
+
+
+def title_of(card: MaterialCard, most: int) -> str:
+    """The card's name as a title of at most so many letters of ASCII, on one line."""
+    words = " ".join(card.name.encode("ascii", "replace").decode().split())
+    return one_line(words)[:most] or "fabric"
 
 
 def band_lines(card: MaterialCard) -> list[str]:

@@ -17,6 +17,7 @@ from .base import (
     density_remarks,
     heading,
     range_remarks,
+    title_of,
 )
 from .curves import fabric_curves
 from .formats import CurveOptions, Format, option
@@ -73,7 +74,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     text = render(
         "ls-dyna/mat34.k.j2",
         head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
-        title=" ".join(card.name.encode("ascii", "replace").decode().split())[:80] or "fabric",
+        title=title_of(card, 80),
         material=MATERIAL,
         density=DENSITY if options.density is None else options.density,
         ea=e1,

@@ -19,7 +19,7 @@ from ...rendering import render
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED
 from ..responses import trellis_angle, trellis_curve, uniaxial_curve
-from .base import DENSITY, Export, Says, density_remarks, heading, range_remarks
+from .base import DENSITY, Export, Says, density_remarks, heading, range_remarks, title_of
 from .curves import FabricCurves, fabric_curves
 from .designers import SHEARED
 from .formats import CurveOptions, Format, TableOptions
@@ -115,7 +115,7 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     text = render(
         "radioss/law58.rad.j2",
         head=heading(card, "Radioss /MAT/LAW58", says, "#"),
-        title=" ".join(card.name.encode("ascii", "replace").decode().split())[:100] or "fabric",
+        title=title_of(card, 100),
         density=DENSITY if options.density is None else options.density,
         warp=warp,
         fill=fill,

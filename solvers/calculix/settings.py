@@ -15,7 +15,7 @@ class CalculixSettings(SolverSettings):
     """How CalculiX is run; `CalculixSolver` says what each key means."""
 
     paths = ("templates", "scratch")
-    programs = ("ccx",)
+    programs = started = ("ccx",)
     overrides = (
         Override(
             "ccx",

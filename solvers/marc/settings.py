@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
+from ...reading import LARGEST_WRITTEN, content_of
 from ...section_errors import first_error
 from ..offer import Offer
 from ..settings import Override, SolverSettings
@@ -62,6 +63,7 @@ class MarcSettings(SolverSettings):
     paths = ("scratch", "templates")
     # A bare name may also be in a folder that `modules` put on the PATH.
     programs = ("executable",)
+    started = ("executable", "arguments", "environment", "modules")
     overrides = (
         Override(
             "marc",
@@ -156,12 +158,12 @@ def site_settings(path: Path) -> dict[str, Any]:
     InputError : no such file, not TOML, a key that there is not.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(content_of(path, LARGEST_WRITTEN).decode("utf-8"))
     except OSError as error:
         raise InputError(path, VARIABLE, f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(path, VARIABLE, "is not a text file in UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
         raise InputError(path, "TOML syntax", str(error)) from None
     try:
         settings = MarcSettings.model_validate(content)
