@@ -30,10 +30,11 @@ if TYPE_CHECKING:
     from .fits.simulation import simulate
     from .materials.card import MaterialCard, read_card
     from .studies.plan import plan
+    from .studies.profile import profile
 
 __version__ = "0.2.0"
-__all__ = ["Fit", "MaterialCard", "Project", "fit", "plan", "predict", "read_card",
-           "read_project", "simulate"]  # fmt: skip
+__all__ = ["Fit", "MaterialCard", "Project", "fit", "plan", "predict", "profile",
+           "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -44,6 +45,7 @@ _PLACES = {
     "fit": "fits.fit",
     "plan": "studies.plan",
     "predict": "fits.predictions",
+    "profile": "studies.profile",
     "read_card": "materials.card",
     "read_project": "fits.project",
     "simulate": "fits.simulation",

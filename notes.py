@@ -56,6 +56,8 @@ class NoteKind(StrEnum):
     ALONE = "undetermined alone"
     INVERSE_CRIME = "inverse crime"
     ABOVE_NOISE = "above the noise"
+    NOT_THE_CARD = "not where the card is"
+    NOT_CLOSED = "profile not closed"
     DISCREPANCY = "wrong form"
     SURFACES = "unfaithful surfaces"
     FLAT_SHEET = "sheet taken for flat"

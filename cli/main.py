@@ -19,6 +19,7 @@ COMMANDS = {
     "check": ("check", "Look at the data before anything is fitted."),
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "validate": ("validate", "Does a fit foretell the test that it was not given?"),
+    "profile": ("profile", "Between what does a modulus lie? Its profile likelihood."),
     "plan": ("plan", "Which test next? Predicted uncertainty of tests that could be made."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),

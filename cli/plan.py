@@ -23,7 +23,7 @@ from .arguments import (
 )
 from .exits import exits
 from .options import data_folders, numbers, read_with_solver, result_folder
-from .progress import CountProgress
+from .progress import NamedProgress
 
 EPILOG = """Examples:
 
@@ -82,7 +82,7 @@ def command(
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
     folder = result_folder(path, "plan", options["out"], options["overwrite"])
-    with _Progress(options["quiet"] or options["as_json"]) as progress:
+    with NamedProgress("tests", options["quiet"] or options["as_json"]) as progress:
         made = plan(
             project,
             card,
@@ -105,20 +105,3 @@ def _noise(given: str) -> tuple[str, float]:
     except ValueError:
         problem = f"expected KIND=VALUE, such as strips=20, got {given!r}"
         raise InputError(None, "--noise", problem) from None
-
-
-class _Progress(CountProgress):
-    """Candidates done, the one whose turn it is, time left."""
-
-    def __init__(self, quiet: bool) -> None:
-        super().__init__("tests", 0, 0, quiet)
-        self.now = ""
-
-    def saw(self, done: int, total: int, name: str) -> None:
-        """Take note of a candidate whose turn comes."""
-        self.done, self.total, self.now = done, total, name
-        self.show()
-
-    def note(self) -> str:
-        """What is computed, and time left."""
-        return f"{self.now}, {self.left()}"

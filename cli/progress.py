@@ -104,6 +104,23 @@ class CountProgress(LiveLine):
         return f"{each * (self.total - self.done):.0f} s left"
 
 
+class NamedProgress(CountProgress):
+    """Things done, the one whose turn it is, time left."""
+
+    def __init__(self, what: str, quiet: bool) -> None:
+        super().__init__(what, 0, 0, quiet)
+        self.now = ""
+
+    def saw(self, done: int, total: int, name: str) -> None:
+        """Take note of how many are done, and of the one whose turn comes where it has a name."""
+        self.done, self.total, self.now = done, total, name or self.now
+        self.show()
+
+    def note(self) -> str:
+        """What is computed, and time left."""
+        return f"{self.now}, {self.left()}" if self.now else self.left()
+
+
 class StudyProgress(CountProgress):
     """Starts done, best objective, time left."""
 

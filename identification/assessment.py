@@ -14,10 +14,11 @@ from ..notes import Note, NoteKind
 from .bands import bands_of
 from .discrepancy import Discrepancy, discrepancies, notes_of_discrepancies
 from .discretisation import Limit
+from .linear import sizes_of
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
-from .propagation import LEFT, POINTS, PRIOR, along, moduli_of, posteriors_of, sizes_of
+from .propagation import LEFT, POINTS, PRIOR, along, moduli_of, posteriors_of
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
 from .comparison import Comparison
+from .linear import sizes_of
 from .nuisance import Nuisance
-from .propagation import PRIOR, along, sizes_of
+from .propagation import PRIOR, along
 from .unknowns import Unknowns
 
 Array = NDArray[np.float64]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..materials.forms.base import COMPONENTS, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .discretisation import Limit
+from .linear import Linear
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
@@ -21,14 +22,10 @@ Array = NDArray[np.float64]
 POINTS = 61
 #: Relative uncertainty of a modulus of which nothing is known.
 PRIOR = 10.0
-#: Of the largest curvature of the misfit: below, the data say nothing of a direction.
-FLAT = 1e-13
 #: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
 #: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
 #: (benchmarks/bench_bias.py).
 LEFT = 0.1
-#: Of the largest norm of a block: smaller ones weigh no more than this one does.
-SMALLEST = 1e-6
 
 
 def posteriors_of(
@@ -45,42 +42,18 @@ def posteriors_of(
     A direction of which the data say nothing is as uncertain as a modulus of which nothing is
     known.
     """
-    assert best.jacobian is not None
-    weights = np.sqrt(weights_of(problem, best.residual, noise))
-    sizes = sizes_of(problem.unknowns, best.unknowns)
-    j = best.jacobian * sizes * weights[:, None]
-    curvature, directions = np.linalg.eigh(j.T @ j)
-    good = curvature > FLAT * curvature[-1]
-    sharp, flat = directions[:, good], directions[:, ~good]
-    estimator = (sharp / curvature[good]) @ sharp.T @ j.T
-    moved = estimator * (weights * noise.rows)
-    scaled = moved @ moved.T + PRIOR**2 * flat @ flat.T
+    linear = Linear.of(problem, best, noise)
+    weights, sizes, moved = linear.weights, linear.sizes, linear.moved
+    scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
     covariance = np.asarray(scaled * sizes[:, None] * sizes)
 
     def centre(residual: Array) -> Array:
-        return np.asarray(best.unknowns - sizes * (estimator @ (weights * residual)))
+        return np.asarray(best.unknowns - sizes * (linear.estimator @ (weights * residual)))
 
     own = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
     if limit is None:
         return own, None
     return own, own.moved(limit.step, centre(best.residual + limit.error), LEFT)
-
-
-def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
-    """(m,) of the squares of the residuals, near the least sum of the norms of their blocks."""
-    blocks = problem.blocks
-    norms = np.maximum(blocks.norms(residual), blocks.norms(noise.least))
-    largest = norms.max()
-    if not largest > 0:
-        return np.ones_like(residual)
-    return np.asarray(1.0 / np.maximum(norms, SMALLEST * largest)[blocks.of])
-
-
-def sizes_of(unknowns: Unknowns, best: Array) -> Array:
-    """(unknowns,) what each is large or small beside: itself, or the width of its bounds."""
-    lower, upper = unknowns.nuisance.bounds
-    law = np.abs(best[: unknowns.size])
-    return np.concatenate([np.maximum(law, 1e-3), np.maximum(upper - lower, 1e-3)])
 
 
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:

@@ -22,7 +22,7 @@ from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..notes import Note, NoteKind
 from .planned import NOW, WORST, Plan, Planned
 from .present_tests import Present, present_tests, solver_maker
-from .series import card_of, card_words, thickness_notes
+from .series import card_of, card_words, fitted_card, thickness_notes
 
 #: Told how many of how many analyses are done, and of what.
 Progress = Callable[[int, int, str], None]
@@ -69,7 +69,7 @@ def plan(
         if name not in known or not value > 0:
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(known)}"
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
-    material = card_of(project, card if card is not None else _fitted(project))
+    material = card_of(project, card if card is not None else fitted_card(project))
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     setup = prepare_fit(project, chosen)
     present = present_tests(setup, material)
@@ -121,18 +121,6 @@ def plan(
         _following(asked, before, found, rank),
         notes,
     )
-
-
-def _fitted(project: Project) -> Path:
-    """The card that the project's fit left in its usual folder."""
-    from ..fits.cards import FITTED
-    from ..fits.store import usual_folder
-
-    path = usual_folder(project.path) / FITTED
-    if not path.is_file():
-        problem = f"no fit left a card in {path}: fit first (bubblefit fit), or name a card"
-        raise InputError(project.path, "--card", problem)
-    return path
 
 
 def _ends(

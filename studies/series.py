@@ -13,8 +13,9 @@ from ..experiments.base import Refined, Studied, Test
 from ..experiments.notes import notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..fits.analyses import Analyses, Progress
-from ..fits.cards import chosen_cards
+from ..fits.cards import FITTED, chosen_cards
 from ..fits.project import Project
+from ..fits.store import usual_folder
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, write_notes
@@ -142,6 +143,20 @@ def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
         return card
     (chosen,) = chosen_cards(project, [card]).values()
     return chosen
+
+
+def fitted_card(project: Project) -> Path:
+    """The card that the project's fit left in its usual folder.
+
+    Raises
+    ------
+    InputError : there is none.
+    """
+    path = usual_folder(project.path) / FITTED
+    if not path.is_file():
+        problem = f"no fit left a card in {path}: fit first (bubblefit fit), or name a card"
+        raise InputError(project.path, "--card", problem)
+    return path
 
 
 def card_words(card: MaterialCard | Path | str) -> str:

@@ -128,6 +128,15 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.DISCREPANCY: (
         (fits.notes_of_form, r"0\.036 mm of what the fit leaves is smooth over the whole sheet"),
     ),
+    K.NOT_THE_CARD: (
+        (fits.notes_of_profile, "another optimum fits the data better than the card's"),
+    ),
+    K.NOT_CLOSED: (
+        (
+            fits.notes_of_profile,
+            r"strain 0\.02: not closed above: the bound of the fit at 12",
+        ),
+    ),
     K.SURFACES: ((fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),
     K.FLAT_SHEET: ((fits.notes_of_bubble, "the sheet is taken for flat and taut"),),
     K.UNMATCHED: ((fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),),

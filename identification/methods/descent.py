@@ -33,6 +33,8 @@ def descend(
     max_analyses: int,
     norms: bool = False,
     only: Flags | None = None,
+    damping: float = FIRST_DAMPING,
+    negligible: float = NEGLIGIBLE,
 ) -> tuple[Evaluation, str]:
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
 
@@ -41,13 +43,15 @@ def descend(
     point : evaluated with its Jacobian.
     norms : minimise e itself, the sum of the blocks' norms, not that of their squares.
     only : (unknowns,) which may change; all unless given.
+    damping : to begin with. negligible : predicted relative decrease of the sum of squares that is
+        not worth an analysis.
 
     Returns
     -------
     The last (best) point, and how it ended: CONVERGED, LEVEL or ANALYSES_USED_UP.
     """
     end = CONVERGED if norms else LEVEL
-    damping, growth, idle = FIRST_DAMPING, 2.0, 0
+    growth, idle = 2.0, 0
     scale: Array | None = None
     while True:
         if point.value < tolerance:
@@ -75,7 +79,7 @@ def descend(
                 damping *= 10.0
                 continue
             predicted = -(2.0 * gradient @ step + step @ curvature @ step)
-            if predicted < NEGLIGIBLE * merit:
+            if predicted < negligible * merit:
                 return point, end
             trial = problem.evaluate(point.unknowns + step, True)
             if trial is not None and not trial.stable:
@@ -131,13 +135,28 @@ def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array
     return np.asarray(1.0 / np.sqrt(sizes))[problem.blocks.of]
 
 
-def bounded_step(hessian: Array, gradient: Array, a: Array, c: Array, y: Array) -> Array | None:
-    """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer."""
+def bounded_step(
+    hessian: Array,
+    gradient: Array,
+    a: Array,
+    c: Array,
+    y: Array,
+    plane: tuple[Array, float] | None = None,
+) -> Array | None:
+    """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer.
+
+    plane : (row, value), to which the step leads: row (y + s) = value.
+    """
     unit = 1.0 / np.sqrt(np.diag(hessian))
     scaled = hessian * unit[:, None] * unit[None, :]
     room = np.minimum(c - a @ y, 0.0) - 1e-12
+    if plane is not None:
+        row, value = plane
+        a, room = np.vstack([row, a]), np.concatenate([[value - row @ y], room])
     try:
-        solution = quadprog.solve_qp(scaled, -gradient * unit, (a * unit).T, room)[0]
+        solution = quadprog.solve_qp(
+            scaled, -gradient * unit, (a * unit).T, room, int(plane is not None)
+        )[0]
     except ValueError:
         return None
     return np.asarray(solution * unit)

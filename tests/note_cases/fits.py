@@ -22,6 +22,7 @@ from bubblefit.fits import mesh_error
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.identification.assessment import Certainty, certainty
 from bubblefit.identification.discrepancy import Discrepancy, notes_of_discrepancies
+from bubblefit.identification.likelihood import BOUND, Side
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
@@ -29,6 +30,7 @@ from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.studies.folds import FoldError
 from bubblefit.studies.laws import FormFit, LawComparison
+from bubblefit.studies.profiled import Profile
 
 from ..identification import cases
 from ..projects import constant_strips, small
@@ -98,6 +100,12 @@ def notes_of_form(*_: Any) -> Iterable[Note]:
     """Of what a fit leaves, much is smooth."""
     found = Discrepancy(ratio=22.6, largest=1.25, rms=0.036, unit="mm")
     return notes_of_discrepancies({"bubble": found})
+
+
+def notes_of_profile(*_: Any) -> Iterable[Note]:
+    """A modulus that a bound stops, and whose data are fitted better elsewhere."""
+    sides = Side((10.0, 9.0), (0.0, 5.0), "", 1), Side((10.0, 12.0), (0.0, -1.0), BOUND, 1)
+    return Profile("G12", 0.02, 10.0, 1.0, (9.0, 11.0), *sides, (1.0, 12.0)).notes
 
 
 def notes_of_limit(*_: Any) -> Iterable[Note]:

@@ -1,0 +1,97 @@
+"""`bubblefit profile PROJECT.toml`: between what does a modulus lie, if nothing is linearised?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import InputError
+from .arguments import (
+    AS_JSON,
+    DATA,
+    JOBS,
+    OVERWRITE,
+    PROJECT,
+    QUIET,
+    TESTS,
+    Decorator,
+    out_option,
+    solver_choice,
+    with_options,
+)
+from .exits import exits
+from .options import data_folders, numbers, read_with_solver, result_folder
+from .progress import NamedProgress
+
+EPILOG = """Examples:
+
+\b
+  bubblefit profile fabric.toml
+  bubblefit profile fabric.toml --modulus G12=0.02,0.05 --modulus E1=0
+  bubblefit profile fabric.toml --modulus G12 --strain 0.05 --card other/material.toml
+"""
+
+
+def _options(command: Any) -> Any:
+    decorators: list[Decorator] = [
+        PROJECT,
+        click.option(
+            "--modulus", "moduli", multiple=True, metavar="NAME[=STRAINS]",
+            help="E1, E2 or G12, and at which strains; several [all, at half the strain reached].",
+        ),
+        click.option(
+            "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
+        ),
+        click.option(
+            "--card", help="Of the fit: a card's file or name [that of the project's fit]."
+        ),
+        TESTS,
+        out_option("out/NAME-profile"),
+        DATA,
+        solver_choice,
+        JOBS,
+        OVERWRITE,
+        AS_JSON,
+        QUIET,
+    ]  # fmt: skip
+    return with_options(exits(command), decorators)
+
+
+@click.command("profile", epilog=EPILOG)
+@_options
+def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **options: Any) -> None:
+    """Profile likelihood of moduli: between what does each lie with 95 %?
+
+    Holds a modulus of the fit of PROJECT.toml away from its best, fits everything else anew, and
+    goes on until the data contradict or a bound is met. Writes profile.csv, profile.png,
+    report.html and result.json.
+    """
+    from ..studies.profile import profile
+
+    path: Path = options["project"]
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    project = project.with_fit(jobs=options["jobs"])
+    asked = _asked(moduli, strain)
+    folder = result_folder(path, "profile", options["out"], options["overwrite"])
+    with NamedProgress("sides", options["quiet"] or options["as_json"]) as progress:
+        found = profile(project, asked, card, options["tests"] or None, progress=progress.saw)
+    found.write(folder)
+    lines = [*found.lines(), f"written to {folder} (open report.html)"]
+    click.echo(json.dumps(found.result, indent=1) if options["as_json"] else "\n".join(lines))
+
+
+def _asked(moduli: Sequence[str], strain: str | None) -> dict[str, list[float]] | None:
+    """Strains by modulus; one that is named twice has those of both."""
+    common = [] if strain is None else numbers(strain, "--strain")
+    if common and not moduli:
+        raise InputError(None, "--strain", "goes with --modulus NAME")
+    asked: dict[str, list[float]] = {}
+    for given in moduli:
+        name, equals, strains = given.partition("=")
+        own = numbers(strains, "--modulus") if equals else common
+        asked.setdefault(name, []).extend(own)
+    return asked or None

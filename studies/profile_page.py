@@ -1,0 +1,81 @@
+"""The folder of profile likelihoods: profile.csv and .png, report.html, notes.csv, result.json."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..fits.store import RESULT
+from ..identification.bands import LEVEL
+from ..identification.likelihood import THRESHOLD
+from ..notes import NOTES, NOTES_ARE, write_notes
+from ..reports import Report, Table, write_report
+from ..reports.likelihoods import ProfilePanel, plot_likelihoods
+from ..writing import replacing, write_text
+from .profiled import METHOD
+
+if TYPE_CHECKING:
+    from .profiled import Profile, Profiles
+
+TABLE, FIGURE = "profile.csv", "profile.png"
+
+
+def write_profiles(found: Profiles, folder: Path) -> Path:
+    """Write everything; raises OutputError. The page's path."""
+    (folder / RESULT).unlink(missing_ok=True)
+    with replacing(folder / TABLE) as path:
+        found.table().to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
+    panels = [
+        ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
+        for one in found.each
+    ]
+    plot_likelihoods(folder / FIGURE, panels, THRESHOLD)
+    write_notes(folder, found.notes)
+    page = write_report(folder, _page(found))
+    write_text(folder / RESULT, json.dumps(found.result, indent=1) + "\n")
+    return page
+
+
+def _page(found: Profiles) -> Report:
+    first = found.each[0]
+    caption = (
+        "-2 log L of each modulus held at a value, everything else fitted anew (dots), and to "
+        "first order without the bounds of the fit (dashed); the horizontal line is the threshold "
+        f"of {100 * LEVEL:.0f} %"
+    )
+    return Report(
+        title=f"{found.title}: profile likelihood",
+        summary=f"{first.name}: {first.words}.",
+        facts=[
+            ("card", found.card),
+            ("tests", ", ".join(found.tests)),
+            ("analyses", found.analyses),
+        ],
+        warnings=[note.line for note in found.notes],
+        figures=[(FIGURE, caption)],
+        tables=[_ends(found)],
+        files=[
+            (TABLE, "the curves"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers of this page, for programs"),
+        ],
+    )
+
+
+def _ends(found: Profiles) -> Table:
+    header = [
+        "modulus", "MPa", f"{100 * LEVEL:.0f} % from, MPa", "to, MPa", "to first order from, MPa",
+        "to, MPa", "upper over lower distance", "analyses",
+    ]  # fmt: skip
+    rows = [_row(one) for one in found.each]
+    return Table("Between what each modulus lies", header, rows, METHOD)
+
+
+def _row(one: Profile) -> list[object]:
+    low, high = (
+        end if end is not None else f"not closed: {side.why}"
+        for end, side in zip(one.ends, (one.below, one.above), strict=True)
+    )
+    skew = "" if one.asymmetry is None else one.asymmetry
+    return [one.name, one.best, low, high, *one.band, skew, one.analyses]

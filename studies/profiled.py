@@ -1,0 +1,227 @@
+"""Profile likelihoods: ends, words, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..identification.bands import LEVEL
+from ..identification.likelihood import BOUND, THRESHOLD, Side
+from ..notes import Note, NoteKind, rows
+from ..notes import lines as note_lines
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Of the distances of the ends from the best: beyond, they are said to be asymmetric.
+ASYMMETRIC = 1.3
+#: Of -2 log L, below the best: another optimum is better.
+BETTER = -0.5
+METHOD = (
+    "The modulus is held at values ever farther from its best and everything else is fitted anew, "
+    "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
+    "by, scaled so that to first order it passes the threshold where the band of the fit ends "
+    "(noise alone, neighbouring values that err as one counted as one; the error of the mesh is "
+    "in neither)."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Of one modulus at one strain, MPa.
+
+    best : of the fit. sigma : one standard deviation to first order. band : its band by the noise,
+    within the bounds. below, above : the profile to either side. allowed : the least and the
+    largest value that the bounds of the fit allow.
+    """
+
+    modulus: str
+    strain: float
+    best: float
+    sigma: float
+    band: tuple[float, float]
+    below: Side
+    above: Side
+    allowed: tuple[float, float]
+
+    @property
+    def name(self) -> str:
+        """The modulus and where."""
+        return f"{self.modulus} at strain {self.strain:.4g}"
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Where the threshold is passed; None where it is not."""
+        return self.below.end, self.above.end
+
+    @property
+    def analyses(self) -> int:
+        """Of both sides."""
+        return self.below.analyses + self.above.analyses
+
+    @property
+    def asymmetry(self) -> float | None:
+        """Distance of the upper end over that of the lower one; None where one is not there."""
+        low, high = self.ends
+        if low is None or high is None or not low < self.best < high:
+            return None
+        return (high - self.best) / (self.best - low)
+
+    @property
+    def curve(self) -> tuple[list[float], list[float]]:
+        """Moduli (MPa), rising, and -2 log L there."""
+        values = [*self.below.values[:0:-1], *self.above.values]
+        return values, [*self.below.ratios[:0:-1], *self.above.ratios]
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        low, high = (
+            _end(end, side, limit)
+            for end, side, limit in zip(
+                self.ends, (self.below, self.above), self.allowed, strict=True
+            )
+        )
+        said = (
+            f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
+            f"(to first order {self.band[0]:.4g} to {self.band[1]:.4g})"
+        )
+        skew = self.asymmetry
+        if skew is not None and not 1 / ASYMMETRIC <= skew <= ASYMMETRIC:
+            low_end, high_end = self.ends
+            assert low_end is not None and high_end is not None
+            said += (
+                f"; asymmetric: {self.best - low_end:.3g} below, {high_end - self.best:.3g} above"
+            )
+        return said
+
+    @property
+    def notes(self) -> list[Note]:
+        """Where the data contradict no value on a side, or another optimum is better."""
+        told = []
+        for word, side in (("below", self.below), ("above", self.above)):
+            if side.why:
+                told.append(
+                    Note(
+                        NoteKind.NOT_CLOSED,
+                        f"not closed {word}: {_why(side)} at {side.values[-1]:.4g} MPa, where -2 "
+                        f"log L is {side.ratios[-1]:.2g} of {THRESHOLD:.3g}",
+                        self.name,
+                    )
+                )
+        if min(*self.below.ratios, *self.above.ratios) < BETTER:
+            words = "another optimum fits the data better than the card's: fit with more starts"
+            told.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
+        return told
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """For result.json."""
+        values, ratios = self.curve
+        return {
+            "modulus": self.modulus,
+            "strain": self.strain,
+            "MPa": self.best,
+            "lower_MPa": self.ends[0],
+            "upper_MPa": self.ends[1],
+            "first_order_sigma_MPa": self.sigma,
+            "first_order_lower_MPa": self.band[0],
+            "first_order_upper_MPa": self.band[1],
+            "asymmetry": self.asymmetry,
+            "not_closed": {
+                word: side.why
+                for word, side in (("below", self.below), ("above", self.above))
+                if side.why
+            },
+            "curve_MPa": values,
+            "curve_minus_2_log_L": ratios,
+            "analyses": self.analyses,
+        }
+
+
+def _why(side: Side) -> str:
+    return "the bound of the fit" if side.why == BOUND else side.why
+
+
+def _end(end: float | None, side: Side, limit: float) -> str:
+    if end is not None:
+        return f"{end:.4g}"
+    if side.why == BOUND:
+        return f"the bound, {limit:.4g},"
+    return f"beyond {side.values[-1]:.4g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """What the data say of moduli, each for itself.
+
+    Parameters
+    ----------
+    card : what it is named. tests : that are fitted. analyses : in all, the optimum's among them.
+    """
+
+    title: str
+    project: Path
+    card: str
+    tests: Sequence[str]
+    each: Sequence[Profile]
+    analyses: int
+    notes: Sequence[Note] = ()
+
+    def table(self) -> pd.DataFrame:
+        """A row for every value that was held: modulus, strain, MPa, minus_2_log_L,
+        first_order (what it would be if nothing were curved)."""
+        import pandas as pd
+
+        found = []
+        for one in self.each:
+            values, ratios = (np.array(v) for v in one.curve)
+            found.append(
+                pd.DataFrame(
+                    {
+                        "modulus": one.modulus,
+                        "strain": one.strain,
+                        "MPa": values,
+                        "minus_2_log_L": ratios,
+                        "first_order": ((values - one.best) / one.sigma) ** 2,
+                    }
+                )
+            )
+        return pd.concat(found, ignore_index=True)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What result.json says."""
+        return {
+            "command": "profile",
+            "title": self.title,
+            "project": str(self.project),
+            "card": self.card,
+            "tests": list(self.tests),
+            "level": LEVEL,
+            "threshold": THRESHOLD,
+            "profiles": [one.numbers for one in self.each],
+            "analyses": self.analyses,
+            "method": METHOD,
+            "notes": rows(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """For the terminal."""
+        told = [f"{one.name}: {one.words}" for one in self.each]
+        return [*told, f"{self.analyses} analyses", *note_lines(self.notes)]
+
+    def write(self, folder: Path | str) -> None:
+        """Write profile.csv, profile.png, report.html, notes.csv and, last, result.json.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from .profile_page import write_profiles
+
+        write_profiles(self, Path(folder))
