@@ -34,6 +34,7 @@ OVERWRITE: Decorator = click.option(
 AS_JSON: Decorator = click.option(
     "--json", "as_json", is_flag=True, help="Print result.json on stdout."
 )
+NO_CACHE = "Run another program also where its run is kept (see `bubblefit cache`)."
 QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
 
 
@@ -71,13 +72,18 @@ def solver_choice(command: Command) -> Command:
     known = command_line()
 
     @functools.wraps(command)
-    def wrapped(*args: Any, solver: str | None, solver_option: Sequence[str], **kwargs: Any) -> Any:
-        given = {"solver": solver, "settings": solver_option}
+    def wrapped(
+        *args: Any, solver: str | None, solver_option: Sequence[str], cache: bool, **kwargs: Any
+    ) -> Any:
+        given = {"solver": solver, "settings": solver_option, "cache": cache}
         given |= {one.name: kwargs.pop(one.name) for one in known}
         return command(*args, solver_given=given, **kwargs)
 
+    cached = click.option("--no-cache", "cache", flag_value=False, default=True, help=NO_CACHE)
     words = "A setting of the solver as in [solver.NAME]; may be given more than once."
-    decorated = click.option(f"--{ANY}", metavar="KEY=VALUE", multiple=True, help=words)(wrapped)
+    decorated = click.option(f"--{ANY}", metavar="KEY=VALUE", multiple=True, help=words)(
+        cached(wrapped)
+    )
     for one in reversed(known):
         kind = PATH if one.path else str
         option = click.option(f"--{one.name}", metavar=one.metavar, type=kind, help=one.what)

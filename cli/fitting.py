@@ -136,8 +136,9 @@ def lines_of(fit: Fit, folder: Path) -> list[str]:
     from ..notes import lines as note_lines
 
     result, best = fit.result, fit.best
-    runs = result["external_runs"]
-    external = f" ({runs} of {result['solver']})" if runs else ""
+    runs, cached = result["external_runs"], result["cached_runs"]
+    kept = f", {cached} from the cache" if cached else ""
+    external = f" ({runs} of {result['solver']}{kept})" if runs or cached else ""
     middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
     lines = [
         f"best {result['objective_is']}: {fit.objective:.3g} (median {middle:.3g} of "

@@ -30,6 +30,7 @@ COMMANDS = {
     "init": ("init", "Write a commented project: an example, or for your own tests."),
     "schema": ("schema", "The JSON Schema of the project file, for editors."),
     "verify": ("verify", "Published and closed-form numbers beside this program's."),
+    "cache": ("cache", "Runs of other programs that are kept: how many, where; fewer."),
     "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
 }
 

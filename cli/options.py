@@ -86,7 +86,9 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
     ------
     InputError : an option of a solver that does not run.
     """
-    mine = {k: v for k, v in given.items() if k not in ("solver", "settings")}
+    mine = {k: v for k, v in given.items() if k not in ("solver", "settings", "cache")}
+    if not given.get("cache", True):
+        project = project.with_fit(cache=False)
     return project.with_solver(given["solver"], mine, given.get("settings", ()))
 
 

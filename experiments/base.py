@@ -314,10 +314,11 @@ class Studied:
 class RunRecord:
     """How a run of one test with one card ended, as it is stored.
 
-    seconds : wall clock. failure : why there is no result, "" where there is one; early : the
-    solver's own word for why it could go no further than it did, "" where it came to the end.
-    strain : (3,) largest (eps1, eps2, gamma12). arrays : what the kind of test keeps of the
-    history. iterations, unstable, remarks : as the solver says them.
+    seconds : wall clock, of when it was made. failure : why there is no result, "" where there is
+    one; early : the solver's own word for why it could go no further than it did, "" where it came
+    to the end. strain : (3,) largest (eps1, eps2, gamma12). arrays : what the kind of test keeps of
+    the history. iterations, unstable, remarks : as the solver says them. from_cache : it was made
+    earlier and taken from the cache of runs.
     """
 
     seconds: float
@@ -328,6 +329,7 @@ class RunRecord:
     iterations: int = 0
     unstable: tuple[str, ...] | None = None
     remarks: tuple[Note, ...] = ()
+    from_cache: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,13 +23,14 @@ def record_of(
     if isinstance(outcome, History):
         try:
             return RunRecord(
-                seconds,
+                seconds if outcome.took is None else outcome.took,
                 early=kind.early(model, outcome),
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
                 arrays=kind.arrays(model, outcome),
                 iterations=outcome.iterations,
                 unstable=outcome.unstable,
                 remarks=tuple(map(as_note, outcome.remarks)),
+                from_cache=outcome.from_cache,
             )
         except SolverFailure as failure:
             outcome = failure

@@ -70,6 +70,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
                 "status": r.status,
                 "analyses": r.analyses,
                 "external_runs": r.external_runs,
+                "cached_runs": r.cached_runs,
                 **({} if fit.coarse_to_fine is None else coarse_columns(r)),
             }
             for r in records
@@ -77,6 +78,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "coarse_to_fine": None if fit.coarse_to_fine is None else fit.coarse_to_fine.to_json(),
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
+        "cached_runs": sum(r.cached_runs for r in records),
         "warnings": [],
         "notes": [],
         "wall_s": fit.wall_s,

@@ -77,8 +77,9 @@ def _page(fit: Fit, folder: Path) -> Report:
         for t in fit.setup.tests
     }
     shown = list(exhibits.values())
-    runs = result["external_runs"]
-    external = [(f"of them by {project.fit.solver}", runs)] if runs else []
+    runs, cached = result["external_runs"], result["cached_runs"]
+    external = [(f"of them by {project.fit.solver}", runs)] if runs or cached else []
+    external += [("of them from the cache", cached)] if cached else []
     pins = fit.pinned
     own = [
         (label if len(shown) == 1 else f"{name}: {label}", value)

@@ -58,6 +58,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             ("cards", len(result["cards"])),
             ("solver", result["solver"]),
             ("wall time, s", float(result["wall_s"])),
+            *([("runs from the cache", predictions.cached)] if predictions.cached else []),
             ("seconds of all runs", float(sum(run.record.seconds for run in each))),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],

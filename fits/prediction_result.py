@@ -77,6 +77,7 @@ class Predictions:
             "runs": [self._numbers(i) for i in range(len(self.each))],
             "notes": note_rows(self.notes),
             "worst_relative_error": self.worst,
+            "cached_runs": self.cached,
             "wall_s": self.wall_s,
             "versions": versions(),
             **({} if self.record is None else {"provenance": PROVENANCE}),
@@ -114,6 +115,11 @@ class Predictions:
     def failed(self) -> list[int]:
         """Numbers of the runs that failed."""
         return [i for i, run in enumerate(self.each) if run.record.failure]
+
+    @property
+    def cached(self) -> int:
+        """How many of the runs were made earlier by another program, and not again."""
+        return sum(run.record.from_cache for run in self.each)
 
     def silent(self) -> list[int]:
         """Numbers of the runs of measured tests that gave nothing to compare."""

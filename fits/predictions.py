@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ..content import digest_of
 from ..errors import InputError, SolverFailure
 from ..experiments.base import Predicted, PredictedRun, RunRecord, Test
 from ..experiments.notes import notes_of_record, other_thickness
@@ -20,7 +21,6 @@ from ..materials.law import HypoelasticLaw
 from ..solvers.base import BandedSolver, BandEnd, Solver
 from ..solvers.registry import solver_named, usable_solver
 from .cards import Cards, card_sources, chosen_cards
-from .content import digest_of
 from .facts import solver_facts
 from .failure_page import failure_page
 from .prediction_result import Predictions, predicted_kind
@@ -236,7 +236,8 @@ def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
 def _usable(project: Project) -> Solver:
     """The project's solver; what is wrong with it shows here, in one line."""
     name = project.fit.solver
-    return usable_solver(name, project.solver_options.get(name, {}), project.path)
+    options = project.solver_options.get(name, {})
+    return usable_solver(name, options, project.path, cache=project.run_cache)
 
 
 def _run(
@@ -303,7 +304,8 @@ def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
     def solver_of(end: BandEnd | None) -> Solver:
         key = "" if end is None else end.name
         if key not in made:
-            made[key] = solver_named(name, **{**options, **({} if end is None else end.options)})
+            more = {} if end is None else end.options
+            made[key] = solver_named(name, project.run_cache, **{**options, **more})
         return made[key]
 
     return solver_of

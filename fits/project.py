@@ -14,9 +14,10 @@ from ..experiments.base import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
 from ..materials.forms.registry import form_settings
 from ..reading import content_of
-from ..sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS
+from ..sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
 from ..solvers.overrides import overridden
 from ..solvers.registry import solver_settings
+from ..solvers.run_cache import RunCache, run_cache
 from .cards import NamedCard, read_cards
 from .file import ProjectFile, parse
 from .schema import FitSection, LawSection
@@ -63,6 +64,15 @@ class Project:
     def title(self) -> str:
         """The fabric's name, else that of the folder."""
         return self.fabric.name or self.path.parent.resolve().name
+
+    @property
+    def run_cache(self) -> RunCache | None:
+        """Where runs of another program are kept, for this project and all others; None: nowhere.
+
+        A folder that the project names is beside its file.
+        """
+        said = self.fit.cache
+        return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
 
     def with_fit(self, **changes: Any) -> Project:
         """The project with other settings of its fit; None leaves a setting as it is."""

@@ -226,7 +226,8 @@ class Fit:
         return pd.concat(frames, ignore_index=True)
 
     def starts(self) -> pd.DataFrame:
-        """How every start ended: start, objective, status, analyses, external_runs, seconds.
+        """How every start ended: start, objective, status, analyses, external_runs,
+        cached_runs, seconds.
 
         Of starts that ran coarse to fine also coarse_objective and coarse_analyses, on the coarse
         mesh, and same_as, the start that had the same optimum there and alone went on.
@@ -241,6 +242,7 @@ class Fit:
                     "status": r.status,
                     "analyses": r.analyses,
                     "external_runs": r.external_runs,
+                    "cached_runs": r.cached_runs,
                     "seconds": r.wall_s,
                     **({} if self.coarse_to_fine is None else coarse_columns(r)),
                 }

@@ -55,6 +55,7 @@ class RunRecords:
             "unstable": record.unstable,
             "remarks": [(note.kind, note) for note in record.remarks],
             "arrays": list(record.arrays),
+            "from_cache": record.from_cache,
         }
         arrays: dict[str, Any] = {f"of_{name}": array for name, array in record.arrays.items()}
         arrays["words"] = np.array(json.dumps(words))
@@ -78,6 +79,7 @@ class RunRecords:
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
                 remarks=tuple(Note(NoteKind(kind), said) for kind, said in words["remarks"]),
+                from_cache=bool(words.get("from_cache", False)),
             )
         return None
 

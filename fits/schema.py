@@ -100,6 +100,7 @@ class FitSection(Section):
     trust: list[Name] = Field(default=[])
     unknowns: UnknownsSection = UnknownsSection()
     mesh_error: Literal["told", "taken out"] = "told"
+    cache: bool | Name = True
 
 
 class CommonSections(Section):

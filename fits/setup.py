@@ -6,6 +6,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from ..content import digest_of
 from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
 from ..identification.comparison import Comparison
 from ..identification.methods import FitOptions
@@ -14,7 +15,6 @@ from ..identification.unknowns import LawBounds, Unknowns
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, Solver
 from ..solvers.registry import solver_named, usable_solver
-from .content import digest_of
 from .law import bounds_of, law_of
 from .project import Project
 from .shared import shared_unknowns, with_shared
@@ -27,7 +27,7 @@ MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
 SOLVER_KEY = "fit.solver"
 #: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
 #: solver is told by what it says of itself.
-UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error")
+UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
     fit = project.fit
     options = project.solver_options.get(fit.solver, {})
     # Once here, in one line, rather than as the failure of every analysis.
-    usable_solver(fit.solver, options, project.path, SOLVER_KEY)
+    usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
     shared_unknowns(project)  # says now what is wrong with them
     law = law_of(project, [test.reach for test in tests])
     bounds = bounds_of(project, law.form)
@@ -123,7 +123,7 @@ def make_solver(project: Project, name: str | None = None) -> Solver:
     InputError : there is none of that name.
     """
     named = name or project.fit.solver
-    return solver_named(named, **project.solver_options.get(named, {}))
+    return solver_named(named, project.run_cache, **project.solver_options.get(named, {}))
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:

@@ -16,6 +16,7 @@ from ..notes import Note, NoteKind, rows, write_notes
 from ..notes import lines as note_lines
 from ..solvers.base import History
 from ..solvers.registry import usable_solver
+from ..solvers.run_cache import run_cache
 from ..writing import write_text
 from .analyses import Analyses, Progress
 from .project import Project
@@ -35,7 +36,7 @@ def simulate(
     InputError : no such solver, or an option it does not know.
     SolverFailure : an analysis does not end well.
     """
-    runs = usable_solver(solver, options)
+    runs = usable_solver(solver, options, cache=run_cache())
     models = test.models(card.thickness)
     return {part: runs.run(model, card.law) for part, model in models.items()}
 

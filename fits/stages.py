@@ -126,6 +126,7 @@ def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> It
             analyses=coarse.analyses,
             wall_s=coarse.wall_s,
             external_runs=coarse.external_runs,
+            cached_runs=coarse.cached_runs,
             failure="",
             coarse_objective=coarse.objective,
             coarse_analyses=coarse.analyses,

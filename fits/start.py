@@ -47,7 +47,8 @@ class EvaluationRecord:
 class StartRecord:
     """How one start ended. `unknowns` are the optimiser's; objective None: there is no fit.
 
-    analyses : in all; external_runs : of them, by an external solver. failure : why the solver
+    analyses : in all; external_runs : of them, run by an external solver; cached_runs : of them, by
+    an external solver earlier and taken from the cache of runs. failure : why the solver
     failed, where that ended it: it is no finished start, and is run again on going on. reached :
     largest strain (eps1, eps2, gamma12) at the optimum.
 
@@ -71,6 +72,7 @@ class StartRecord:
     coarse_objective: float | None = None
     coarse_analyses: int = 0
     same_as: int | None = None
+    cached_runs: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, exact in JSON."""
@@ -94,6 +96,7 @@ class StartRecord:
             mesh="coarse" if values.get("mesh") == "coarse" else "full",
             coarse_objective=_number(values.get("coarse_objective")),
             coarse_analyses=int(values.get("coarse_analyses", 0)),
+            cached_runs=int(values.get("cached_runs", 0)),
         )
 
 
@@ -153,10 +156,12 @@ def run_start(
     finally:
         for p in watched:
             p.watch = None
+    cached = problem.cached if problem.solver.external else 0
     wall = time.perf_counter() - begun + (0.0 if coarse is None else coarse.wall_s)
     none = StartRecord(
-        number, (seed, number), None, status, analyses, (), (), wall, runs, failure, mesh=mesh,
-        coarse_objective=None if coarse is None else coarse.objective, coarse_analyses=before,
+        number, (seed, number), None, status, analyses, (), (), wall, runs - cached, failure,
+        mesh=mesh, coarse_objective=None if coarse is None else coarse.objective,
+        coarse_analyses=before, cached_runs=cached,
     )  # fmt: skip
     if optimum is None:
         return none

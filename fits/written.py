@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
+from ..sections import beside
 from ..solvers.registry import solver_sections
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
         "law": plain(project.law.model_dump()),
         "fit": plain(project.fit.model_dump()),
     }
+    if isinstance(folder := settings["fit"].get("cache"), str):
+        settings["fit"]["cache"] = os.path.abspath(beside(project.path.parent, folder))
     options = _solver_options(project)
     if options:
         settings["solver"] = {solver: options}

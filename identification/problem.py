@@ -17,6 +17,9 @@ from .unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
+#: Status of an analysis that was kept earlier, and ended well then.
+FROM_CACHE = "ok, from the cache"
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -36,10 +39,15 @@ class Evaluation:
     stable: bool = True
 
     @property
+    def from_cache(self) -> bool:
+        """Whether nothing ran: every run of it was kept earlier."""
+        return bool(self.histories) and all(h.from_cache for h in self.histories)
+
+    @property
     def status(self) -> str:
         """What a history says of it."""
         if self.stable:
-            return "ok"
+            return FROM_CACHE if self.from_cache else "ok"
         return next(filter(None, (instability(h.unstable) for h in self.histories)))
 
 
@@ -69,6 +77,7 @@ class FitProblem:
     surrogate: FitProblem | None = None
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
+    cached: int = 0  # of them, from the cache of runs
     failure: str = ""  # why the last one that failed did
     warm_starts: bool = True
     blocks: Blocks = field(init=False, repr=False)
@@ -133,7 +142,8 @@ class FitProblem:
 
     def reset(self) -> None:
         """Forget the warm start and the count: every start of a study begins alike."""
-        self.analyses, self.unstable, self.failure, self.warm_starts = 0, 0, "", True
+        self.analyses, self.unstable, self.cached = 0, 0, 0
+        self.failure, self.warm_starts = "", True
         for comparison in self.comparisons:
             comparison.forget()
         if self.surrogate is not None:
@@ -186,6 +196,7 @@ class FitProblem:
             all(h.stable is not False for c, h in pairs if c.must_be_stable),
         )
         self.unstable += not point.stable
+        self.cached += point.from_cache
         self._report(y, value, point.status)
         return point
 

@@ -55,7 +55,8 @@ class History:
     counts as its work; remarks: what a reader of the result should know (plain words are notes of
     the kind "of the solver"); early: the solver's own word for an end before the model's last
     frame (it found no equilibrium further on), "" where there is none: fewer frames without it
-    are no result.
+    are no result; took: seconds that the run took when it was made, where it was made earlier and
+    is taken from the cache of runs, None where it ran now.
     """
 
     load: Array
@@ -73,6 +74,12 @@ class History:
     wrinkled: Array | None = None
     remarks: tuple[Note, ...] = ()
     early: str = ""
+    took: float | None = None
+
+    @property
+    def from_cache(self) -> bool:
+        """Whether nothing ran, because the same run was kept earlier."""
+        return self.took is not None
 
     @property
     def stable(self) -> bool | None:
@@ -172,6 +179,16 @@ class Solver(Protocol):
 
     def check(self) -> SolverCheck:
         """Is it installed, which version, does it carry the law?"""
+        ...
+
+
+@runtime_checkable
+class ProgramSolver(Solver, Protocol):
+    """A solver that says which files run, so that a run of another program is another run."""
+
+    @property
+    def programs(self) -> Sequence[Path]:
+        """Programs and libraries; they count by content. SolverFailure where one is not there."""
         ...
 
 

@@ -16,7 +16,9 @@ from .calculix.settings import OFFER as CALCULIX
 from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
 from .offer import Offer
+from .once import with_cache
 from .plugins import plug_in_named, plug_ins
+from .run_cache import RunCache
 from .settings import SolverSettings, check_programs
 
 #: What makes each of our own solvers from its options.
@@ -79,8 +81,12 @@ def _started(name: str) -> tuple[str, ...]:
     return ()
 
 
-def solver_named(name: str, **options: Any) -> Solver:
+def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) -> Solver:
     """A new solver with its constructor's `options`: ours, else that of a plug-in.
+
+    Parameters
+    ----------
+    cache : where runs of another program are kept; every run is made where it is None.
 
     Raises
     ------
@@ -89,11 +95,16 @@ def solver_named(name: str, **options: Any) -> Solver:
     """
     # A plug-in cannot take the place of one of ours.
     if name in SOLVERS:
-        return SOLVERS[name](**options)
-    plug_in = plug_in_named(name)
-    if plug_in is None:
-        raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
-    return plug_in.make(**options)
+        solver = SOLVERS[name](**options)
+    else:
+        plug_in = plug_in_named(name)
+        if plug_in is None:
+            raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
+        solver = plug_in.make(**options)
+    if cache is None:
+        return solver
+    section = solver_sections().get(name)
+    return with_cache(solver, cache, options if section is None else section.counted(options))
 
 
 def usable_solver(
@@ -101,6 +112,7 @@ def usable_solver(
     options: Mapping[str, Any] | None = None,
     path: Path | None = None,
     key: str = "fit.solver",
+    cache: RunCache | None = None,
 ) -> Solver:
     """A new solver that is there and carries the law: one line now, not in every analysis.
 
@@ -110,7 +122,7 @@ def usable_solver(
     Parameters
     ----------
     options : what it is made with, as `solver_settings` has it.
-    path, key : the project that names it, and where.
+    path, key : the project that names it, and where. cache : as of `solver_named`.
 
     Raises
     ------
@@ -118,7 +130,7 @@ def usable_solver(
     SolverFailure : it is not installed, or does not carry the law.
     """
     try:
-        solver = solver_named(name, **(options or {}))
+        solver = solver_named(name, cache, **(options or {}))
     except InputError as error:
         if error.field == "solver":
             raise InputError(path, f"{key} (or --solver)", error.problem) from None

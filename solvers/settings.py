@@ -45,13 +45,26 @@ class SolverSettings(Section):
 
     paths : keys whose values are files or folders beside the project file. programs : likewise,
     but a bare name is a program on the PATH. started : keys that say what is run, and how: see
-    `check_programs`. overrides : what the command line may say instead.
+    `check_programs`. overrides : what the command line may say instead. uncounted : keys that
+    change no result; nor do where files lie, which count by what is in them.
     """
 
     paths: ClassVar[tuple[str, ...]] = ()
     programs: ClassVar[tuple[str, ...]] = ()
     started: ClassVar[tuple[str, ...]] = ()
     overrides: ClassVar[tuple[Override, ...]] = ()
+    uncounted: ClassVar[tuple[str, ...]] = ("timeout", "keep")
+
+    @classmethod
+    def counted(cls, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Of what a solver is made with, what may change a result and is no file."""
+        others = {
+            *cls.uncounted,
+            *cls.paths,
+            *cls.programs,
+            *(o.name for o in cls.overrides if o.look),
+        }
+        return {key: value for key, value in options.items() if key not in others}
 
     def given(self, folder: Path) -> dict[str, Any]:
         """What the solver is made with; paths from `folder`, that of the file with the table."""

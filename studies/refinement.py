@@ -209,7 +209,8 @@ def run_level(series: Series, level: Level) -> LevelRun:
         history = series.run(part, series.card.law)
     except SolverFailure as failure:
         return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
-    seconds = time.perf_counter() - begun
+    # Of a run that is in the cache: what it took when it was made.
+    seconds = time.perf_counter() - begun if history.took is None else history.took
     studied = part.studied
     values = studied.quantities(part.model, history)
     along = None if studied.curve is None else studied.curve(part.model, history)

@@ -12,6 +12,7 @@ import pytest
 from bubblefit.experiments import registry as experiments
 from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.calculix.executable import Executable
+from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 from matplotlib.figure import Figure
 
@@ -22,6 +23,8 @@ from .figure_checks import check_figure
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
 os.environ["BUBBLEFIT_PROGRAMS_FROM"] = os.sep
 
+# A test that runs another program means the run; those of the cache of runs name a folder for it.
+os.environ[VARIABLE] = OFF
 # The first call of a kernel compiles it, or reads it from the cache.
 settings.register_profile("bubblefit", deadline=None)
 settings.load_profile("bubblefit")

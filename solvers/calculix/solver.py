@@ -99,6 +99,11 @@ class CalculixSolver:
             templates=templates_mark(self.templates),
         )
 
+    @property
+    def programs(self) -> tuple[Path, ...]:
+        """The ccx that runs, and the library that carries the law."""
+        return self.executable().path, material_library()
+
     def check(self) -> SolverCheck:
         """Whether there is a ccx that can load the law; its version."""
         try:

@@ -64,6 +64,8 @@ class MarcSettings(SolverSettings):
     # A bare name may also be in a folder that `modules` put on the PATH.
     programs = ("executable",)
     started = ("executable", "arguments", "environment", "modules")
+    # What is included counts by content, in what the solver says of itself.
+    uncounted = ("timeout", "keep", "licence_wait", "licence_retry", "include")
     overrides = (
         Override(
             "marc",

@@ -78,6 +78,17 @@ class MarcSolver:
             ),
         )
 
+    @property
+    def programs(self) -> tuple[Path, ...]:
+        """run_marc; none where only the site's modules know where it is."""
+        found = find_marc(self.settings)
+        return () if found is None else (found,)
+
+    @property
+    def keep(self) -> bool:
+        """Whether the folders of runs that end well stay."""
+        return self.settings.keep
+
     def check(self) -> SolverCheck:
         """Whether there is a run_marc.
 

@@ -63,12 +63,14 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
                 "status": "converged",
                 "analyses": record.analyses,
                 "external_runs": 0,
+                "cached_runs": 0,
             }
             for number, record in enumerate(fit.best.records)
         ],
         "coarse_to_fine": None,
         "analyses": sum(record.analyses for record in fit.best.records),
         "external_runs": 0,
+        "cached_runs": 0,
         "wall_s": fit.wall_s,
         "versions": versions(),
         "uncertainty": {

@@ -294,12 +294,13 @@ def test_starts_that_failed_other_programs_and_no_certainty(
 ) -> None:
     """Nothing is said of what is not known."""
     one, two = together.best.records
-    lost = replace(two, objective=None, external_runs=4, failure="no licence")
+    lost = replace(two, objective=None, external_runs=4, cached_runs=3, failure="no licence")
     best = replace(together.best, records=[one, lost], ranked=[one], certainty=None)
     fit = replace(together, best=best)
     found = reported(fit, tmp_path, monkeypatch)
     facts = dict(found.facts)
     assert facts["starts"] == "1 feasible of 2" and facts["of them by membrane"] == 4
+    assert facts["of them from the cache"] == 3
     (values,), _ = told.calls["plot_optima"]
     assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s

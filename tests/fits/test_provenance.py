@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import bubblefit.fits.content
+import bubblefit.content
 import bubblefit.fits.facts
 import numpy as np
 import pytest
@@ -158,7 +158,7 @@ def test_another_version_is_named(
     first: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     setup = prepared(read_project(written(tmp_path)))
-    for module in (bubblefit.fits.content, bubblefit.fits.facts):
+    for module in (bubblefit.content, bubblefit.fits.facts):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'

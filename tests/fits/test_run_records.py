@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.experiments.cylinder.record import run_of
-from bubblefit.fits.content import digest_of
 from bubblefit.fits.predictions import mark_of
 from bubblefit.fits.run_records import RunRecords
 from bubblefit.materials.card import MaterialCard

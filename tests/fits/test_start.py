@@ -20,7 +20,7 @@ class Problem:
         self.solver = SimpleNamespace(name=name, external=external)
         self.surrogate, self.watch, self.failure = surrogate, None, ""
         self.unknowns = SimpleNamespace(size=2, to_coefficients=np.diag([10.0, 100.0]))
-        self.resets = 0
+        self.resets, self.cached = 0, 0
 
     def reset(self) -> None:
         self.resets += 1
@@ -78,6 +78,13 @@ def test_what_is_told_and_counted(monkeypatch: pytest.MonkeyPatch, problem: Prob
     )  # fmt: skip
     assert problem.resets == 1
     assert problem.watch is None and problem.surrogate.watch is None
+
+
+def test_runs_from_the_cache_are_counted_apart(monkeypatch, problem: Problem) -> None:
+    problem.cached = 2
+    record, _ = started(monkeypatch, problem, OPTIMUM)
+    assert (record.external_runs, record.cached_runs, record.analyses) == (1, 2, 5)
+    assert StartRecord.from_json(record.to_json()) == record
 
 
 def test_runs_of_a_solver_of_our_own_are_no_external_ones(monkeypatch) -> None:
@@ -148,8 +155,8 @@ def test_a_record_of_an_older_version() -> None:
     record = StartRecord(1, (7, 1), 0.5, "ok", 3, (1.0,), (2.0,), 0.25)
     said = record.to_json()
     assert (said.pop("external_runs"), said.pop("failure")) == (0, "")
-    later = ("reached", "mesh", "coarse_objective", "coarse_analyses", "same_as")
-    assert [said.pop(name) for name in later] == [(), "full", None, 0, None]
+    later = ("reached", "mesh", "coarse_objective", "coarse_analyses", "same_as", "cached_runs")
+    assert [said.pop(name) for name in later] == [(), "full", None, 0, None, 0]
     assert StartRecord.from_json(said) == record
     for key in said:
         with pytest.raises(KeyError):

@@ -1,0 +1,304 @@
+"""Runs that are kept: the same comes back, only for the same, and a damaged one is told."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import logging
+import multiprocessing
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import Note, NoteKind
+from bubblefit.solvers.base import History
+from bubblefit.solvers.history_file import TITLE, Damaged, from_bytes, to_bytes
+from bubblefit.solvers.run_cache import LIMIT, VARIABLE, RunCache, run_cache
+
+from ..commands import in_process
+
+KEY = hashlib.sha256(b"a run").hexdigest()
+
+
+def history(number: float = 1.0, frames: int = 3) -> History:
+    """One with everything that a solver may say, in numbers of all digits."""
+    random = np.random.default_rng(int(number))
+    return History(
+        load=number + random.standard_normal(frames),
+        displacement=random.standard_normal((frames, 5, 3)),
+        strain_min=-random.random(3),
+        strain_max=random.random(3),
+        reactions={"top": random.standard_normal((frames, 3)), "a b/c": np.zeros((frames, 3))},
+        cavity_pressure=random.random(frames),
+        iterations=17,
+        unstable=("132 kPa",),
+        remarks=(Note(NoteKind.SNAP, "it snapped — once", "at 3 kPa"),),
+        early="no equilibrium",
+    )
+
+
+def same(one: History, other: History) -> None:
+    for name in ("load", "displacement", "strain_min", "strain_max", "cavity_pressure"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert one.reactions.keys() == other.reactions.keys()
+    for name in one.reactions:
+        np.testing.assert_array_equal(one.reactions[name], other.reactions[name])
+    words = ("iterations", "unstable", "remarks", "early", "wrinkled", "cavity_volume", "path")
+    for name in words:
+        assert getattr(one, name) == getattr(other, name)
+    assert [(n.kind, n.of) for n in one.remarks] == [(n.kind, n.of) for n in other.remarks]
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> RunCache:
+    return RunCache(tmp_path / "runs")
+
+
+def test_the_same_comes_back_to_the_last_digit(cache: RunCache) -> None:
+    kept = history()
+    assert cache.read(KEY) is None
+    cache.write(KEY, kept, 12.5)
+    found = cache.read(KEY)
+    assert found is not None and found.from_cache and found.took == 12.5
+    assert not kept.from_cache
+    same(found, kept)
+    assert cache.read(KEY.replace(KEY[0], "f" if KEY[0] != "f" else "0")) is None
+
+
+def test_what_is_no_result_of_numbers_is_not_kept(cache: RunCache) -> None:
+    @dataclass(frozen=True, eq=False)
+    class Own(History):
+        more: str = ""
+
+    plain = history()
+    objects = np.array([{}, None], dtype=object)
+    bad = [
+        replace(plain, load=np.array([1.0, np.nan])),
+        replace(plain, displacement=objects),
+        Own(plain.load, plain.displacement, plain.strain_min, plain.strain_max),
+    ]
+    for one in bad:
+        cache.write(KEY, one, 1.0)
+    assert cache.entries() == []
+
+
+def damaged(content: bytes, at: int) -> bytes:
+    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize("how", ["cut", "changed"])
+def test_a_damaged_run_is_dropped_and_told(cache, caplog, share, how) -> None:
+    cache.write(KEY, history(), 1.0)
+    (entry,) = cache.entries()
+    whole = entry.path.read_bytes()
+    at = int(share * (len(whole) - 1))
+    entry.path.write_bytes(whole[:at] if how == "cut" else damaged(whole, at))
+    with caplog.at_level(logging.WARNING):
+        assert cache.read(KEY) is None
+    (said,) = caplog.messages
+    assert said.startswith(f"{entry.path} is dropped from the cache of runs and run again: it")
+    assert not entry.path.exists()
+    cache.write(KEY, history(), 1.0)
+    assert cache.read(KEY) is not None
+
+
+def with_checksum(whole: bytes) -> bytes:
+    return TITLE + hashlib.sha256(whole).digest() + whole
+
+
+def test_nothing_is_unpickled(tmp_path: Path) -> None:
+    """Not where somebody has written the right checksum either."""
+    mark = tmp_path / "unpickled"
+
+    class Trap:
+        def __reduce__(self):
+            return os.mkdir, (str(mark),)
+
+    content = io.BytesIO()
+    trap = np.empty(1, dtype=object)
+    trap[0] = Trap()
+    np.savez_compressed(content, words=np.array(json.dumps({"key": KEY})), load=trap)
+    with pytest.raises(Damaged):
+        from_bytes(with_checksum(content.getvalue()), KEY)
+    assert not mark.exists()
+
+
+def test_another_runs_file_and_another_layout_are_told() -> None:
+    whole = to_bytes(history(), KEY, 1.0)
+    with pytest.raises(Damaged, match="of another run"):
+        from_bytes(whole, "0" * 64)
+    with pytest.raises(Damaged, match="another version"):
+        from_bytes(whole.replace(b"run 1", b"run 2", 1), KEY)
+    with pytest.raises(Damaged, match="cannot be read"):
+        from_bytes(with_checksum(b"no archive"), KEY)
+
+
+def key(number: int) -> str:
+    return hashlib.sha256(str(number).encode()).hexdigest()
+
+
+def filled(cache: RunCache, count: int) -> int:
+    """Runs that were last used one after the other; bytes of one."""
+    for number in range(count):
+        cache.write(key(number), history(number), 1.0)
+    for number in range(count):
+        (path,) = cache.folder.glob(f"*/{key(number)}.run")
+        os.utime(path, (1e9 + number, 1e9 + number))
+    return max(entry.size for entry in cache.entries())
+
+
+def there(cache: RunCache, count: int) -> list[int]:
+    names = {entry.path.stem for entry in cache.entries()}
+    return [number for number in range(count) if key(number) in names]
+
+
+def test_what_was_used_longest_ago_goes_first(cache: RunCache) -> None:
+    size = filled(cache, 5)
+    assert cache.read(key(0)) is not None  # used now
+    gone = cache.prune(2 * size)
+    assert there(cache, 5) == [0, 4] and len(gone) == 3
+    assert cache.prune(older=3600.0) and there(cache, 5) == [0]
+    assert cache.prune(0) and cache.entries() == []
+
+
+def test_the_folder_never_holds_more_than_its_limit(cache: RunCache) -> None:
+    assert cache.limit == LIMIT
+    cache.write(key(99), history(99), 1.0)
+    size = cache.entries()[0].size
+    cache.set_limit(6 * size)
+    assert RunCache(cache.folder).limit == 6 * size
+    for number in range(12):
+        cache.write(key(number), history(number), 1.0)
+        assert sum(entry.size for entry in cache.entries()) <= 6 * size
+        time.sleep(0.002)  # the clock of a file system
+    left = there(cache, 12)
+    assert 11 in left and 0 not in left and len(left) >= 4
+
+
+def test_what_was_cut_off_a_day_ago_is_swept(cache: RunCache) -> None:
+    cache.write(KEY, history(), 1.0)
+    old, fresh = (cache.folder / KEY[:2] / f".{name}.part" for name in ("old", "fresh"))
+    for path in (old, fresh):
+        path.write_bytes(b"cut")
+    os.utime(old, (1e9, 1e9))
+    cache.prune(10**9)
+    assert not old.exists() and fresh.exists() and len(cache.entries()) == 1
+
+
+def write_many(folder: Path, seed: int) -> None:
+    cache = RunCache(folder)
+    for number in np.random.default_rng(seed).permutation(20):
+        cache.write(key(int(number)), history(int(number)), 1.0)
+        found = cache.read(key(int(number)))
+        assert found is not None
+        same(found, history(int(number)))
+
+
+def test_many_may_write_at_once(cache: RunCache, caplog) -> None:
+    context = multiprocessing.get_context("fork")
+    several = [context.Process(target=write_many, args=(cache.folder, k)) for k in range(4)]
+    for process in several:
+        process.start()
+    for process in several:
+        process.join()
+    assert [process.exitcode for process in several] == [0] * 4
+    assert there(cache, 20) == list(range(20)) and not list(cache.folder.glob("*/.*"))
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(tmp_path, caplog) -> None:
+    place = tmp_path / "file"
+    place.write_text("no folder")
+    cache = RunCache(place / "runs")
+    with caplog.at_level(logging.WARNING):
+        for number in range(3):
+            cache.write(key(number), history(), 1.0)
+            assert cache.read(key(number)) is None
+    assert [m for m in caplog.messages if "runs cannot be kept there" in m] == [
+        f"{place / 'runs'}: runs cannot be kept there: Not a directory"
+    ]
+
+
+def test_a_full_disk_leaves_nothing_half(cache, monkeypatch, caplog) -> None:
+    def full(source: str, target: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("bubblefit.solvers.run_cache.os.replace", full)
+    cache.write(KEY, history(), 1.0)
+    assert "No space left" in caplog.text
+    assert [path for path in cache.folder.rglob("*") if path.is_file()] == []
+
+
+def test_where_it_is_and_whether(monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "c"))
+    assert run_cache().folder == tmp_path / "c" / "runs"
+    assert run_cache(False) is None
+    assert run_cache(tmp_path / "own").folder == tmp_path / "own"
+    assert run_cache() is run_cache()
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "e"))
+    assert run_cache(tmp_path / "own").folder == tmp_path / "e"
+    assert run_cache(False) is None
+    monkeypatch.setenv(VARIABLE, "off")
+    assert run_cache() is None and run_cache(tmp_path / "own") is None
+
+
+def test_the_command_shows_and_drops(cache, monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv(VARIABLE, str(cache.folder))
+    said = in_process("cache", cwd=tmp_path).output
+    assert said == f"{cache.folder}: 0 runs, 0 B of at most 2 GB\n"
+    size = filled(cache, 4)
+    said = in_process("cache", cwd=tmp_path).output.splitlines()
+    total = sum(entry.size for entry in cache.entries())
+    assert said[0] == f"{cache.folder}: 4 runs, {total / 1000:.3g} kB of at most 2 GB"
+    assert said[1].startswith("last used between ") and said[1].endswith(" weeks ago")
+    told = json.loads(in_process("cache", "--prune", 2 * size, "--json", cwd=tmp_path).output)
+    assert (told["runs"], told["dropped"]) == (2, 2) and told["bytes"] <= 2 * size
+    assert there(cache, 4) == [2, 3]
+    assert "dropped: 2 runs" in in_process("cache", "--older", "1h", cwd=tmp_path).output
+    filled(cache, 4)
+    assert "of at most 1 B" in in_process("cache", "--limit", "1B", cwd=tmp_path).output
+    assert cache.entries() == []
+    in_process("cache", "--limit", "3 MB", cwd=tmp_path)
+    filled(cache, 3)
+    other = RunCache(tmp_path / "other")
+    filled(other, 2)
+    in_process("cache", "--folder", other.folder, "--clear", cwd=tmp_path)
+    assert other.entries() == [] and len(cache.entries()) == 3
+    in_process("cache", "--clear", cwd=tmp_path)
+    assert cache.entries() == []
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--prune", "much", "--prune: expected a size such as 500MB or 2GB, got 'much'"),
+        ("--prune", "-1GB", "expected a size"),
+        ("--limit", "2 K", "expected a size"),
+        ("--older", "30", "--older: expected an age such as 12h, 30d or 8w, got '30'"),
+    ],
+)
+def test_what_is_no_size_or_age_is_told_and_drops_nothing(
+    cache, monkeypatch, tmp_path, option, value, words
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(cache.folder))
+    filled(cache, 2)
+    done = in_process("cache", option, value, cwd=tmp_path, code=2)
+    assert words in done.output and len(cache.entries()) == 2
+
+
+def test_nothing_to_show_where_it_is_off(monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv(VARIABLE, "off")
+    done = in_process("cache", cwd=tmp_path, code=2)
+    assert "BUBBLEFIT_RUNS: is 'off': no runs are kept, name a folder instead" in done.output
+
+
+def test_a_law_is_no_history() -> None:
+    """What a plug-in gives back by mistake is left to those who read it."""
+    with pytest.raises(TypeError, match="HypoelasticLaw is not a History"):
+        to_bytes(HypoelasticLaw.linear(800.0, 400.0, 80.0), KEY, 1.0)  # type: ignore[arg-type]
