@@ -52,6 +52,15 @@ def _kernel_folder() -> Path | None:
     return folder if os.access(folder, os.W_OK | os.X_OK) else None
 
 
+def kernels_are_compiled() -> bool:
+    """Whether compiled kernels of exactly these sources are kept: otherwise a run begins with it.
+
+    Where no folder can be written they are compiled every time.
+    """
+    folder = _kernel_folder()
+    return folder is not None and next(folder.rglob("*.nbc"), None) is not None
+
+
 def compiled(**options: Any) -> Callable[[Any], Any]:
     """`numba.njit(**options)`, cached where a folder can be written, else compiled every time."""
 

@@ -78,6 +78,26 @@ class NoteKind(StrEnum):
 #: A run that has a note of these kinds is marked in the tables of runs.
 MARKS = (NoteKind.BEYOND_CARD, NoteKind.SNAP, NoteKind.UNSTABLE, NoteKind.EARLY)
 
+#: What is said first of a fit, where only one thing is: first what makes its moduli wrong, then
+#: what makes them unsure, then how it went.
+GRAVEST = (
+    NoteKind.DISCREPANCY,
+    NoteKind.UNSTABLE,
+    NoteKind.ABOVE_NOISE,
+    NoteKind.DOUBTFUL,
+    NoteKind.FLAT_SHEET,
+    NoteKind.SURFACES,
+    NoteKind.UNMATCHED,
+    NoteKind.BEYOND_LAW,
+    NoteKind.BOUND,
+    NoteKind.UNCERTAIN,
+    NoteKind.MESH,
+    NoteKind.INVERSE_CRIME,
+    NoteKind.MARGIN,
+    NoteKind.STARTS,
+    NoteKind.ALONE,
+)
+
 
 class Note(str):
     """A sentence, of which kind it is, and of what it is said ("" : of all)."""
@@ -113,6 +133,12 @@ def marks(notes: Iterable[str]) -> list[str]:
     """What a run is marked with in a table of runs, by its notes."""
     kinds = {as_note(note).kind for note in notes}
     return [kind.value for kind in MARKS if kind in kinds]
+
+
+def foremost(notes: Iterable[Note]) -> Note | None:
+    """The note that matters most, the first of its kind; None where there is none."""
+    rank = {kind: place for place, kind in enumerate(GRAVEST)}
+    return min(notes, key=lambda note: rank.get(note.kind, len(rank)), default=None)
 
 
 def rows(notes: Iterable[Note]) -> list[dict[str, str]]:

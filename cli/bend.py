@@ -8,13 +8,21 @@ from typing import Any
 import click
 
 from .arguments import DATA, PROJECT
+from .examples import examples
 from .options import data_folders, folder_beside
 from .predicting import prediction_options, run_predictions
 
 KIND = "cylinder"
 
 
-@click.command("bend")
+@click.command(
+    "bend",
+    epilog=examples(
+        "bubblefit bend fabric.toml",
+        "bubblefit bend fabric.toml --card out/fabric/material.toml --samples 0",
+        'bubblefit bend fabric.toml --test "150 mm, 140 kPa" --resume',
+    ),
+)
 @PROJECT
 @DATA
 @click.option(

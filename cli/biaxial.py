@@ -9,13 +9,22 @@ from typing import cast
 import click
 
 from .arguments import DATA, PROJECT, TESTS, out_option
+from .ending import written_to
+from .examples import examples
 from .exits import exits
 from .options import data_folders, result_folder
 
 UNLOADED = {"8": False, "10": True}
 
 
-@click.command("biaxial")
+@click.command(
+    "biaxial",
+    epilog=examples(
+        "bubblefit biaxial project.toml",
+        "bubblefit biaxial project.toml --paths 10 --free",
+        "bubblefit biaxial project.toml --ratio 1:1 --ratio 2:1 --out out/two-ratios",
+    ),
+)
 @PROJECT
 @TESTS
 @click.option("--paths", type=click.Choice(list(UNLOADED)), default="8", show_default=True,
@@ -47,8 +56,6 @@ def command(
     Each yarn's strain is replaced by a line over the larger load, then least squares. What is
     chosen here is written beside what all other choices give. A law of any form is fitted to the
     same tests by `bubblefit fit`, and made into such constants by `bubblefit export`.
-
-    Example: bubblefit biaxial project.toml --paths 10 --free
     """
     from .. import __version__
     from ..data.biaxial.ratios import plain_ratio
@@ -85,4 +92,4 @@ def command(
         click.echo(json.dumps(result, indent=1))
         return
     said = [line for one in evaluations for line in lines_of(one)]
-    click.echo("\n".join([*said, *note_lines(notes), f"written to {folder}"]))
+    click.echo("\n".join([*said, *note_lines(notes), written_to(folder)]))

@@ -12,13 +12,21 @@ import click
 
 from ..errors import InputError
 from .arguments import AS_JSON, PATH
+from .examples import examples
 from .exits import exits
 
 BYTES = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
 
 
-@click.command("cache")
+@click.command(
+    "cache",
+    epilog=examples(
+        "bubblefit cache",
+        "bubblefit cache --older 8w --prune 2GB",
+        "bubblefit cache --clear",
+    ),
+)
 @click.option("--folder", type=PATH, help="Of the runs, where a project names one of its own.")
 @click.option("--clear", is_flag=True, help="Drop all runs.")
 @click.option(

@@ -9,13 +9,21 @@ from pathlib import Path
 import click
 
 from .arguments import DATA, PROJECT, TESTS, TRUST, out_option
+from .ending import written_to
+from .examples import examples
 from .exits import exits
 from .options import data_folders, folder_beside
 
 DOUBTFUL = 2  # as for any bad input
 
 
-@click.command("check")
+@click.command(
+    "check",
+    epilog=examples(
+        "bubblefit check project.toml",
+        "bubblefit check project.toml --test bubble --trust preload",
+    ),
+)
 @PROJECT
 @TESTS
 @out_option("out/NAME-check")
@@ -47,6 +55,6 @@ def command(
     if as_json:
         click.echo(json.dumps(found.result, indent=1))
     else:
-        click.echo("\n".join([*found.lines(), f"written to {folder} (open report.html)"]))
+        click.echo("\n".join([*found.lines(), written_to(folder)]))
     if not found.sound:
         sys.exit(DOUBTFUL)

@@ -8,12 +8,20 @@ from typing import Any
 
 import click
 
+from .ending import written_to
+from .examples import examples
 from .fitting import fit_options
 from .options import command_line, data_folders, folder_beside, read_with_solver
 from .progress import FitsProgress
 
 
-@click.command("compare")
+@click.command(
+    "compare",
+    epilog=examples(
+        "bubblefit compare project.toml",
+        "bubblefit compare project.toml --form cubic --form spline:6 --folds 4",
+    ),
+)
 @click.option(
     "--form",
     "forms",
@@ -64,6 +72,6 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     lines = [
         *lines_of(result),
         *note_lines(comparison.notes),
-        f"written to {folder} (open report.html)",
+        written_to(folder),
     ]
     click.echo(json.dumps(result, indent=1) if options["as_json"] else "\n".join(lines))

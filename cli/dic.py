@@ -17,19 +17,33 @@ from ..data.tables import write_table
 from ..errors import InputError, OutputError
 from ..sections import LENGTH_UNITS
 from ..writing import replacing
+from .examples import examples
 from .exits import exits
 from .frame_arguments import check_out, columns_named, frame_options
+from .usage import Suggesting
 
 #: What a frame must hold; where it has displacements, too, they are added.
 PLACES = ("x", "y", "z")
 
 
-@click.group("dic")
+@click.group(
+    "dic",
+    cls=Suggesting,
+    epilog=examples(
+        'bubblefit dic sphere "ball/*.csv" --radius 50.02',
+    ),
+)
 def command() -> None:
     """What image correlation is worth: tests of the camera itself."""
 
 
-@command.command("sphere")
+@command.command(
+    "sphere",
+    epilog=examples(
+        'bubblefit dic sphere "ball/*.csv" --radius 50.02',
+        "bubblefit dic sphere ball1.csv ball2.csv --out sphere.csv",
+    ),
+)
 @click.argument("frames", nargs=-1, required=True)
 @click.option(
     "--radius",

@@ -16,6 +16,7 @@ from ..solvers.base import Diagnosis
 from ..solvers.diagnosis import diagnose
 from ..solvers.overrides import command_line
 from ..solvers.registry import solver_names
+from .examples import examples
 from .exits import exits
 
 UNUSABLE = 4
@@ -29,7 +30,13 @@ def _programs(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@click.command("doctor")
+@click.command(
+    "doctor",
+    epilog=examples(
+        "bubblefit doctor",
+        "bubblefit doctor --ccx /opt/ccx/bin/ccx --json",
+    ),
+)
 @_programs
 @click.option("--solver", metavar="NAME", help="A solver, such as a plug-in, that has to work.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings on stdout as JSON.")

@@ -15,6 +15,7 @@ from ..materials.exports.formats import Option, options_of
 from ..notes import rows
 from ..solvers.exports import FORMATS
 from ..writing import replacing
+from .examples import examples
 from .exits import exits
 
 
@@ -34,7 +35,13 @@ def _values(known: Option) -> click.ParamType:
     return click.FloatRange(least, known.most, min_open=known.above is not None)
 
 
-@click.command("export")
+@click.command(
+    "export",
+    epilog=examples(
+        "bubblefit export out/fabric/material.toml --format marc",
+        "bubblefit export material.toml --format calculix --out for-ccx --force",
+    ),
+)
 @click.argument("card", type=click.Path(path_type=Path))
 @click.option("--format", "name", type=click.Choice(list(FORMATS)), required=True)
 @click.option(

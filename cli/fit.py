@@ -6,10 +6,18 @@ from typing import Any
 
 import click
 
+from .examples import examples
 from .fitting import fit_options, run_fit
 
 
-@click.command("fit")
+@click.command(
+    "fit",
+    epilog=examples(
+        "bubblefit fit project.toml",
+        "bubblefit fit project.toml --test bubble --test strips --out out/both",
+        "bubblefit fit project.toml --solver calculix --starts 1 --verbose",
+    ),
+)
 @fit_options
 def command(**options: Any) -> None:
     """Fit the moduli of PROJECT.toml to all its tests together, or to those named.

@@ -26,6 +26,8 @@ from .arguments import (
     with_checks,
 )
 from .exits import WORSE, resumable
+from .fit_words import lines_of
+from .logs import verbose
 from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 
@@ -45,7 +47,12 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         JOBS,
         click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
         solver_choice,
-        click.option("--fail-above", type=float, metavar="E", help="Exit 1 when e is above E."),
+        click.option(
+            "--fail-above",
+            type=float,
+            metavar="E",
+            help="Exit 1 when more than E is left of the objective.",
+        ),
         TRUST,
         click.option("--resume", is_flag=True, help="Go on with an interrupted fit."),
         OVERWRITE,
@@ -64,6 +71,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     KeyboardInterrupt : after saying how to go on.
     """
     from ..fits.fit import fit
+    from ..fits.logged import timed
     from ..fits.store import usual_folder
 
     path: Path = options["project"]
@@ -86,7 +94,8 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
             progress=progress.saw,
             command_line=command_line(),
         )
-    result.report(folder)
+    with timed(f"card, tables and figures in {folder}"):
+        result.report(folder)
     tell(result, folder, options["fail_above"], options["as_json"])
 
 
@@ -103,68 +112,11 @@ def _tests(
 
 def tell(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 1 when the best fit is worse than asked for."""
-    words = json.dumps(fit.result, indent=1) if as_json else "\n".join(lines_of(fit, folder))
-    click.echo(words)
+    if as_json:
+        click.echo(json.dumps(fit.result, indent=1))
+    else:
+        click.echo("\n".join(lines_of(fit, folder, every=verbose())))
     if fail_above is not None and fit.objective > fail_above:
-        said = f"e = {fit.objective:.4g} is above --fail-above {fail_above:g}"
-        click.echo(f"bubblefit: {said}", err=True)
+        said = f"{fit.objective:.4g} is left of the objective, above {fail_above:g}"
+        click.echo(f"bubblefit: --fail-above: {said}", err=True)
         sys.exit(WORSE)
-
-
-def band_lines(fit: Fit) -> list[str]:
-    """How far a modulus may be off, where that is most; nothing where it is not known."""
-    from ..fits.page import sigma_words
-    from ..identification.bands import LEVEL
-    from ..reports import percent
-
-    sure = fit.best.certainty
-    if sure is None or not sure.band:
-        return []
-    parts = []
-    for name, (lower, upper) in sure.band.items():
-        own = fit.law.modulus(name, sure.strain[name])
-        below, above = float((1 - lower / own).max()), float((upper / own - 1).max())
-        parts.append(f"{name} -{sigma_words(below)} to +{sigma_words(above)}")
-    return [f"{percent(LEVEL)} bands (noise and mesh), where they are widest: {', '.join(parts)}"]
-
-
-def lines_of(fit: Fit, folder: Path) -> list[str]:
-    """How good the fit is, what its tests say, what to know, where it is."""
-    import numpy as np
-
-    from ..fits.page import sigma_words
-    from ..notes import lines as note_lines
-
-    result, best = fit.result, fit.best
-    runs, cached = result["external_runs"], result["cached_runs"]
-    kept = f", {cached} from the cache" if cached else ""
-    external = f" ({runs} of {result['solver']}{kept})" if runs or cached else ""
-    middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
-    lines = [
-        f"best {result['objective_is']}: {fit.objective:.3g} (median {middle:.3g} of "
-        f"{len(best.ranked)} starts, {len(best.records)} asked), {result['analyses']} "
-        f"analyses{external}, {result['wall_s']:.0f} s"
-    ]
-    if fit.stages:
-        lines.append(f"coarse to fine: {fit.stages}")
-    several = len(fit.findings) > 1
-    for name, findings in fit.findings.items():
-        lines += [f"{name}: {line}" if several else line for line in findings.lines]
-    left = "; ".join(
-        f"{name} {m.rms:.3g} {m.unit} (noise {m.noise:.3g} {m.unit}, {m.noise_is})"
-        for name, m in fit.misfits.items()
-    )
-    lines.append(f"RMS residual beside the noise: {left}")
-    lines += band_lines(fit)
-    lines += [
-        f"{verdict.name}: {verdict.words}"
-        for verdict in fit.verdicts
-        if verdict.shared or verdict.prior is None
-    ]
-    for source, sigmas in result.get("pinned", {}).items():
-        parts = ", ".join(
-            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
-            for name, s in sigmas.items()
-        )
-        lines.append(f"1 sigma from {source}: {parts}")
-    return [*lines, *note_lines(fit.notes), f"written to {folder} (open report.html)"]

@@ -20,6 +20,7 @@ from ..data.gauge_table import GaugeTable
 from ..errors import InputError
 from ..notes import lines as note_lines
 from ..sections import LENGTH_UNITS
+from .examples import examples
 from .exits import exits
 from .frame_arguments import check_out, columns_named, frame_options
 
@@ -33,7 +34,14 @@ OF_LOADS = tuple(
 ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit"])
 
 
-@click.command("gauge")
+@click.command(
+    "gauge",
+    epilog=examples(
+        'bubblefit gauge "frames/*.csv" --lower 0 -50 --upper 0 50 --out gauge.csv',
+        "bubblefit gauge f1.csv f2.csv --lower 0 -50 --upper 0 50 --out warp.csv"
+        " --loads machine.csv --direction warp",
+    ),
+)
 @click.argument("frames", nargs=-1, required=True)
 @click.option(
     "--lower", type=float, nargs=2, required=True, metavar="X Y", help="One end, mm, undeformed."

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ..errors import InputError, OutputError
+from .examples import examples
 from .exits import exits
 from .options import numbers
 
@@ -30,7 +31,14 @@ FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
 COUNT = click.IntRange(0, 99)
 
 
-@click.command("init")
+@click.command(
+    "init",
+    epilog=examples(
+        "bubblefit init mine",
+        "bubblefit init mine --example uniaxial",
+        "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
+    ),
+)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option(
     "--example",

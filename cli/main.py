@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib
-import logging
 from typing import Any
 
 import click
 
 from .. import __version__
+from .examples import examples
+from .logs import listen, with_verbose
 from .options import COMMAND_LINE
+from .usage import Suggesting, in_one_line
 
 COMMANDS = {
     "fit": ("fit", "Fit a material to all tests of a fabric together."),
@@ -35,8 +37,11 @@ COMMANDS = {
 }
 
 
-class LazyGroup(click.Group):
-    """Imports a subcommand only when it runs: `bubblefit --help` stays quick."""
+class LazyGroup(Suggesting):
+    """Imports a subcommand only when it runs: `bubblefit --help` stays quick.
+
+    What cannot be understood is one line, also below it.
+    """
 
     def make_context(
         self,
@@ -46,9 +51,14 @@ class LazyGroup(click.Group):
         **extra: Any,
     ) -> click.Context:
         given = ["bubblefit", *args]  # parsing eats them
-        context = super().make_context(info_name, args, parent, **extra)
+        with in_one_line():
+            context = super().make_context(info_name, args, parent, **extra)
         context.meta[COMMAND_LINE] = given
         return context
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with in_one_line():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -57,21 +67,31 @@ class LazyGroup(click.Group):
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
-        command: click.Command = module.command
-        return command
+        return with_verbose(module.command)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    "bubblefit",
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=examples(
+        "bubblefit init mine",
+        "bubblefit fit mine/project.toml",
+        "bubblefit fit --help",
+    ),
+)
 @click.version_option(__version__, prog_name="bubblefit")
-@click.option("--verbose", is_flag=True, help="Log what the library does, on stderr.")
+@click.option(
+    "--verbose", is_flag=True, help="Tell each analysis, solver files and times, on stderr."
+)
 def main(verbose: bool) -> None:
     """Test data in, validated material card of a coated fabric out.
 
     Exit codes: 0 fine, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
     4 the solver failed, 130 interrupted.
     """
-    logging.basicConfig(level=logging.INFO if verbose else logging.WARNING)
+    listen(verbose)

@@ -21,17 +21,11 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .ending import written_to
+from .examples import examples
 from .exits import exits
 from .options import data_folders, numbers, read_with_solver, result_folder
 from .progress import NamedProgress
-
-EPILOG = """Examples:
-
-\b
-  bubblefit plan fabric.toml
-  bubblefit plan fabric.toml --card out/fabric/material.toml --rank G12
-  bubblefit plan fabric.toml --specimens 5 --noise strips=20 --strain 0.1,0.1,0.05
-"""
 
 
 def _plan_options(command: Any) -> Any:
@@ -67,7 +61,14 @@ def _plan_options(command: Any) -> Any:
     return with_options(exits(command), decorators)
 
 
-@click.command("plan", epilog=EPILOG)
+@click.command(
+    "plan",
+    epilog=examples(
+        "bubblefit plan fabric.toml",
+        "bubblefit plan fabric.toml --card out/fabric/material.toml --rank G12",
+        "bubblefit plan fabric.toml --specimens 5 --noise strips=20 --strain 0.1,0.1,0.05",
+    ),
+)
 @_plan_options
 def command(
     card: str | None, strain: str | None, rank: str, noises: tuple[str, ...], **options: Any
@@ -94,7 +95,7 @@ def command(
             progress=progress.saw,
         )
     made.write(folder)
-    lines = [*made.lines(), f"written to {folder} (open report.html)"]
+    lines = [*made.lines(), written_to(folder)]
     click.echo(json.dumps(made.result, indent=1) if options["as_json"] else "\n".join(lines))
 
 

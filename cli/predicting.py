@@ -21,6 +21,7 @@ from .arguments import (
     solver_choice,
     with_checks,
 )
+from .ending import written_to
 from .exits import WORSE, resumable
 from .options import command_line, with_solver
 from .progress import RunsProgress
@@ -98,7 +99,7 @@ def run_predictions(
 
 def tell(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
-    lines = [*predictions.lines(), f"written to {folder} (open report.html)"]
+    lines = [*predictions.lines(), written_to(folder)]
     click.echo(json.dumps(predictions.result, indent=1) if as_json else "\n".join(lines))
     failed = predictions.failed()
     if failed:

@@ -23,17 +23,11 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .ending import written_to
+from .examples import examples
 from .exits import exits
 from .options import data_folders, numbers, read_with_solver, result_folder
 from .progress import NamedProgress
-
-EPILOG = """Examples:
-
-\b
-  bubblefit profile fabric.toml
-  bubblefit profile fabric.toml --modulus G12=0.02,0.05 --modulus E1=0
-  bubblefit profile fabric.toml --modulus G12 --strain 0.05 --card other/material.toml
-"""
 
 
 def _options(command: Any) -> Any:
@@ -61,7 +55,14 @@ def _options(command: Any) -> Any:
     return with_options(exits(command), decorators)
 
 
-@click.command("profile", epilog=EPILOG)
+@click.command(
+    "profile",
+    epilog=examples(
+        "bubblefit profile fabric.toml",
+        "bubblefit profile fabric.toml --modulus G12=0.02,0.05 --modulus E1=0",
+        "bubblefit profile fabric.toml --modulus G12 --strain 0.05 --card other/material.toml",
+    ),
+)
 @_options
 def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **options: Any) -> None:
     """Profile likelihood of moduli: between what does each lie with 95 %?
@@ -80,7 +81,7 @@ def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **opt
     with NamedProgress("sides", options["quiet"] or options["as_json"]) as progress:
         found = profile(project, asked, card, options["tests"] or None, progress=progress.saw)
     found.write(folder)
-    lines = [*found.lines(), f"written to {folder} (open report.html)"]
+    lines = [*found.lines(), written_to(folder)]
     click.echo(json.dumps(found.result, indent=1) if options["as_json"] else "\n".join(lines))
 
 

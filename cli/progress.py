@@ -1,107 +1,16 @@
-"""Progress of a study: a live line on a terminal, a plain line a minute elsewhere."""
+"""Progress of fits and of predictions: what is counted, and what is said beside the count."""
 
 from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-)
-
-from ..fits.analyses import Step
 from ..fits.start import EvaluationRecord, Stage, StartRecord
+from .live_line import CountProgress
 
 if TYPE_CHECKING:
     from ..fits.predictions import RunEvent
-
-PLAIN_EVERY_S = 60.0
-
-
-class LiveLine:
-    """A bar on a terminal, on stderr, so that stdout stays for results; elsewhere none."""
-
-    def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
-        self.bar: Progress | None = None
-        if not quiet and sys.stderr.isatty():
-            self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                *more,
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
-
-    def __enter__(self) -> Self:
-        if self.bar is not None:
-            self.bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar is not None:
-            self.bar.stop()
-
-
-class SeriesProgress(LiveLine):
-    """A few analyses one after the other, with the increments of the one that runs."""
-
-    def __init__(self, quiet: bool) -> None:
-        super().__init__(quiet)
-        if self.bar is not None:
-            self.task = self.bar.add_task("", total=None)
-
-    def saw(self, step: Step) -> None:
-        """Show how far the analysis is that runs."""
-        if self.bar is not None:
-            words = f"analysis {step.analysis} of {step.analyses}, {step.part}"
-            self.bar.update(
-                self.task,
-                description=words,
-                completed=step.done,
-                total=step.increments or None,
-            )
-
-
-class CountProgress(LiveLine):
-    """Tasks done and a note."""
-
-    def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
-        super().__init__(quiet, TextColumn("{task.fields[note]}"))
-        self.what, self.total, self.done, self.already = what, total, done, done
-        self.begun = self.said = time.monotonic()
-        self.quiet = quiet
-        if self.bar is not None:
-            self.task = self.bar.add_task(what, total=total, completed=done, note="")
-
-    def show(self) -> None:
-        """On a terminal at once, elsewhere a plain line a minute."""
-        if self.bar is not None:
-            self.bar.update(self.task, completed=self.done, total=self.total, note=self.note())
-        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
-            self.said = time.monotonic()
-            words = f"{self.done} of {self.total} {self.what}, {self.note()}"
-            print(words, file=sys.stderr, flush=True)
-
-    def note(self) -> str:
-        """What to say beside the count."""
-        return self.left()
-
-    def left(self) -> str:
-        """Time left, from the tasks done so far."""
-        fresh = self.done - self.already
-        if not fresh:
-            return "? left"
-        each = (time.monotonic() - self.begun) / fresh
-        return f"{each * (self.total - self.done):.0f} s left"
 
 
 class NamedProgress(CountProgress):
@@ -129,6 +38,8 @@ class StudyProgress(CountProgress):
         self.starts = total
         self.best: float | None = None
         self.analyses = 0
+        #: The start that last had an analysis, and what that left of the objective.
+        self.under_way: tuple[int, float | None] | None = None
 
     def saw(self, record: object) -> None:
         """Take note of a record, of a stage that begins, or of time passing."""
@@ -136,8 +47,10 @@ class StudyProgress(CountProgress):
             self.begin(record)
         elif isinstance(record, EvaluationRecord):
             self.analyses += 1
+            self.under_way = record.start, record.objective
         elif isinstance(record, StartRecord):
             self.done += 1
+            self.under_way = None
             if record.objective is not None:
                 self.best = min(self.best or record.objective, record.objective)
         self.show()
@@ -151,14 +64,21 @@ class StudyProgress(CountProgress):
             0,
             None,
         )
+        self.under_way = None
         self.begun = time.monotonic()
         if self.bar is not None:
             self.bar.update(self.task, description=stage.what)
 
     def note(self) -> str:
-        """Best objective so far, analyses, time left."""
-        best = "none yet" if self.best is None else f"{self.best:.3g}"
-        return f"best e {best}, {self.analyses} analyses, {self.left()}"
+        """Best objective so far, that of the start under way, analyses, time left."""
+        parts = [] if self.best is None else [f"best {self.best:.3g}"]
+        if self.under_way is not None:
+            start, value = self.under_way
+            parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
+        begun = parts or ["no analysis yet"]
+        return ", ".join(
+            [*begun, f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}", self.left()]
+        )
 
 
 class FitsProgress(StudyProgress):

@@ -6,10 +6,17 @@ from pathlib import Path
 
 import click
 
+from .examples import examples
 from .exits import exits
 
 
-@click.command("schema")
+@click.command(
+    "schema",
+    epilog=examples(
+        "bubblefit schema",
+        "bubblefit schema --out project.schema.json",
+    ),
+)
 @click.option("--out", type=click.Path(path_type=Path), help="File to write [print it].")
 @exits
 def command(out: Path | None) -> None:

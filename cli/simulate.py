@@ -20,10 +20,13 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .ending import written_to
+from .examples import examples
 from .exits import exits
+from .live_line import SeriesProgress
 from .options import data_folders, read_with_solver, result_folder
-from .progress import SeriesProgress
 from .simulate_bend import simulate_bend
+from .usage import Suggesting
 
 
 def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -67,15 +70,28 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
         return
     for words in done.lines:
         click.echo(words)
-    click.echo(f"written to {folder}")
+    click.echo(written_to(folder))
 
 
-@click.group("simulate")
+@click.group(
+    "simulate",
+    cls=Suggesting,
+    epilog=examples(
+        "bubblefit simulate bubble project.toml --card out/project/material.toml",
+        "bubblefit simulate bend --diameter 150 --pressure 140 --card material.toml",
+    ),
+)
 def command() -> None:
     """Forward analyses with material cards, one or several side by side."""
 
 
-@command.command("test")
+@command.command(
+    "test",
+    epilog=examples(
+        "bubblefit simulate test project.toml --card out/project/material.toml",
+        "bubblefit simulate test project.toml --test bubble --card one.toml --card two.toml",
+    ),
+)
 @card_options
 def simulate_test(**options: Any) -> None:
     """Run the tests of PROJECT.toml with the materials of one or several cards.
@@ -86,14 +102,26 @@ def simulate_test(**options: Any) -> None:
     run_simulation("simulate test", options)
 
 
-@command.command("bubble")
+@command.command(
+    "bubble",
+    epilog=examples(
+        "bubblefit simulate bubble project.toml --card material.toml",
+        "bubblefit simulate bubble project.toml --card material.toml --within-range",
+    ),
+)
 @card_options
 def simulate_bubble(**options: Any) -> None:
     """Inflate the bubbles of PROJECT.toml with the materials of one or several cards."""
     run_simulation("simulate bubble", options, "bubble")
 
 
-@command.command("uniaxial")
+@command.command(
+    "uniaxial",
+    epilog=examples(
+        "bubblefit simulate uniaxial project.toml --card material.toml",
+        "bubblefit simulate uniaxial project.toml --card a.toml --card b.toml --out out/both",
+    ),
+)
 @card_options
 def simulate_uniaxial(**options: Any) -> None:
     """Pull the strips of PROJECT.toml with the materials of one or several cards.

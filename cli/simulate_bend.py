@@ -10,6 +10,7 @@ import click
 from pydantic import ValidationError
 
 from ..errors import InputError
+from .examples import examples
 from .predicting import prediction_options, run_predictions
 
 if TYPE_CHECKING:
@@ -24,7 +25,13 @@ SHAPE = (
 )  # fmt: skip
 
 
-@click.command("bend")
+@click.command(
+    "bend",
+    epilog=examples(
+        "bubblefit simulate bend --diameter 150 --pressure 140 --card material.toml",
+        "bubblefit simulate bend --diameter 200 --pressure 70 --card material.toml --places 50,100",
+    ),
+)
 @click.option("--diameter", type=float, required=True, metavar="MM", help="Before inflation.")
 @click.option("--pressure", type=float, required=True, metavar="KPA", help="Gauge pressure.")
 @click.option(

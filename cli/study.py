@@ -20,9 +20,12 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .ending import written_to
+from .examples import examples
 from .exits import exits
+from .live_line import SeriesProgress
 from .options import data_folders, read_with_solver, result_folder
-from .progress import SeriesProgress
+from .usage import Suggesting
 
 What = Literal["elements", "increments"]
 
@@ -65,15 +68,28 @@ def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **g
         return
     for words in done.lines():
         click.echo(words)
-    click.echo(f"written to {folder}")
+    click.echo(written_to(folder))
 
 
-@click.group("study")
+@click.group(
+    "study",
+    cls=Suggesting,
+    epilog=examples(
+        "bubblefit study mesh project.toml --card out/project/material.toml",
+        "bubblefit study nu12 project.toml --card out/project/material.toml",
+    ),
+)
 def command() -> None:
     """What refinement, or nu12, changes in the analyses of a project."""
 
 
-@command.command("mesh")
+@command.command(
+    "mesh",
+    epilog=examples(
+        "bubblefit study mesh project.toml --card out/project/material.toml",
+        "bubblefit study mesh project.toml --card material.toml --what increments --levels 3",
+    ),
+)
 @card_options
 @click.option(
     "--what",
@@ -107,7 +123,13 @@ def study_mesh(what: What, levels: int, factor: int, coarser: int | None, **opti
     run_study(what if what == "increments" else "mesh", study, options)
 
 
-@command.command("nu12")
+@command.command(
+    "nu12",
+    epilog=examples(
+        "bubblefit study nu12 project.toml --card material.toml",
+        "bubblefit study nu12 project.toml --card material.toml --nu12 0.1 --nu12 0.4",
+    ),
+)
 @card_options
 @click.option(
     "--nu12", "values", type=float, multiple=True,

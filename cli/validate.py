@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
+from .ending import written_to
+from .examples import examples
 from .exits import resumable
 from .fitting import fit_options
 from .options import (
@@ -25,7 +27,15 @@ if TYPE_CHECKING:
     from ..fits.project import Project
 
 
-@click.command("validate")
+@click.command(
+    "validate",
+    epilog=examples(
+        "bubblefit validate project.toml --form cubic --form spline:6",
+        "bubblefit validate project.toml --leave frames",
+        "bubblefit validate project.toml --weights strips",
+        "bubblefit validate project.toml --card out/project/material.toml",
+    ),
+)
 @click.option(
     "--form",
     "forms",
@@ -60,11 +70,6 @@ def command(
     tests instead; with --card cards at the tests, without a fit. Writes validation.csv and
     result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
     over the weight of a kind of test: weights.csv, weights.png, result.json.
-
-    \b
-        bubblefit validate PROJECT.toml --form cubic --form spline:6
-        bubblefit validate PROJECT.toml --leave frames
-        bubblefit validate PROJECT.toml --weights strips
     """
     from ..fits.cards import chosen_cards
     from ..notes import lines as note_lines
@@ -90,7 +95,7 @@ def command(
                 command_line=command_line(),
             )  # fmt: skip
     validation.write(folder)
-    lines = [*validation.lines(), *note_lines(validation.notes), f"written to {folder}"]
+    lines = [*validation.lines(), *note_lines(validation.notes), written_to(folder)]
     said = json.dumps(validation.result, indent=1) if options["as_json"] else "\n".join(lines)
     click.echo(said)
 
@@ -126,5 +131,5 @@ def _weights(counted: str, forms: Sequence[str], options: Mapping[str, Any]) -> 
             command_line=command_line(),
         )  # fmt: skip
     study.write(folder)
-    lines = [*study.lines(), *note_lines(study.notes), f"written to {folder}"]
+    lines = [*study.lines(), *note_lines(study.notes), written_to(folder)]
     click.echo(json.dumps(study.result, indent=1) if options["as_json"] else "\n".join(lines))

@@ -10,12 +10,19 @@ from pathlib import Path
 import click
 
 from ..studies.verification import SUBJECTS, Number, numbers
+from .examples import examples
 from .exits import WORSE, exits
 
 COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9}  source"
 
 
-@click.command("verify")
+@click.command(
+    "verify",
+    epilog=examples(
+        "bubblefit verify",
+        "bubblefit verify --subject bars --subject hencky",
+    ),
+)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME",
               help=f"Only this one: {', '.join(SUBJECTS)}.  [all]")  # fmt: skip
 @click.option("--data", type=Path, metavar="FOLDER",

@@ -9,6 +9,7 @@ from typing import Any
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History, Solver
 from ..solvers.registry import usable_solver
+from .logged import timed
 from .project import Project
 
 
@@ -57,6 +58,10 @@ class Analyses:
         SolverFailure : it does not end well.
         """
         self.count += 1
+        with timed(f"analysis {self.count}, {part}, by {self.solver.name}"):
+            return self._run(part, model, law, increments)
+
+    def _run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
         tell, count = self._progress, self.count
         if tell is None:
             return self.solver.run(model, law)

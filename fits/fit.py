@@ -15,6 +15,7 @@ from .budget import with_certainty
 from .doubts import judge
 from .facts import facts_of, solver_facts
 from .failure_page import failure_page
+from .logged import log_record, timed
 from .project import Project
 from .record import Record, data_rows, this_run
 from .result import Fit
@@ -76,7 +77,8 @@ def fit(
     trusted = [*project.fit.trust, *trust]
     project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
-    setup = prepare_fit(project, chosen)
+    with timed("tests and their data made ready"):
+        setup = prepare_fit(project, chosen)
     problem = setup.problem()
     judgements = judge(setup)
     for judgement in judgements:
@@ -97,8 +99,10 @@ def fit(
         files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
         done = files.begin(resume)
     with failure_page(None if out is None else Path(out), project.title):
-        records = _records(setup, files, done, progress or _nobody)
-        best = with_certainty(setup, problem, _best(problem, records, project))
+        with timed("all starts"):
+            records = _records(setup, files, done, progress or _nobody)
+        with timed("the best fit once more, and how sure it is"):
+            best = with_certainty(setup, problem, _best(problem, records, project))
     return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
 
 
@@ -136,6 +140,7 @@ def _records(
     def ran(record: EvaluationRecord | StartRecord | None) -> None:
         if record is not None and files is not None:
             files.add(record)
+        log_record(record)
         progress(record)
 
     try:

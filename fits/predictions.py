@@ -23,6 +23,7 @@ from ..solvers.registry import solver_named, usable_solver
 from .cards import Cards, card_sources, chosen_cards
 from .facts import solver_facts
 from .failure_page import failure_page
+from .logged import log_run
 from .prediction_result import Predictions, predicted_kind
 from .processes import Task, run_tasks
 from .project import Project, cores
@@ -262,6 +263,7 @@ def _run(
         thick = other_thickness(card, project.fabric.thickness)
         notes = [*notes_of_record(record, card), *thick]
         ended[number] = replace(pair, record=record, notes=notes)
+        log_run(pair.title, record, again)
         progress(RunEvent(ended[number], len(ended), len(pairs), again))
 
     progress(RunEvent(None, 0, len(pairs)))

@@ -62,6 +62,7 @@ def run_folder(
     with _undisturbed():
         folder = fresh_folder(name, parent)
         _under_way.add(folder)
+    log.info("%s runs in %s", solver, folder)
     try:
         yield folder
     except SolverFailure as failure:

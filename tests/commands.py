@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import pkgutil
+import re
 import signal
 import subprocess
 import sys
@@ -24,6 +25,8 @@ from click.testing import CliRunner
 TIMEOUT_S = 300.0
 #: How long a command that is told to stop may take to end.
 ENDING_S = 30.0
+#: np.float64(0.5), array([0.5, 1. ]), [0.5 1. ]
+NUMPY = re.compile(r"\bnp\.\w+\(|\barray\(|\[ ?-?\d+\.\d* +-?\d+\.\d*[\]\s]")
 #: Rooms that commands import as they go.
 ROOMS = ("cli", "data", "experiments", "fits", "materials", "reports", "solvers", "studies")
 
@@ -64,7 +67,14 @@ def bubblefit(
     exit_code = os.waitstatus_to_exitcode(status)
     done = subprocess.CompletedProcess(command, exit_code, *texts)
     assert done.returncode == code, done.stderr + done.stdout
+    plain(done.stdout + done.stderr)
     return done
+
+
+def plain(text: str) -> None:
+    """What a command prints is for people: no numbers or arrays as numpy writes them."""
+    found = NUMPY.search(text)
+    assert found is None, text[max(found.start() - 80, 0) :][:200] if found else ""
 
 
 @cache
@@ -149,6 +159,7 @@ def in_process(*arguments, cwd, code=0):
     finally:
         os.chdir(here)
     assert done.exit_code == code, (done.output, done.exception)
+    plain(done.output)
     return done
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 import pytest
-from bubblefit.cli.fitting import lines_of
+from bubblefit.cli.fit_words import lines_of
 from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder import page as cylinders
 from bubblefit.fits import page as fit_page
@@ -188,7 +188,7 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
     patch.setattr(fit_page, "_pinned", lambda *_: [])
     patch.setattr(type(fit.setup.tests[0]), "show", lambda *_: Exhibit())
     page = fit.report(folder)
-    return Told(lines_of(fit, folder), _json(folder), folder, page.read_text())
+    return Told(lines_of(fit, folder, every=True), _json(folder), folder, page.read_text())
 
 
 def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:

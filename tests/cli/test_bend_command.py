@@ -105,7 +105,7 @@ def test_the_files_of_a_study_agree(study) -> None:
         np.testing.assert_allclose(amount, amount.iloc[0])
         stem = "-".join([*key[0].replace(",", "").split(), key[1]])
         assert (out / "beams" / f"{stem}.vtu").exists()
-    assert text.count(" N/mm") == 1 and "written to out (open report.html)" in text
+    assert text.count(" N/mm") == 1 and "page: out/report.html" in text
     assert list(result["tests"]) == list(tests) and result["cards"] == list(cards)
 
 

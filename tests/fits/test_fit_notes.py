@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fitting import lines_of
+from bubblefit.cli.fit_words import lines_of
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.identification.assessment import certainty
@@ -30,7 +30,7 @@ def fitted(tmp_path_factory) -> tuple[bf.Fit, Path]:
 
 def test_notes_stand_everywhere(fitted) -> None:
     fit, out = fitted
-    terminal = lines_of(fit, out)
+    terminal = lines_of(fit, out, every=True)
     page = html.unescape((out / "report.html").read_text())
     table = pd.read_csv(out / "notes.csv", keep_default_na=False).to_dict("records")
     assert table == fit.result["notes"] and len(table) == len(fit.notes) > 1
@@ -72,8 +72,8 @@ def test_the_residual_stands_beside_the_noise(fitted) -> None:
     misfit = np.concatenate([fit.residuals()["difference_mm"]])
     assert left["rms"] == pytest.approx(np.sqrt(np.mean(misfit**2)), rel=1e-6)
     assert (left["noise"], left["noise_is"], left["unit"]) == (0.05, "assumed", "mm")
-    words = f"bubble {left['rms']:.3g} mm (noise 0.05 mm, assumed)"
-    assert f"RMS residual beside the noise: {words}" in lines_of(fit, out)
+    times = f"{left['rms'] / 0.05:.2g} times the noise (0.05 mm, assumed)"
+    assert f"misfit of bubble: {left['rms']:.3g} mm RMS, {times}" in lines_of(fit, out)
     page = (out / "report.html").read_text()
     assert "Residual beside the noise" in page and f"<td>{number(left['rms'])}</td>" in page
 

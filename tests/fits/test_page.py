@@ -9,7 +9,6 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.cli.fitting import lines_of
 from bubblefit.experiments.base import Exhibit
 from bubblefit.fits import page
 from bubblefit.fits.coefficients import TITLE, two_digits
@@ -393,13 +392,3 @@ def test_every_unknown_with_its_sigma_and_correlations(
     warp = shown.rows[2]
     assert warp[:4] == ["beta_11", table["value"][2], table["sigma"][2], "GPa"]
     assert warp[4:] == ["0.00", "0.00", "1.00"] == [two_digits(value) for value in (-1e-9, 0, 1)]
-
-
-def test_the_terminal_says_how_far_off_a_modulus_may_be(together: bf.Fit, tmp_path: Path) -> None:
-    (line,) = [line for line in lines_of(together, tmp_path) if line.startswith("95 % bands")]
-    sure = together.best.certainty
-    assert sure is not None
-    lower, upper = sure.band["E1"]
-    own = together.law.beta[11]
-    words = f"E1 -{percent(1 - lower.min() / own)} to +{percent(upper.max() / own - 1)}, E2 -"
-    assert line.startswith(f"95 % bands (noise and mesh), where they are widest: {words}")

@@ -11,7 +11,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fitting import lines_of
+from bubblefit.cli.fit_words import lines_of
 from bubblefit.cli.progress import FitsProgress, StudyProgress
 from bubblefit.errors import InputError
 from bubblefit.experiments.base import Weighting
@@ -260,10 +260,10 @@ def test_progress_counts_each_stage_and_forgets_the_other_meshs_objective(fitted
         progress.saw(event)
         heard.append(said(progress))
     assert heard == [
-        ("starts on the coarse mesh", 0, 2, "best e none yet"),
-        ("starts on the coarse mesh", 1, 2, "best e 0.5"),
-        ("starts on the coarse mesh", 2, 2, "best e 0.25"),
-        ("distinct optima on the full mesh", 0, 1, "best e none yet"),
+        ("starts on the coarse mesh", 0, 2, "no analysis yet"),
+        ("starts on the coarse mesh", 1, 2, "best 0.5"),
+        ("starts on the coarse mesh", 2, 2, "best 0.25"),
+        ("distinct optima on the full mesh", 0, 1, "no analysis yet"),
     ]
     progress.saw("the next fit")
-    assert said(progress) == ("starts", 0, 2, "best e none yet")
+    assert said(progress) == ("starts", 0, 2, "no analysis yet")

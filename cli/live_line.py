@@ -1,0 +1,111 @@
+"""A live line of progress on a terminal, a plain line a minute elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
+
+from ..caching import kernels_are_compiled
+from ..fits.analyses import Step
+
+PLAIN_EVERY_S = 60.0
+COMPILING = (
+    "compiling for this machine: the first run takes some tens of seconds more, later ones do not"
+)
+
+
+class LiveLine:
+    """A bar on a terminal, on stderr, so that stdout stays for results; elsewhere none."""
+
+    def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
+        self.bar: Progress | None = None
+        self.quiet = quiet
+        if not quiet and sys.stderr.isatty():
+            self.bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                *more,
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+
+    def __enter__(self) -> Self:
+        if not self.quiet and not kernels_are_compiled():
+            print(COMPILING, file=sys.stderr, flush=True)
+        if self.bar is not None:
+            self.bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+
+class SeriesProgress(LiveLine):
+    """A few analyses one after the other, with the increments of the one that runs."""
+
+    def __init__(self, quiet: bool) -> None:
+        super().__init__(quiet)
+        self.said = time.monotonic()
+        if self.bar is not None:
+            self.task = self.bar.add_task("", total=None)
+
+    def saw(self, step: Step) -> None:
+        """Show how far the analysis is that runs; elsewhere than on a terminal once a minute."""
+        words = f"analysis {step.analysis} of {step.analyses}, {step.part}"
+        if self.bar is None and not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            of = f" of {step.increments}" if step.increments else ""
+            print(f"{words}: increment {step.done:g}{of}", file=sys.stderr, flush=True)
+        if self.bar is not None:
+            self.bar.update(
+                self.task,
+                description=words,
+                completed=step.done,
+                total=step.increments or None,
+            )
+
+
+class CountProgress(LiveLine):
+    """Tasks done and a note."""
+
+    def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
+        super().__init__(quiet, TextColumn("{task.fields[note]}"))
+        self.what, self.total, self.done, self.already = what, total, done, done
+        self.begun = self.said = time.monotonic()
+        if self.bar is not None:
+            self.task = self.bar.add_task(what, total=total, completed=done, note="")
+
+    def show(self) -> None:
+        """On a terminal at once, elsewhere a plain line a minute."""
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done, total=self.total, note=self.note())
+        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            words = f"{self.done} of {self.total} {self.what}, {self.note()}"
+            print(words, file=sys.stderr, flush=True)
+
+    def note(self) -> str:
+        """What to say beside the count."""
+        return self.left()
+
+    def left(self) -> str:
+        """Time left, from the tasks done so far."""
+        fresh = self.done - self.already
+        if not fresh:
+            return "time left not known yet"
+        each = (time.monotonic() - self.begun) / fresh
+        return f"{each * (self.total - self.done):.0f} s left"

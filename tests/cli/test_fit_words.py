@@ -1,0 +1,142 @@
+"""What a fit says on the terminal: every number with its unit, the warning that matters."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+from types import SimpleNamespace
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.cli.ending import written_to
+from bubblefit.cli.fit_words import lines_of, misfit_lines, modulus_lines, warning_lines
+from bubblefit.fits.answer import Answer, answers
+from bubblefit.identification.noise import Misfit
+from bubblefit.notes import GRAVEST, Note, NoteKind, foremost
+
+from ..projects import constant_strips
+
+K = NoteKind
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory: pytest.TempPathFactory) -> bf.Fit:
+    """Strips of constant moduli, one start."""
+    project = bf.read_project(constant_strips(tmp_path_factory.mktemp("words")))
+    return bf.fit(project, tests=["two"], starts=1, jobs=1)
+
+
+def test_moduli_are_told_up_to_where_they_are_fitted(fit: bf.Fit) -> None:
+    told = answers(fit)
+    for name, component in (("E1", 0), ("E2", 1), ("G12", 2)):
+        own = [one for one in told if one.modulus == name]
+        end = fit.best.valid[component]
+        assert [one.end for one in own] == [False] * (len(own) - 1) + [True]
+        assert own[-1].strain == end
+        assert [one.strain for one in own[:-1]] == [
+            s for s in (0, 0.01, 0.02, 0.05, 0.1) if s < 0.95 * end
+        ]
+        for one in own:
+            assert one.value == fit.law.modulus(name, one.strain)
+            assert one.per_width == pytest.approx(one.value * fit.thickness)
+
+
+def test_sigma_and_band_are_those_of_the_tables(fit: bf.Fit) -> None:
+    """The same as in moduli.csv, at its strains."""
+    table = fit.moduli()
+    for one in answers(fit):
+        rows = table[table["modulus"] == one.modulus]
+        assert one.sigma == pytest.approx(
+            np.interp(one.strain, rows["strain"], rows["sigma_relative"]), rel=1e-2
+        )
+        assert one.band is not None
+        assert one.band[0] <= one.value <= one.band[1]
+        for end, column in zip(one.band, ("lower_MPa", "upper_MPa"), strict=True):
+            assert end == pytest.approx(np.interp(one.strain, rows["strain"], rows[column]), 1e-2)
+
+
+def test_the_table_of_the_moduli(fit: bf.Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = [
+        Answer("E1", 0.0, 806.35, 653.14, 0.0441, (753.3, 842.7)),
+        Answer("E1", 0.1073, 490.0, 396.9, 10.0, None, True),
+        Answer("G12", 0.05, 13.972, 11.317),
+    ]
+    monkeypatch.setattr("bubblefit.fits.answer.answers", lambda _: told)
+    title, head, *rows = modulus_lines(fit)
+    assert title == (
+        f"{fit.project.title}: tangent moduli at logarithmic strains, with what noise and mesh "
+        f"leave open within the bounds; kN/m: times {fit.thickness:.4g} mm"
+    )
+    assert head.split() == "strain MPa 1 sigma 95 % band, MPa kN/m".split()
+    assert [" ".join(row.split()) for row in rows] == [
+        "E1, along warp 0 % 806.4 4.4 % 753.3 to 842.7 653.1",
+        "10.7 % 490 unknown not known 396.9 (the end)",
+        "G12, in shear 5 % 13.97 not known not known 11.32",
+    ]
+    assert {len(row.removesuffix("  (the end)")) for row in rows} == {len(head)}
+
+
+def test_noise_alone_is_said_where_the_mesh_is_not_known(fit: bf.Fit) -> None:
+    sure = fit.best.certainty
+    assert sure is not None
+    bare = replace(fit, best=replace(fit.best, certainty=replace(sure, mesh=None)))
+    assert "with what noise alone leave open" in modulus_lines(bare)[0]
+
+
+def test_the_misfit_stands_beside_the_noise() -> None:
+    left = {
+        "a": Misfit(0.31, 0.02, "given", "mm"),
+        "b": Misfit(1.5, 30.0, "assumed", "N"),
+        "c": Misfit(1.0, 0.0, "given", "N"),
+    }
+    assert misfit_lines(SimpleNamespace(misfits=left)) == [  # type: ignore[arg-type]
+        "misfit of a: 0.31 mm RMS, 16 times the noise (0.02 mm, given)",
+        "misfit of b: 1.5 N RMS, 0.05 times the noise (30 N, assumed)",
+        "misfit of c: 1 N RMS, no noise to compare with",
+    ]
+
+
+def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure() -> None:
+    wrong = [K.DISCREPANCY, K.UNSTABLE, K.ABOVE_NOISE, K.DOUBTFUL, K.FLAT_SHEET, K.SURFACES]
+    unsure = [K.BOUND, K.UNCERTAIN, K.MESH]
+    places = [GRAVEST.index(kind) for kind in (*wrong, *unsure, K.STARTS)]
+    assert places == sorted(places) and len(set(GRAVEST)) == len(GRAVEST)
+    notes = [Note(K.STARTS, "one"), Note(K.MESH, "two"), Note(K.DISCREPANCY, "three")]
+    for order in permutations(notes):
+        assert foremost(order) == "three"
+    assert foremost([Note(K.SOLVER, "none of these"), Note(K.ALONE, "it")]) == "it"
+    assert foremost([Note(K.MESH, "first"), Note(K.MESH, "second")]) == "first"
+    assert foremost([]) is None
+
+
+def test_one_warning_and_how_many_more(tmp_path: Path) -> None:
+    notes = [Note(K.STARTS, "some failed"), Note(K.BOUND, "E1 touches", "two"), Note(K.MESH, "m")]
+    where = f"{tmp_path / 'notes.csv'} (or --verbose)"
+    assert warning_lines(notes, tmp_path) == [
+        "warning: two: E1 touches",
+        f"2 further notes: {where}",
+    ]
+    assert warning_lines(notes[:2], tmp_path)[1] == f"1 further note: {where}"
+    assert warning_lines(notes[:1], tmp_path) == ["warning: some failed"]
+    assert warning_lines([], tmp_path) == []
+
+
+def test_the_answer_comes_first_and_the_page_last(fit: bf.Fit, tmp_path: Path) -> None:
+    page = fit.report(tmp_path)
+    lines = lines_of(fit, tmp_path)
+    assert lines[: len(modulus_lines(fit))] == modulus_lines(fit)
+    assert lines[-1] == f"page: {page} (tables and figures beside it)"
+    (found,) = [line for line in lines if " starts ended with a fit" in line]
+    count = fit.result["analyses"]
+    assert found.startswith(f"1 of 1 starts ended with a fit; {fit.setup.objective_is}: best ")
+    assert re.search(rf": best {fit.objective:.3g}, median {fit.objective:.3g}; {count} ", found)
+    assert not [line for line in lines if re.search(r"np\.|array\(|\be of Eq", line)]
+
+
+def test_without_a_page_the_folder_is_named(tmp_path: Path) -> None:
+    assert written_to(tmp_path) == f"written to {tmp_path}"
+    (tmp_path / "report.html").touch()
+    assert written_to(tmp_path) == f"page: {tmp_path}/report.html (tables and figures beside it)"
