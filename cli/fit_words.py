@@ -10,6 +10,7 @@ import numpy as np
 
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
+from .answer import WORDS, answers
 from .ending import written_to
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit) -> list[str]:
     """A table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
-    from ..fits.answer import WORDS, answers
     from ..fits.page import sigma_words
     from ..identification.bands import LEVEL
     from ..reports import percent

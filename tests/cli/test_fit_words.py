@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.cli.answer import Answer, answers
 from bubblefit.cli.ending import written_to
 from bubblefit.cli.fit_words import lines_of, misfit_lines, modulus_lines, warning_lines
-from bubblefit.fits.answer import Answer, answers
 from bubblefit.identification.noise import Misfit
 from bubblefit.notes import GRAVEST, Note, NoteKind, foremost
 
@@ -37,7 +37,7 @@ def test_moduli_are_told_up_to_where_they_are_fitted(fit: bf.Fit) -> None:
         assert [one.end for one in own] == [False] * (len(own) - 1) + [True]
         assert own[-1].strain == end
         assert [one.strain for one in own[:-1]] == [
-            s for s in (0, 0.01, 0.02, 0.05, 0.1) if s < 0.95 * end
+            s for s in (0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3) if s < 0.95 * end
         ]
         for one in own:
             assert one.value == fit.law.modulus(name, one.strain)
@@ -64,7 +64,7 @@ def test_the_table_of_the_moduli(fit: bf.Fit, monkeypatch: pytest.MonkeyPatch) -
         Answer("E1", 0.1073, 490.0, 396.9, 10.0, None, True),
         Answer("G12", 0.05, 13.972, 11.317),
     ]
-    monkeypatch.setattr("bubblefit.fits.answer.answers", lambda _: told)
+    monkeypatch.setattr("bubblefit.cli.fit_words.answers", lambda _: told)
     title, head, *rows = modulus_lines(fit)
     assert title == (
         f"{fit.project.title}: tangent moduli at logarithmic strains, with what noise and mesh "

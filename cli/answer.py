@@ -10,10 +10,10 @@ import numpy as np
 from ..materials.forms.base import COMPONENTS
 
 if TYPE_CHECKING:
-    from .result import Fit
+    from ..fits.result import Fit
 
 #: Logarithmic strains at which moduli are told, and the end of the valid strains beside them.
-STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1)
+STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 #: Of the end: a strain nearer to it is left out, the end stands for it.
 NEAR = 0.95
 #: What a modulus is of.
