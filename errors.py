@@ -99,6 +99,10 @@ class SolverFailure(BubblefitError):
         return type(self), fields
 
 
+class LicenceDenied(SolverFailure):
+    """A program that never began, for want of a licence: another try may do."""
+
+
 def one_line(text: str) -> str:
     """The text with escapes for what a name or a cell may hold and a terminal must not be sent."""
     if text.isprintable():

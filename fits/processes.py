@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import BubblefitError
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem
+from ..solvers.announcements import Announcement, hearing, pass_on
 from ..solvers.scratch import remove_interrupted
 from .start import EvaluationRecord, MeshName, StartRecord, run_start
 
@@ -112,6 +113,10 @@ def run_tasks(
                 continue
             if isinstance(record, BaseException):
                 raise record
+            if isinstance(record, Announcement):
+                pass_on(record)
+                yield None
+                continue
             if isinstance(record, _Ended):
                 left -= 1
                 record = record.record
@@ -170,7 +175,7 @@ def _work(prepare: Callable[[], Task], tasks: Any, records: Any, parent: int) ->
         records.put(record)
 
     try:
-        with threadpool_limits(1):
+        with threadpool_limits(1), hearing(tell):
             task = prepare()
             while (number := tasks.get()) is not None:
                 tell(_Ended(task(number, tell)))

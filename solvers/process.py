@@ -8,8 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -17,6 +18,9 @@ from typing import Generic, TypeVar
 from ..errors import InputError
 
 T = TypeVar("T")
+#: Open files that programs inherit, and whether anybody still wants what they compute.
+_kept_open: ContextVar[tuple[int, ...]] = ContextVar("kept_open", default=())
+_unwanted: ContextVar[Callable[[], bool]] = ContextVar("unwanted", default=lambda: False)
 
 POLL_S = 0.05
 #: Lines of the log that an error carries.
@@ -54,6 +58,30 @@ class Outcome:
         return f"signal {number}"
 
 
+class Unwanted(Exception):
+    """Nobody waits for the result any more: the task was cancelled while its program ran."""
+
+
+@contextmanager
+def kept_open(file: int) -> Iterator[None]:
+    """Programs that are run within inherit the open file: its lock is held until they end, too."""
+    before = _kept_open.set((*_kept_open.get(), file))
+    try:
+        yield
+    finally:
+        _kept_open.reset(before)
+
+
+@contextmanager
+def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
+    """A program that is run within is killed, and `Unwanted` raised, once `unwanted` says so."""
+    before = _unwanted.set(unwanted)
+    try:
+        yield
+    finally:
+        _unwanted.reset(before)
+
+
 def run_process(
     command: Sequence[str | Path],
     folder: Path,
@@ -73,6 +101,7 @@ def run_process(
     Raises
     ------
     InputError : the program cannot be started (not there, no permission, another machine's).
+    Unwanted : see `unless`.
     Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after the group is killed.
     """
     begun = time.monotonic()
@@ -86,6 +115,7 @@ def run_process(
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,
+                pass_fds=_kept_open.get(),
                 preexec_fn=_die_with_parent if _LIBC is not None else None,
             )
         except OSError as error:
@@ -101,6 +131,8 @@ def run_process(
                     if timeout is not None and time.monotonic() - begun > timeout:
                         timed_out = True
                         break
+                if _unwanted.get()():
+                    raise Unwanted
                 if watch is not None:
                     watch()
         finally:

@@ -13,6 +13,8 @@ from ..errors import BubblefitError, InputError, SolverFailure
 from ..section_errors import first_error
 from .base import Solver, SolverCheck
 from .calculix.settings import OFFER as CALCULIX
+from .licence_settings import SCHEDULER, licence_settings, split
+from .licences import licensed
 from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
 from .offer import Offer
@@ -45,7 +47,8 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
     Parameters
     ----------
     path : the project's file; paths in its tables are beside it.
-    tables : [solver] of the project. A plug-in's is as it is written: the plug-in checks it.
+    tables : [solver] of the project. A plug-in's is as it is written, but for licences: the plug-in
+        checks it.
 
     Raises
     ------
@@ -68,7 +71,13 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
         if not isinstance(tables[name], Mapping):
             raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
         check_programs(path, name, tables[name], _started(name))
-        found[name] = dict(tables[name])
+        licences, own = split(tables[name])
+        if SCHEDULER in licences:  # who answers there can run code here: only the user may name it
+            raise InputError(path, f"solver.{name}.{SCHEDULER}", "say --scheduler instead")
+        found[name] = {
+            **own,
+            **licence_settings(name, licences, path).model_dump(exclude_unset=True),
+        }
     return found
 
 
@@ -84,6 +93,8 @@ def _started(name: str) -> tuple[str, ...]:
 def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) -> Solver:
     """A new solver with its constructor's `options`: ours, else that of a plug-in.
 
+    What options say of licences is not the solver's matter: every external one is held to it.
+
     Parameters
     ----------
     cache : where runs of another program are kept; every run is made where it is None.
@@ -94,17 +105,22 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
     SolverFailure : a plug-in that does not work; names its distribution.
     """
     # A plug-in cannot take the place of one of ours.
+    make: Callable[..., Solver]
     if name in SOLVERS:
-        solver = SOLVERS[name](**options)
+        make = SOLVERS[name]
     else:
         plug_in = plug_in_named(name)
         if plug_in is None:
             raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
-        solver = plug_in.make(**options)
+        make = plug_in.make
+    licences, own = split(options)
+    made = make(**own)
+    # The project's words count more than the site's.
+    solver = licensed(made, name, {**getattr(made, "site_licences", {}), **licences})
     if cache is None:
         return solver
     section = solver_sections().get(name)
-    return with_cache(solver, cache, options if section is None else section.counted(options))
+    return with_cache(solver, cache, own if section is None else section.counted(own))
 
 
 def usable_solver(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
-from bubblefit.solvers.marc.solver import MarcSolver
+from bubblefit.solvers.registry import solver_named
 
 from . import needs
 
@@ -34,13 +35,13 @@ class StandIn:
         """From now on it fails as `fault` says."""
         (self.folder / "fault").write_text(fault)
 
-    def solver(self, **settings) -> MarcSolver:
+    def solver(self, **settings) -> Any:
         """Marc's adapter on it; increments as the model has them unless said."""
         if settings.get("law") == "hypela2":
             needs.fortran()
         scratch = self.folder / "scratch"
         scratch.mkdir(exist_ok=True)
-        return MarcSolver(marc=self.program, **{
+        return solver_named("marc", marc=self.program, **{
             "increments": 0, "scratch": str(scratch), **settings
         })  # fmt: skip
 

@@ -7,14 +7,15 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...sections import Positive
+from ..licence_settings import ExternalSettings
 from ..offer import Offer
-from ..settings import Override, SolverSettings
+from ..settings import Override
 
 
-class CalculixSettings(SolverSettings):
+class CalculixSettings(ExternalSettings):
     """How CalculiX is run; `CalculixSolver` says what each key means."""
 
-    paths = ("templates", "scratch")
+    paths = ("templates", "scratch", "licence_folder")
     programs = started = ("ccx",)
     overrides = (
         Override(

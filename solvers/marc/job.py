@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from ...errors import SolverFailure
+from ...errors import LicenceDenied, SolverFailure
 from ..base import Progress
 from ..process import Watch, run_process
-from ..scratch import remove, run_folder
+from ..scratch import run_folder
 from .analysis import Reader
 from .command import find_marc, run_command
 from .deck import JOB
@@ -27,10 +26,6 @@ NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
 WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
 T = TypeVar("T")
 Tell = Callable[[Progress], None]
-
-
-class NoLicence(SolverFailure):
-    """Marc never began, for want of a licence: another try may do."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +46,7 @@ def run_job(
     timeout: float | None = None,
     tell: Tell | None = None,
 ) -> tuple[T, Ending]:
-    """Run it in a fresh scratch folder; again while there is no licence and time to wait.
+    """Run it in a fresh scratch folder.
 
     Parameters
     ----------
@@ -62,23 +57,13 @@ def run_job(
 
     Raises
     ------
-    SolverFailure : it did not end well; the scratch folder is kept and named.
+    SolverFailure : it did not end well; the scratch folder is kept and named. LicenceDenied : it
+        never began, for want of a licence.
     InputError : a Marc that is not there or cannot be started.
     """
     find_marc(settings)
-    seconds = timeout or settings.timeout
-    last = time.monotonic() + settings.licence_wait
-    while True:
-        try:
-            with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-                return _in(folder, job, settings, read, rescue, seconds, tell)
-        except NoLicence as failure:
-            if time.monotonic() + settings.licence_retry > last:
-                raise
-            log.info("%s; trying again in %g s", failure.reason, settings.licence_retry)
-            if failure.scratch is not None:
-                remove(failure.scratch)
-            time.sleep(settings.licence_retry)
+    with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
+        return _in(folder, job, settings, read, rescue, timeout or settings.timeout, tell)
 
 
 def _in(
@@ -115,7 +100,7 @@ def _in(
             number = end.number if failure.exit_number is None else failure.exit_number
             raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
     log.info("stopped early: %s", end.problem)
-    kind = NoLicence if end.licence else SolverFailure
+    kind = LicenceDenied if end.licence else SolverFailure
     try:
         if rescue is not None and end.collapse:
             return rescue(results, end.iterations), end

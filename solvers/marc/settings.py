@@ -13,8 +13,9 @@ from pydantic import ConfigDict, Field, ValidationError
 from ...errors import InputError
 from ...reading import LARGEST_WRITTEN, content_of
 from ...section_errors import first_error
+from ..licence_settings import ExternalSettings
 from ..offer import Offer
-from ..settings import Override, SolverSettings
+from ..settings import Override
 
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
@@ -39,7 +40,7 @@ Count = Annotated[int, Field(ge=1, le=1024)]
 Word = Annotated[str, Field(pattern=r"^[^\s\x00]+$")]
 
 
-class MarcSettings(SolverSettings):
+class MarcSettings(ExternalSettings):
     """Every setting of MSC Marc, with its default.
 
     executable : `run_marc`, by path or by name. version : of Marc, for the record.
@@ -53,19 +54,18 @@ class MarcSettings(SolverSettings):
     pressure_type, pressure_sign : code of the pressure on shells, and the sign that inflates.
     include : files that stand in for blocks of the deck, by the name of the block.
     templates : folder of whole decks of the site's own.
-    timeout : s, of one run. licence_wait : s to go on trying while no licence is free, and
-    licence_retry : s between two tries.
+    timeout : s, of one run.
     scratch, keep : where runs are made, and whether the good ones stay.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-    paths = ("scratch", "templates")
+    paths = ("scratch", "templates", "licence_folder")
     # A bare name may also be in a folder that `modules` put on the PATH.
     programs = ("executable",)
     started = ("executable", "arguments", "environment", "modules")
     # What is included counts by content, in what the solver says of itself.
-    uncounted = ("timeout", "keep", "licence_wait", "licence_retry", "include")
+    uncounted = ("timeout", "keep", "include")
     overrides = (
         Override(
             "marc",
@@ -95,8 +95,6 @@ class MarcSettings(SolverSettings):
     include: dict[str, str] = Field(default_factory=dict)
     templates: str | None = None
     timeout: Seconds = 3600.0
-    licence_wait: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-    licence_retry: Seconds = 30.0
     scratch: str | None = None
     keep: bool = False
 

@@ -17,6 +17,7 @@ from ...notes import Note, NoteKind
 from ..analyses import analysis_of
 from ..base import History, Progress, SolverCheck
 from ..identity import file_mark, in_words, templates_mark
+from ..licence_settings import KEYS
 from . import bubble, cylinder_analysis, strip
 from .analysis import Reader, Run
 from .command import find_marc
@@ -89,6 +90,12 @@ class MarcSolver:
         """Whether the folders of runs that end well stay."""
         return self.settings.keep
 
+    @property
+    def site_licences(self) -> dict[str, Any]:
+        """What the site's file says of licences; the project's own words count more."""
+        return {key: getattr(self.settings, key) for key in KEYS
+                if key in self.settings.model_fields_set}  # fmt: skip
+
     def check(self) -> SolverCheck:
         """Whether there is a run_marc.
 
@@ -112,11 +119,12 @@ class MarcSolver:
         Parameters
         ----------
         scratch : the folder below which the run's own is made.
-        timeout : s, of one run of Marc; waiting for a licence is not counted.
+        timeout : s, of one run of Marc.
 
         Raises
         ------
-        SolverFailure : it did not end well; the scratch folder is kept and named.
+        SolverFailure : it did not end well; the scratch folder is kept and named. LicenceDenied :
+            it never began, for want of a licence.
         InputError : a template or file that cannot be used, a Marc that cannot be started.
         """
         settings, repeats, early = self.settings, 0, ""

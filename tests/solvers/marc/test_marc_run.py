@@ -18,6 +18,7 @@ from bubblefit.solvers.bars import BARS, TOLERANCE
 from bubblefit.solvers.marc import proof
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.registry import solver_named
 from bubblefit.solvers.strains import log_strain
 
 from ...marc_files import sts_text, t19_text
@@ -50,7 +51,7 @@ def fake(machine):
         path.write_text(f"#!/bin/sh\n{script}\n")
         path.chmod(0o755)
         (machine / "scratch").mkdir(exist_ok=True)
-        return MarcSolver(marc=path, scratch=str(machine / "scratch"), **options)
+        return solver_named("marc", marc=path, scratch=str(machine / "scratch"), **options)
 
     return make
 

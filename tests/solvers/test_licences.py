@@ -1,0 +1,413 @@
+"""Licences: never more at once than there are, none lost with who had it, a denied one waited for.
+
+The program that is run counts its copies itself (`counted_program`).
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import stat
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bubblefit.cli.progress import StudyProgress
+from bubblefit.errors import LicenceDenied, SolverFailure
+from bubblefit.fits.processes import run_tasks
+from bubblefit.solvers import licence_locks, licences
+from bubblefit.solvers.announcements import Announcement, announce, hearing
+from bubblefit.solvers.base import BandedSolver, DifferentiatingSolver, ProgramSolver, Solver
+from bubblefit.solvers.licence_locks import locked
+from bubblefit.solvers.licence_settings import LicenceSettings
+from bubblefit.solvers.licences import LicensedSolver, held, patiently
+from bubblefit.solvers.once import Once
+from bubblefit.solvers.registry import solver_named, solver_settings
+from bubblefit.solvers.run_cache import RunCache
+
+from ..complaints import complaint
+from ..counted_program import CountedSolver, seen
+from ..plug_ins import install
+
+FORK: Any = multiprocessing.get_context("fork")
+LAW: Any = None
+PROJECT = Path("/somewhere/project.toml")
+
+
+def settings(folder: Path, licences: int | None = 2, **more: Any) -> LicenceSettings:
+    return LicenceSettings(licences=licences, licence_folder=str(folder / "locks"), **more)
+
+
+def licensed(solver: Any, given: LicenceSettings) -> Any:
+    return licences.licensed(solver, solver.name, given.model_dump(exclude_unset=True))
+
+
+def in_processes(count: int, work: Callable[[int], None]) -> None:
+    processes = [FORK.Process(target=work, args=(n,)) for n in range(count)]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join(60)
+        assert process.exitcode == 0
+
+
+# Counting
+
+
+def test_never_more_at_once_than_there_are_licences(tmp_path: Path) -> None:
+    def work(process: int) -> None:
+        solver = licensed(CountedSolver(tmp_path / "runs"), settings(tmp_path))
+        for job in range(5):
+            solver.run(f"{process}.{job}", LAW)
+
+    in_processes(4, work)
+    found = seen(tmp_path / "runs")
+    assert found.most == 2
+    assert found.begun == found.ended
+    assert found.ended == {f"{p}.{j}": 1 for p in range(4) for j in range(5)}
+
+
+def test_the_program_counts_its_copies(tmp_path: Path) -> None:
+    """Without licences there are as many as there are processes: the test above can fail."""
+    in_processes(4, lambda n: CountedSolver(tmp_path / "runs", 0.3).run(n, LAW) and None)
+    assert seen(tmp_path / "runs").most > 2
+
+
+def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+
+    def work(process: int) -> None:
+        licensed(CountedSolver(folder, 60.0), settings(tmp_path, 1)).run("killed", LAW)
+
+    holder = FORK.Process(target=work, args=(0,))
+    holder.start()
+    wait_for(lambda: (folder / "log").exists())
+    assert holder.pid is not None
+    os.kill(holder.pid, signal.SIGKILL)
+    holder.join()
+    heard: list[Announcement] = []
+    with hearing(heard.append):
+        licensed(CountedSolver(folder), settings(tmp_path, 1)).run("next", LAW)
+    found = seen(folder)
+    assert found.most == 1 and found.ended == {"next": 1}
+
+
+def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path: Path) -> None:
+    """Who started it may be gone before: a child of a child is killed by nobody."""
+    from bubblefit.solvers.process import run_process
+
+    def work(_: int) -> None:
+        with held("acme", settings(tmp_path, 1)):
+            # As a wrapper script leaves a program behind: in a session of its own.
+            script = "setsid sleep 0.8 & sleep 0.2"
+            run_process(["sh", "-c", script], tmp_path, tmp_path / "log")
+
+    in_processes(1, work)
+    begun, heard = time.monotonic(), list[Announcement]()
+    with hearing(heard.append), held("acme", settings(tmp_path, 1)):
+        assert time.monotonic() - begun > 0.2
+    assert [bool(said.words) for said in heard] == [True, False]
+
+
+def test_waiting_is_said_once_and_so_is_its_end(tmp_path: Path) -> None:
+    # Forked before the lock is there: a copy of this process would hold it, too.
+    ready = FORK.Event()
+    process = FORK.Process(target=_hold, args=(settings(tmp_path, 1), tmp_path, ready))
+    process.start()
+    with locked("acme", 1, tmp_path / "locks", lambda: None):
+        ready.set()
+        wait_for(lambda: (tmp_path / "heard").exists())
+        time.sleep(0.2)
+    process.join(30)
+    heard = [Announcement(*said) for said in map(json.loads, lines(tmp_path / "heard"))]
+    assert [said.words for said in heard] == ["waiting for a licence of acme", ""]
+    assert heard[0].of == heard[1].of and str(process.pid) in heard[0].of
+
+
+def _hold(given: LicenceSettings, folder: Path, ready: Any) -> None:
+    ready.wait(30)
+
+    def write(said: Announcement) -> None:
+        with (folder / "heard").open("a") as file:
+            file.write(json.dumps([said.words, said.of]) + "\n")
+
+    with hearing(write), held("acme", given):
+        pass
+
+
+def test_other_programs_and_folders_count_apart(tmp_path: Path) -> None:
+    with (
+        locked("acme", 1, tmp_path / "a", pytest.fail),
+        locked("b", 1, tmp_path / "a", pytest.fail),
+    ):
+        with locked("acme", 1, tmp_path / "b", pytest.fail):
+            pass
+
+
+def test_the_machines_own_folder_is_everybodys(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(licence_locks, "FOLDER", tmp_path / "machine")
+    old = os.umask(0o077)
+    try:
+        with locked("acme", 1, None, pytest.fail):
+            pass
+    finally:
+        os.umask(old)
+    assert stat.S_IMODE((tmp_path / "machine").stat().st_mode) == 0o1777
+    assert stat.S_IMODE((tmp_path / "machine" / "acme-1.lock").stat().st_mode) == 0o666
+
+
+def test_a_file_that_was_tidied_away_is_no_lock(tmp_path: Path) -> None:
+    """Whoever opened it before the other one was there may not run beside who locks that."""
+    with locked("acme", 1, tmp_path, pytest.fail) as file:
+        (tmp_path / "acme-1.lock").unlink()
+        with locked("acme", 1, tmp_path, pytest.fail) as other:
+            assert not os.path.samestat(os.fstat(file), os.fstat(other))
+            assert licence_locks._any(tmp_path, "acme", 1) is None
+
+
+def test_a_link_is_not_followed_and_a_folder_must_be_one(tmp_path: Path) -> None:
+    (tmp_path / "victim").write_text("")
+    (tmp_path / "acme-1.lock").symlink_to(tmp_path / "victim")
+    for place in (tmp_path, tmp_path / "victim"):
+        given = settings(tmp_path, 1).model_copy(update={"licence_folder": str(place)})
+        said = complaint(held("acme", given).__enter__)
+        assert said.startswith(f"{place}: solver.acme.licence_folder: no licence can be counted")
+
+
+# A denied one
+
+
+@pytest.fixture
+def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
+    """Pauses between tries, none of which is made; time passes as if they were."""
+    made: list[float] = []
+    monkeypatch.setattr(licences.time, "sleep", made.append)
+    monkeypatch.setattr(licences.time, "monotonic", lambda: sum(made))
+    monkeypatch.setattr(licences.random, "uniform", lambda low, high: (low + high) / 2)
+    yield made
+
+
+def denials(count: int, folder: Path, error: type[SolverFailure] = LicenceDenied) -> Any:
+    """Fails so many times, then gives 7; every try leaves a scratch folder."""
+    tries: list[Path] = []
+
+    def run() -> int:
+        if len(tries) == count:
+            return 7
+        tries.append(folder / f"try-{len(tries)}")
+        tries[-1].mkdir()
+        raise error("no licence: none free", "acme", 5, "FLEXlm error -4", tries[-1])
+
+    return run, tries
+
+
+def test_pauses_double_up_to_ten_times_the_first(tmp_path: Path, pauses: list[float]) -> None:
+    run, tries = denials(7, tmp_path)
+    heard: list[Announcement] = []
+    given = settings(tmp_path, licence_wait=1000.0, licence_retry=3.0)
+    with hearing(heard.append):
+        assert patiently(run, "acme", given) == 7
+    assert pauses == [3.0, 6.0, 12.0, 24.0, 30.0, 30.0, 30.0]
+    words = "acme: no licence: none free; trying again in 6 s, for 997 s more at most"
+    assert heard[1] == Announcement(words)
+    assert not any(folder.exists() for folder in tries)
+
+
+def test_after_the_stated_time_it_is_a_failure(tmp_path: Path, pauses: list[float]) -> None:
+    run, tries = denials(99, tmp_path)
+    given = settings(tmp_path, licence_wait=20.0, licence_retry=4.0)
+    with pytest.raises(LicenceDenied) as caught:
+        patiently(run, "acme", given)
+    assert pauses == [4.0, 8.0, 8.0]  # the last one is cut: it is tried once more at the very end
+    failure = caught.value
+    assert failure.reason == "no licence: none free; 4 tries in 20 s (licence_wait)"
+    assert (failure.exit_number, failure.log_tail) == (5, "FLEXlm error -4")
+    assert [folder.exists() for folder in tries] == [False, False, False, True]
+    assert failure.scratch == tries[-1]
+
+
+def test_pauses_differ_by_chance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[float] = []
+    monkeypatch.setattr(licences.time, "sleep", made.append)
+    for k in range(40):
+        (tmp_path / str(k)).mkdir()
+        run, _ = denials(1, tmp_path / str(k))
+        patiently(run, "acme", settings(tmp_path, licence_wait=60.0, licence_retry=2.0))
+    assert 1.0 <= min(made) < 1.4 and 2.6 < max(made) <= 3.0 and len(set(made)) == 40
+
+
+def test_words_of_the_site_mean_a_denied_licence(tmp_path: Path, pauses: list[float]) -> None:
+    given = settings(tmp_path, licence_denied=["flexlm ERROR -4"])
+    run, tries = denials(2, tmp_path, SolverFailure)
+    assert patiently(run, "acme", given) == 7 and len(tries) == 2
+    other = settings(tmp_path, licence_denied=["FLEXlm error -18"])
+    (tmp_path / "other").mkdir()
+    run, tries = denials(2, tmp_path / "other", SolverFailure)
+    with pytest.raises(SolverFailure, match="none free") as caught:
+        patiently(run, "acme", other)
+    assert len(tries) == 1 and "tries" not in caught.value.reason
+
+
+def test_how_long_is_waited_unless_said() -> None:
+    assert LicenceSettings().wait == 0
+    assert LicenceSettings(licences=3).wait == 600
+    assert LicenceSettings(licences=3, licence_wait=0.0).wait == 0
+
+
+# Which solvers have them
+
+ACME = """
+class THING:
+    name, external, progress, identity = "acme", True, None, "acme 1"
+    def __init__(self, acmes=0): pass
+    def run(self, model, law, scratch=None, timeout=None): pass
+    def check(self): pass
+"""
+
+
+def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
+    own = CountedSolver(tmp_path)
+    assert licensed(own, LicenceSettings(licence_denied=["no"])) is own
+    assert licensed(own, LicenceSettings(licence_wait=1.0)) is not own
+    inner = solver_named("membrane")
+    assert licensed(inner, LicenceSettings(licences=1)) is inner  # it needs none
+    plain = licensed(own, LicenceSettings(licences=1))
+    assert isinstance(plain, Solver) and (plain.name, plain.external) == ("counted", True)
+    assert (plain.identity, plain.check()) == (own.identity, own.check())
+    assert not isinstance(plain, DifferentiatingSolver | BandedSolver)
+    plain.progress = print
+    assert own.progress is print
+
+    class Able(CountedSolver):
+        def run_with_sensitivity(self, model: Any, law: Any, parameters: Any = None) -> Any:
+            return model, parameters
+
+        programs = (Path("/opt/acme"),)
+        keep = True
+
+        def band(self, model: Any) -> Any:
+            return (model,)
+
+    able: Any = licensed(Able(tmp_path), settings(tmp_path))
+    assert isinstance(able, DifferentiatingSolver) and isinstance(able, BandedSolver)
+    assert able.run_with_sensitivity(3, LAW, ("nu12",)) == (3, ("nu12",))
+    assert able.band(4) == [4]
+    # What a cache of runs asks.
+    assert isinstance(able, ProgramSolver) and able.programs == (Path("/opt/acme"),)
+    assert able.keep and not plain.keep and not isinstance(plain, ProgramSolver)
+    assert type(able).__module__ == __name__
+
+
+def test_a_run_that_is_in_the_cache_needs_no_licence(packages: Path, tmp_path: Path) -> None:
+    install(packages, "acme", ACME, group="bubblefit.solvers")
+    folder = str(tmp_path / "locks")
+    solver: Any = solver_named(
+        "acme", RunCache(tmp_path / "runs"), licences=1, licence_folder=folder
+    )
+    assert isinstance(solver, Once) and isinstance(solver.solver, LicensedSolver)
+    assert solver.options == {}  # licences change no result
+
+
+def test_slopes_need_a_licence_too(tmp_path: Path) -> None:
+    class Able(CountedSolver):
+        def run_with_sensitivity(self, *_: Any) -> Any:
+            return licence_locks._any(tmp_path / "locks", "counted", 1)
+
+    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
+    assert able.run_with_sensitivity(3, LAW) is None
+
+
+def test_every_external_solver_has_the_keys(packages: Path) -> None:
+    install(packages, "acme", ACME, group="bubblefit.solvers")
+    keys = {"licences": 4, "licence_folder": "locks", "licence_denied": ["no seat"]}
+    tables = {"marc": keys, "calculix": keys, "acme": {**keys, "acmes": 1}}
+    found = solver_settings(PROJECT, tables)
+    for name in tables:
+        solver: Any = solver_named(name, **found[name])
+        assert isinstance(solver, LicensedSolver), name
+        assert solver.licences.licences == 4 and solver.licences.wait == 600
+        assert solver.licences.licence_folder == "/somewhere/locks"
+        assert solver.licences.licence_denied == ["no seat"]
+    assert found["acme"]["acmes"] == 1
+
+
+@pytest.mark.parametrize("name", ["marc", "calculix", "acme"])
+def test_a_wrong_value_names_file_and_key(packages: Path, name: str) -> None:
+    install(packages, "acme", "THING = None", group="bubblefit.solvers")
+    for key, value in {"licences": 0, "licence_wait": -1.0, "licence_denied": "text"}.items():
+        said = complaint(solver_settings, PROJECT, {name: {key: value}})
+        assert said.startswith(f"{PROJECT}: solver.{name}.{key}: expected "), said
+
+
+def test_no_project_names_a_scheduler(packages: Path) -> None:
+    """Who answers there runs code here."""
+    install(packages, "acme", ACME, group="bubblefit.solvers")
+    for name in ("marc", "calculix", "acme"):
+        said = complaint(solver_settings, PROJECT, {name: {"licence_scheduler": "tcp://x:1"}})
+        assert said.startswith(f"{PROJECT}: solver.{name}.licence_scheduler: ")
+
+
+def test_the_sites_file_counts_licences_too(tmp_path: Path) -> None:
+    site = tmp_path / "site.toml"
+    site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
+    solver: Any = solver_named("marc", marc=site, licences=5)
+    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
+    assert solver.licences.licence_folder == str(tmp_path / "locks")
+
+
+# What is said of it
+
+
+def test_what_a_worker_announces_is_heard_here() -> None:
+    def prepare() -> Any:
+        return lambda number, tell: announce("waiting", f"run {number}")
+
+    heard: list[Announcement] = []
+    with hearing(heard.append):
+        records = list(run_tasks(prepare, [4], 1))
+    assert heard == [Announcement("waiting", "run 4")]
+    assert records[-1] is None  # what the task gives; nothing else is a record
+
+
+def test_progress_says_who_waits(capsys: pytest.CaptureFixture[str]) -> None:
+    with StudyProgress(4, quiet=False) as progress:
+        for who in "ab":
+            announce("waiting for a licence of marc", who)
+        assert progress.states == ", 2 waiting for a licence of marc"
+        announce("", "a")
+        announce("denied")
+        assert progress.states == ", 1 waiting for a licence of marc"
+        announce("", "b")
+        assert progress.states == ""
+    # Where there is no bar each is a line, a state once a minute.
+    assert capsys.readouterr().err == "waiting for a licence of marc\ndenied\n"
+    with StudyProgress(4, quiet=True):
+        announce("waiting for a licence of marc", "a")
+    assert capsys.readouterr().err == ""
+
+
+def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    with StudyProgress(4, quiet=False) as progress:
+        announce("waiting for a licence of marc", "a")
+        progress.said -= 100.0
+        progress.show()
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert (
+        said
+        == "0 of 4 starts, best e none yet, 0 analyses, ? left, 1 waiting for a licence of marc"
+    )
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text().splitlines()
+
+
+def wait_for(there: Callable[[], object]) -> None:
+    end = time.monotonic() + 30
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.01)
