@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
+from contextlib import ExitStack
 from typing import Self
 
 from rich.console import Console
@@ -18,6 +20,7 @@ from rich.progress import (
 
 from ..caching import kernels_are_compiled
 from ..fits.analyses import Step
+from ..solvers.announcements import Announcement, hearing
 
 PLAIN_EVERY_S = 60.0
 COMPILING = (
@@ -26,11 +29,17 @@ COMPILING = (
 
 
 class LiveLine:
-    """A bar on a terminal, on stderr, so that stdout stays for results; elsewhere none."""
+    """A bar on a terminal, on stderr, so that stdout stays for results; elsewhere none.
+
+    What is announced while it is there is said on a line of its own; a state (somebody waits for a
+    licence) is on the bar, and without one a line, a minute apart.
+    """
 
     def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
         self.bar: Progress | None = None
-        self.quiet = quiet
+        self.quiet, self._hearing = quiet, ExitStack()
+        self._states: dict[str, str] = {}
+        self._stated: dict[str, float] = {}
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
                 TextColumn("{task.description}"),
@@ -45,13 +54,37 @@ class LiveLine:
     def __enter__(self) -> Self:
         if not self.quiet and not kernels_are_compiled():
             print(COMPILING, file=sys.stderr, flush=True)
+        self._hearing.enter_context(hearing(self.heard))
         if self.bar is not None:
             self.bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._hearing.close()
         if self.bar is not None:
             self.bar.stop()
+
+    def heard(self, said: Announcement) -> None:
+        """Take note of a state, or say it."""
+        if said.of:
+            self._states.pop(said.of, None)
+            if said.words:
+                self._states[said.of] = said.words
+            last = self._stated.get(said.words, -PLAIN_EVERY_S)
+            if time.monotonic() - last < PLAIN_EVERY_S:
+                return
+            self._stated[said.words] = time.monotonic()
+        if self.quiet or not said.words:
+            return
+        if self.bar is None:
+            print(said.words, file=sys.stderr, flush=True)
+        elif not said.of:
+            self.bar.console.print(said.words, markup=False, highlight=False, soft_wrap=True)
+
+    @property
+    def states(self) -> str:
+        """Who is in which state, as the end of a note; "" where nobody is."""
+        return "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
 
 
 class SeriesProgress(LiveLine):
@@ -65,7 +98,7 @@ class SeriesProgress(LiveLine):
 
     def saw(self, step: Step) -> None:
         """Show how far the analysis is that runs; elsewhere than on a terminal once a minute."""
-        words = f"analysis {step.analysis} of {step.analyses}, {step.part}"
+        words = f"analysis {step.analysis} of {step.analyses}, {step.part}{self.states}"
         if self.bar is None and not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
             self.said = time.monotonic()
             of = f" of {step.increments}" if step.increments else ""
@@ -92,10 +125,11 @@ class CountProgress(LiveLine):
     def show(self) -> None:
         """On a terminal at once, elsewhere a plain line a minute."""
         if self.bar is not None:
-            self.bar.update(self.task, completed=self.done, total=self.total, note=self.note())
+            self.bar.update(self.task, completed=self.done, total=self.total,
+                            note=self.note() + self.states)  # fmt: skip
         elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
             self.said = time.monotonic()
-            words = f"{self.done} of {self.total} {self.what}, {self.note()}"
+            words = f"{self.done} of {self.total} {self.what}, {self.note()}{self.states}"
             print(words, file=sys.stderr, flush=True)
 
     def note(self) -> str:

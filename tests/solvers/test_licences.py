@@ -398,7 +398,7 @@ def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch: pytest.MonkeyP
     said = capsys.readouterr().err.splitlines()[-1]
     assert (
         said
-        == "0 of 4 starts, best e none yet, 0 analyses, ? left, 1 waiting for a licence of marc"
+        == "0 of 4 starts, best e none yet, , 1 waiting for a licence of marc"
     )
 
 
