@@ -29,11 +29,12 @@ if TYPE_CHECKING:
     from .fits.result import Fit
     from .fits.simulation import simulate
     from .materials.card import MaterialCard, read_card
+    from .studies.bootstrap import bootstrap
     from .studies.plan import plan
     from .studies.profile import profile
 
 __version__ = "0.2.0"
-__all__ = ["Fit", "MaterialCard", "Project", "fit", "plan", "predict", "profile",
+__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predict", "profile",
            "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
@@ -42,6 +43,7 @@ _PLACES = {
     "Fit": "fits.result",
     "MaterialCard": "materials.card",
     "Project": "fits.project",
+    "bootstrap": "studies.bootstrap",
     "fit": "fits.fit",
     "plan": "studies.plan",
     "predict": "fits.predictions",

@@ -58,6 +58,7 @@ class NoteKind(StrEnum):
     ABOVE_NOISE = "above the noise"
     NOT_THE_CARD = "not where the card is"
     NOT_CLOSED = "profile not closed"
+    FEW_UNITS = "few to draw from"
     DISCREPANCY = "wrong form"
     SURFACES = "unfaithful surfaces"
     FLAT_SHEET = "sheet taken for flat"

@@ -22,6 +22,7 @@ COMMANDS = {
     "bend": ("bend", "Inflate and bend cylinders with material cards."),
     "validate": ("validate", "Does a fit foretell the test that it was not given?"),
     "profile": ("profile", "Between what does a modulus lie? Its profile likelihood."),
+    "bootstrap": ("bootstrap", "How far do moduli scatter if the data are drawn again?"),
     "plan": ("plan", "Which test next? Predicted uncertainty of tests that could be made."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
     "simulate": ("simulate", "One forward analysis with a material card."),

@@ -29,6 +29,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "studies.laws:compare_laws,LawComparison", "studies.plan:plan",
          "studies.planned:Plan,Planned", "studies.profile:profile",
          "studies.profiled:Profiles,Profile",
+         "studies.bootstrap:bootstrap", "studies.bootstrapped:Bootstrap",
          "studies.validation:validate,judge_cards", "studies.validated:Validation",
          "studies.weights:weight_study", "studies.weights_result:WeightStudy",
          "studies.convergence:convergence,Convergence"),

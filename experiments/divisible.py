@@ -13,6 +13,8 @@ class Divisible(Protocol):
     """A prepared test of which single parts can be left out of a fit.
 
     Its `comparisons` take the masks of `parts`, and none is among them of which nothing is left.
+    Their objectives say by `of_points(values)` which residuals are of which points: (m,) of values
+    for the points of a mask; a bootstrap lets parts count several times, or not at all.
     """
 
     @property

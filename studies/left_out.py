@@ -48,8 +48,10 @@ def sorts_of(tests: Sequence[PreparedTest]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def parts_of(setup: FitSetup, sort: str) -> list[Part]:
+def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     """Every part of a sort, test by test.
+
+    option : that asked for them, for the complaint.
 
     Raises
     ------
@@ -67,7 +69,7 @@ def parts_of(setup: FitSetup, sort: str) -> list[Part]:
             f"no test has two or more {sort} of which a fit could do without one; what can be "
             f"left out of the tests chosen: {there}, or whole tests"
         )
-        raise InputError(setup.project.path, "--leave", problem)
+        raise InputError(setup.project.path, option, problem)
     return parts
 
 

@@ -137,6 +137,7 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
             r"strain 0\.02: not closed above: the bound of the fit at 12",
         ),
     ),
+    K.FEW_UNITS: ((fits.notes_of_bootstrap, "one: warp: 2 specimens only: so few drawn"),),
     K.SURFACES: ((fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),
     K.FLAT_SHEET: ((fits.notes_of_bubble, "the sheet is taken for flat and taut"),),
     K.UNMATCHED: ((fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),),

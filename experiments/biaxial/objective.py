@@ -89,6 +89,10 @@ class StrainObjective:
             raise InputError(None, "nuisance", f"a biaxial path knows no {', '.join(names)}")
         return np.empty((sum(self.sizes), 0))
 
+    def of_points(self, values: Array) -> Array:
+        """(m,) for each residual, of values for each load of the path."""
+        return np.tile(values[1:], 2)
+
     def shifted(self, here: History, there: History) -> StrainObjective:
         """The objective of a model that shows `here` where this one shows `there`."""
         other = copy.copy(self)

@@ -131,6 +131,11 @@ class FieldObjective:
             return ()
         return tuple(places for places in known for _ in "xyz")
 
+    def of_points(self, values: Array) -> Array:
+        """(m,) for each residual, of values for each place of the targets, frame by frame."""
+        ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
+        return np.concatenate([np.tile(own, 3) for own in np.split(values, ends)])
+
     def shifted(self, here: History, there: History) -> FieldObjective:
         """The objective of a model that moves as `here` where this one moves as `there`."""
         other = copy.copy(self)

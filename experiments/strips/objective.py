@@ -74,6 +74,10 @@ class LoadObjective:
         """(n, 1) mm, the elongation of every reading: neighbours may err as one."""
         return (self.elongation[:, None],)
 
+    def of_points(self, values: Array) -> Array:
+        """(m,) for each residual, of values for each measured point."""
+        return values
+
     def shifted(self, here: History, there: History) -> LoadObjective:
         """The objective of a model that carries `here` where this one carries `there`."""
         other = copy.copy(self)

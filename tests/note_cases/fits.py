@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
 import bubblefit as bf
@@ -24,10 +25,12 @@ from bubblefit.identification.assessment import Certainty, certainty
 from bubblefit.identification.discrepancy import Discrepancy, notes_of_discrepancies
 from bubblefit.identification.likelihood import BOUND, Side
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
+from bubblefit.identification.resampling import Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.studies.bootstrapped import Bootstrap
 from bubblefit.studies.folds import FoldError
 from bubblefit.studies.laws import FormFit, LawComparison
 from bubblefit.studies.profiled import Profile
@@ -106,6 +109,13 @@ def notes_of_profile(*_: Any) -> Iterable[Note]:
     """A modulus that a bound stops, and whose data are fitted better elsewhere."""
     sides = Side((10.0, 9.0), (0.0, 5.0), "", 1), Side((10.0, 12.0), (0.0, -1.0), BOUND, 1)
     return Profile("G12", 0.02, 10.0, 1.0, (9.0, 11.0), *sides, (1.0, 12.0)).notes
+
+
+def notes_of_bootstrap(*_: Any) -> Iterable[Note]:
+    """Of two specimens."""
+    units = [Unit(name, np.zeros(1, dtype=bool)) for name in "ab"]
+    found: Any = SimpleNamespace(notes=())
+    return Bootstrap(found, "specimens", [Group("one: warp", units)], (), 0).notes
 
 
 def notes_of_limit(*_: Any) -> Iterable[Note]:

@@ -1,0 +1,88 @@
+"""The folder of a bootstrap: its tables, bootstrap.png, report.html, notes.csv, result.json."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..fits.coefficients import two_digits
+from ..fits.store import RESULT
+from ..identification.bands import LEVEL
+from ..materials.forms.base import COMPONENTS
+from ..notes import NOTES, NOTES_ARE, write_notes
+from ..reports import Report, Table, write_report
+from ..reports.bootstraps import plot_bootstrap
+from ..writing import replacing, write_text
+from .bootstrap_record import SAMPLES
+from .bootstrapped import METHOD
+
+if TYPE_CHECKING:
+    from .bootstrapped import Bootstrap
+
+TABLE, COEFFICIENTS, FIGURE = "bootstrap.csv", "coefficients.csv", "bootstrap.png"
+
+
+def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
+    """Write everything; raises OutputError. The page's path."""
+    (folder / RESULT).unlink(missing_ok=True)
+    for name, table in ((TABLE, done.table()), (COEFFICIENTS, done.coefficients())):
+        with replacing(folder / name) as path:
+            table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
+    law = done.found.best.law
+    best = {name: law.modulus(name, strain) for name, strain in done.strains.items()}
+    plot_bootstrap(folder / FIGURE, done.strains, best, done.bands, done.of_fit)
+    write_notes(folder, done.notes)
+    page = write_report(folder, _page(done))
+    write_text(folder / RESULT, json.dumps(done.result, indent=1) + "\n")
+    return page
+
+
+def _page(done: Bootstrap) -> Report:
+    told = ", ".join(f"{name} {100 * own:.2g} %" for name, (own, _) in done.sigma.items())
+    caption = (
+        f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
+        "band by the noise alone"
+    )
+    return Report(
+        title=f"{done.found.setup.project.title}: bootstrap over {done.over}",
+        summary=f"1 sigma over {len(done.samples)} samples: {told}.",
+        facts=[
+            ("card", done.found.card),
+            ("tests", ", ".join(test.test.name for test in done.found.setup.tests)),
+            ("drawn", ", ".join(f"{group.name}: {len(group.units)}" for group in done.groups)),
+            ("analyses", done.analyses),
+            ("samples that did not settle", done.unfinished),
+        ],
+        warnings=[note.line for note in done.notes],
+        figures=[(FIGURE, caption)],
+        tables=[_sigmas(done), _correlations(done)],
+        files=[
+            (TABLE, "moduli along their strains, with both bands"),
+            (COEFFICIENTS, "the unknowns, with their correlations over the samples"),
+            (SAMPLES, "every sample: what was drawn, and the optimiser's unknowns"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers of this page, for programs"),
+        ],
+    )
+
+
+def _sigmas(done: Bootstrap) -> Table:
+    rows: list[list[object]] = [
+        [name, *(f"{100 * value:.2g} %" for value in done.sigma[name])] for name in COMPONENTS
+    ]
+    header = ["modulus", "1 sigma of the samples", "of the fit, by noise"]
+    return Table("How far the moduli scatter", header, rows, METHOD, text=(1, 2))
+
+
+def _correlations(done: Bootstrap) -> Table:
+    found = done.coefficients()
+    names = found["unknown"].tolist()
+    own = ["unknown", "value", "sigma", "sigma_of_fit"]
+    rows: list[list[object]] = [
+        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
+        for _, row in found.iterrows()
+    ]
+    header = ["unknown", "value", "1 sigma", "of the fit", *names]
+    note = "Coefficients in MPa; then the correlations over the samples."
+    return Table("Unknowns over the samples", header, rows, note)
