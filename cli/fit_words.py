@@ -32,7 +32,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit) -> list[str]:
     """A table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
-    from ..fits.page import sigma_words
+    from ..fits.determined import sigma_words
     from ..identification.bands import LEVEL
     from ..reports import percent
 
@@ -79,7 +79,7 @@ def test_lines(fit: Fit) -> list[str]:
 
 def sure_lines(fit: Fit) -> list[str]:
     """Unknowns beside the moduli, and what each test pins down."""
-    from ..fits.page import sigma_words
+    from ..fits.determined import sigma_words
 
     lines = [
         f"{verdict.name}: {verdict.words}"

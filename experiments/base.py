@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # a module of types: whoever reads a project need not wait fo
     from ..materials.card import MaterialCard
     from ..materials.law import HypoelasticLaw, ThicknessChange
     from ..reports import Table
+    from ..reports.content import Part
     from ..solvers.base import BandEnd, History, Solver
     from .spread import Around
 
@@ -256,12 +257,23 @@ class Findings:
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """What a test puts on the page of a fit: facts, figures, tables, files that it wrote."""
+    """What a test puts on a page: facts, figures, tables, files that it wrote.
+
+    parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
+    """
 
     facts: Sequence[tuple[str, object]] = ()
     figures: Sequence[Shown] = ()
     tables: Sequence[Table] = ()
     files: Sequence[Shown] = ()
+    parts: Sequence[Part] = ()
+
+    def all_parts(self, title: str = "") -> list[Part]:
+        """Everything but the files, in the order of the page; title : before it, "" for none."""
+        from ..reports import Facts, pictures
+
+        facts = [Facts(self.facts, title)] if self.facts or title else []
+        return [*facts, *self.parts, *pictures(self.figures), *self.tables]
 
 
 @dataclass(frozen=True)

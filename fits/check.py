@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
 from .. import __version__
 from ..experiments.base import Exhibit, FittableTest, Output
 from ..experiments.doubts import Judgement
-from ..reports import Report, Table, write_report
+from ..reports import Report, Section, Table, write_report
 from ..writing import write_text
 from .doubts import judge
 from .project import Project
@@ -112,8 +112,13 @@ class Check:
                     *(n.line for n in j.notes),
                 )
             ],
-            figures=[figure for _, exhibit in exhibits for figure in exhibit.figures],
-            tables=[doubts, *(table for _, exhibit in exhibits for table in exhibit.tables)],
+            sections=[
+                Section("Doubts", [doubts]),
+                Section(
+                    "What was seen",
+                    [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
+                ),
+            ],
             files=[("check.json", "the doubts in plain values")],
             versions={"bubblefit": __version__},
         )

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..experiments.base import Exhibit, Output
 from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
-from ..reports import Report, Table, percent, write_report
+from ..reports import Report, Section, Table, percent, write_report
 from ..writing import replacing
+from .citation import citation
 from .store import RESULT, Store
 
 if TYPE_CHECKING:
@@ -67,11 +69,17 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             for run, how in zip(each, ended, strict=True)
             if run.record.failure or run.record.early
         ],
-        figures=[figure for exhibit in exhibits.values() for figure in exhibit.figures],
-        tables=[
-            *(table for exhibit in exhibits.values() for table in exhibit.tables),
-            *_notes(predictions),
-            *([] if predictions.record is None else predictions.record.tables()),
+        sections=[
+            Section("What was predicted", [
+                part
+                for exhibit in exhibits.values()
+                for part in replace(exhibit, facts=()).all_parts()
+            ]),
+            Section("What to know of the runs", _notes(predictions)),
+            Section(
+                "The record", [] if predictions.record is None else predictions.record.tables()
+            ),
+            Section("How to cite", citation()),
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"),
@@ -81,7 +89,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             *([] if predictions.record is None else predictions.record.files),
         ],
         versions=result["versions"],
-    )
+    )  # fmt: skip
 
 
 def _notes(predictions: Predictions) -> list[Table]:

@@ -16,7 +16,7 @@ RUN, RESULT = "run.json", "result.json"
 PROVENANCE, AS_RUN = "provenance.json", "as-run.toml"
 #: What only a complete result has, beside it: a page and a card of an earlier one must not stand
 #: beside a later one that failed.
-OUTDATED = (RESULT, "report.html", "material.toml")
+OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
 #: What run.json must hold of a folder that an older version wrote: it can be replaced only.
 PARTS = "parts"
 #: What of them can be told in words.

@@ -1,4 +1,4 @@
-"""Figures, the HTML report and VTU files."""
+"""Figures, the page and VTU files."""
 
 from .beam import BeamBodies, plot_beam
 from .bending import (
@@ -10,17 +10,31 @@ from .bending import (
     plot_gas,
 )
 from .biaxial import BiaxialPanel, plot_biaxial
+from .charts import Chart, Charts, Series, dots, line
 from .clock import plot_clock
+from .content import (
+    Download,
+    Facts,
+    Listing,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Words,
+    pictures,
+)
 from .convergence import ConvergencePanel, plot_convergence
 from .curves import plot_curves
-from .html import Report, StartRow, Table, percent, write_report
+from .html import percent, write_report
 from .laws import LawRow, plot_laws
 from .loads import StripCurves, plot_loads
+from .maps import Maps, Shade, Solid, maps_of
 from .moduli import plot_moduli
 from .moduli_together import plot_moduli_together
 from .nu12 import plot_nu12
 from .optima import plot_optima
 from .orders import OrderErrors, plot_orders
+from .packed import pack
 from .pinned import plot_pinned
 from .plan import plot_plan
 from .profiles import plot_profiles
@@ -39,14 +53,30 @@ __all__ = [
     "BendPanel",
     "BendReadings",
     "BiaxialPanel",
+    "Chart",
+    "Charts",
     "ConvergencePanel",
+    "Download",
+    "Facts",
     "LawRow",
+    "Listing",
+    "Maps",
     "OrderErrors",
+    "Picture",
     "Report",
-    "StartRow",
+    "Section",
+    "Series",
+    "Shade",
+    "Solid",
     "StripCurves",
     "Table",
+    "Words",
+    "dots",
+    "line",
+    "maps_of",
+    "pack",
     "percent",
+    "pictures",
     "plot_beam",
     "plot_bending",
     "plot_bending_cases",

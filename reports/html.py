@@ -1,108 +1,106 @@
-"""The report of a fit: one HTML page beside its figures."""
+"""The page: report.html, one file with everything inside, made of the data in page.json."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from math import inf, isfinite
+import base64
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields
+from datetime import date
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from jinja2 import FileSystemLoader
+from markupsafe import Markup
 
 from ..rendering import TEMPLATES, environment
 from ..writing import replacing
+from .chart_svg import chart_svg
+from .content import Report
+from .embedded import data_uri
+from .map_svg import map_svg
+from .page_data import charts_data, maps_data, solid_data
+from .page_file import as_written, write_page_data
+from .solid_svg import solid_svg
 
-
-@dataclass(frozen=True)
-class StartRow:
-    """One start of the multistart, as result.json lists it."""
-
-    seed: int
-    objective: float | None
-    status: str
-    analyses: int
-
-
-@dataclass(frozen=True)
-class Table:
-    """A further table; numbers are written with four significant digits, text as it is.
-
-    text : columns that are words: set from the left, as the first always is.
-    """
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[object]]
-    note: str = ""
-    text: Sequence[int] = ()
-
-
-@dataclass(frozen=True)
-class Report:
-    """All that the page shows. Empty parts are left out.
-
-    Parameters
-    ----------
-    title : of the project.
-    summary : a sentence or two: how good is the fit.
-    facts : label and value pairs for the head of the page, values as text or numbers.
-    coefficients : rows (name, value, lower bound, upper bound) in `unit`.
-    unit : of the coefficients, "GPa" unless the project says otherwise.
-    moduli_error : largest relative error of E1, E2, G12 over the strain reached (0.01 is 1 %),
-        where the solution is known; moduli_error_range : by the same names, the strain from and
-        to which each was compared.
-    strain_reached : largest warp, fill and shear strain in any test.
-    valid_strain : by the same names, the ends up to which the moduli are fitted; as far as was
-        reached unless given.
-    warnings : what a reader must know before using the numbers.
-    figures : (file relative to the page, caption), in order.
-    tables : further tables (R^2 of the surfaces, residuals, nuisance parameters).
-    starts : every start; shown best first.
-    files : (name, what it is) of the output folder.
-    versions : name and version of what computed this.
-    """
-
-    title: str
-    summary: str = ""
-    facts: Sequence[tuple[str, object]] = ()
-    coefficients: Sequence[tuple[str, float, float, float]] = ()
-    unit: str = "GPa"
-    moduli_error: Mapping[str, float] = field(default_factory=dict)
-    moduli_error_range: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    strain_reached: Mapping[str, float] = field(default_factory=dict)
-    valid_strain: Mapping[str, float] = field(default_factory=dict)
-    warnings: Sequence[str] = ()
-    figures: Sequence[tuple[str, str]] = ()
-    tables: Sequence[Table] = ()
-    starts: Sequence[StartRow] = ()
-    files: Sequence[tuple[str, str]] = ()
-    versions: Mapping[str, str] = field(default_factory=dict)
+PAGE = "report.html"
+#: In the order in which they are read.
+SCRIPTS = ("tools", "axes", "charts", "chart_mouse", "maps", "solids", "start")
 
 
 def write_report(folder: Path | str, report: Report) -> Path:
-    """Write `report.html` into the output folder.
+    """Write `page.json` and, made of it, `report.html` into the output folder.
+
+    Pictures must be there already.
 
     Raises
     ------
-    OutputError : the file cannot be written.
+    OutputError : a file cannot be written.
     jinja2.UndefinedError : the template asks for what the report does not have.
     """
-    html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
-    html.filters["number"] = number
-    html.filters["percent"] = percent
-    template = html.get_template("report.html.j2")
-    context = {f.name: getattr(report, f.name) for f in fields(report)}
-    context["starts"] = sorted(report.starts, key=_best_first)
-    page = template.render(context)
-    path = Path(folder) / "report.html"
+    folder = Path(folder)
+    (folder / PAGE).unlink(missing_ok=True) if folder.is_dir() else None
+    write_page_data(folder, report)
+    return write_page(folder, as_written(report))
+
+
+def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
+    """Write only the page: report.html of the folder, or another file.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    path = folder / PAGE if path is None else path
     with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(page_text(folder, report), encoding="utf-8", newline="")
     return path
 
 
-def _best_first(start: StartRow) -> float:
-    value = start.objective
-    return value if value is not None and isfinite(value) else inf
+def page_text(folder: Path, report: Report, today: date | None = None) -> str:
+    """The page as text. folder : of its pictures; today : the day that it names."""
+    html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
+    html.filters |= {
+        "number": number, "percent": percent, "chart_svg": chart_svg, "map_svg": map_svg,
+        "charts_data": charts_data, "maps_data": maps_data, "solid_svg": solid_svg,
+        "solid_data": solid_data, "data_link": data_link,
+        "data_uri": lambda file: data_uri(folder, file),
+    }  # fmt: skip
+    style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8")
+    script = "".join(
+        (TEMPLATES / "report" / "scripts" / f"{name}.js").read_text(encoding="utf-8")
+        for name in SCRIPTS
+    )
+    script = f'"use strict";\n{{\n{script}}}\n'
+    context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
+    context |= {
+        "style": Markup(style), "script": Markup(script), "today": today or date.today(),
+        "policy": policy(style, script),
+    }  # fmt: skip
+    return html.get_template("report.html.j2").render(context)
+
+
+def policy(style: str, script: str) -> str:
+    """What the page may do: run this script, look as this style says, show what is inside it."""
+    allowed: Mapping[str, str] = {
+        "default-src": "'none'",
+        "script-src": _hash(script),
+        "style-src": _hash(style),
+        "img-src": "data:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    return "; ".join(f"{name} {value}" for name, value in allowed.items())
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def data_link(text: str) -> str:
+    """A link whose target is the text itself."""
+    return "data:application/octet-stream;base64," + base64.b64encode(text.encode()).decode()
 
 
 def number(value: object) -> str:

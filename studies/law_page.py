@@ -11,7 +11,16 @@ from ..experiments.base import CardRun, Output, Shown
 from ..experiments.registry import kind_named
 from ..fits.store import RESULT, Store
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import LawRow, Report, Table, plot_laws, write_report
+from ..reports import (
+    LawRow,
+    Picture,
+    Report,
+    Section,
+    Table,
+    pictures,
+    plot_laws,
+    write_report,
+)
 from ..writing import replacing
 from .law_words import conclusion, noise, table_of
 
@@ -40,24 +49,28 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         summary="; ".join(conclusion(result)),
         facts=[("error", result["objective_is"]), ("the data's own noise", total)],
         warnings=[note.line for note in comparison.notes],
-        figures=[
-            ("laws.png", "Error of the fit, and at specimens left out of it"),
-            *(f for test in first.fit.setup.tests for f in _side_by_side(comparison, test, folder)),
-        ],
-        tables=[
-            Table(
-                "Errors",
-                list(table.columns),
-                table.to_numpy(dtype=object).tolist(),
-                "fitted: to all points; left out: at what the fits of the folds were not given",
-            )
+        sections=[
+            Section("Errors", [
+                Picture("laws.png", "Error of the fit, and at specimens left out of it"),
+                Table(
+                    "Errors",
+                    list(table.columns),
+                    table.to_numpy(dtype=object).tolist(),
+                    "fitted: to all points; left out: at what the fits of the folds were not given",
+                ),
+            ]),
+            Section("The forms side by side", pictures([
+                shown
+                for test in first.fit.setup.tests
+                for shown in _side_by_side(comparison, test, folder)
+            ])),
         ],
         files=[
             (COMPARISON, "the table"),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers, for programs"),
         ],
-    )
+    )  # fmt: skip
     written = write_report(folder, page)
     Store(folder).finish(result)
     return written

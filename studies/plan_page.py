@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..fits.store import RESULT
 from ..materials.forms.base import COMPONENTS
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Table, plot_plan, write_report
+from ..reports import Picture, Report, Section, Table, plot_plan, write_report
 from ..writing import replacing, write_text
 from .planned import ASSUMED, words
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 TABLE, FIGURE = "plan.csv", "plan.png"
 WITHOUT = "the present tests alone"
+CAPTION = "1 sigma of the moduli with one more test, root mean square along each"
 
 
 def write_plan(plan: Plan, folder: Path) -> Path:
@@ -51,8 +52,10 @@ def _page(plan: Plan) -> Report:
             *_following(plan),
         ],
         warnings=[note.line for note in plan.notes],
-        figures=[(FIGURE, "1 sigma of the moduli with one more test, root mean square along each")],
-        tables=[_summaries(plan), *(_at_strains(plan, name) for name in COMPONENTS)],
+        sections=[
+            Section("Which test next", [Picture(FIGURE, CAPTION), _summaries(plan)]),
+            Section("Along the strains", [_at_strains(plan, name) for name in COMPONENTS]),
+        ],
         files=[
             (TABLE, "the tables"),
             (NOTES, NOTES_ARE),

@@ -121,7 +121,7 @@ def test_the_files_agree(together):
     # Beneath the fit's tolerance warm and cold analyses differ by rounding.
     assert history["objective"].min() == pytest.approx(result["objective"], rel=1e-3, abs=1e-9)
     page = (out / "report.html").read_text()
-    figures = re.findall(r'src="([^"]+\.png)"', page)
+    figures = re.findall(r'title="([^"]+\.png)"', page)
     assert set(figures) == {p.name for p in out.glob("*.png")}
     own = {"strips-loads.png", "bubble-profiles.png", "bubble-heights.png", "strips-bias.png"}
     assert {"pinned.png", *own} <= set(figures)

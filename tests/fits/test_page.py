@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from bubblefit.experiments.base import Exhibit
 from bubblefit.fits import page
+from bubblefit.fits.answer import WORDS, band_words
 from bubblefit.fits.coefficients import TITLE, two_digits
+from bubblefit.fits.determined import sigma_words
 from bubblefit.fits.numbers import versions
-from bubblefit.reports import Report, StartRow, Table, percent
+from bubblefit.reports import Download, Facts, Report, Table, Words, percent
 
 from ..projects import ELONGATION, MODULI
 
@@ -51,13 +53,36 @@ def reported(fit: bf.Fit, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Repo
 
     monkeypatch.setattr(page, "write_report", keep)
     assert fit.report(folder) == folder / "report.html"
-    # The record, which test_provenance.py looks at, comes last of the tables.
+    # The record, which test_provenance.py looks at, comes after everything but the citation.
     (whole,) = seen
-    tables, record = whole.tables[:-2], whole.tables[-2:]
-    assert [table.title for table in record] == ["The record", "The record: data files"]
+    record, cite = whole.sections[-2:]
+    assert [part.title for part in record.parts] == ["The record", "The record: data files"]
+    assert cite.title == "How to cite"
     own = ("provenance.json", "as-run.toml")
     assert [name for name, _ in whole.files if name in own] == list(own)
-    return replace(whole, tables=tables, files=[f for f in whole.files if f[0] not in own])
+    files = [f for f in whole.files if f[0] not in own]
+    return replace(whole, sections=whole.sections[:-2], files=files)
+
+
+def titled(report: Report, title: str) -> Table:
+    """The one table of a title."""
+    (table,) = [table for table in report.tables if table.title == title]
+    return table
+
+
+def facts(report: Report) -> list[tuple[str, object]]:
+    """Of all sections, in order."""
+    return [pair for part in report.parts if isinstance(part, Facts) for pair in part.pairs]
+
+
+def said(report: Report) -> list[str]:
+    """Every paragraph that is no warning."""
+    return [
+        words
+        for part in report.parts
+        if isinstance(part, Words) and not part.warning
+        for words in part.lines
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -103,38 +128,43 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
     shown = {("one", d): one[d]["rms_N"] for d in one} | {("two", "warp"): two["warp"]["rms_N"]}
     assert shown == {key: pytest.approx(error, rel=2e-3) for key, error in errors.items()}
 
-    assert found.title == "made" and found.unit == "GPa" and found.moduli_error == {}
+    assert found.title == "made" and [section.title for section in found.sections] == [
+        "The answer", "Can it be trusted?", "The moduli over strain", "Measured beside modelled",
+        "What the data determine", "How it was found",
+    ]  # fmt: skip
     a, b, c = (shown[key] for key in (("one", "warp"), ("one", "fill"), ("two", "warp")))
-    assert found.summary == (
+    assert said(found)[0] == (
         f"Best of 2 starts: objective {fit.objective:.3g}; one: RMS errors in N: warp {a:.3g}, "
         f"fill {b:.3g}, together {a + b:.4g}; two: RMS errors in N: warp {c:.3g}, together {c:.4g}."
     )
     objective_is = "weighted sum of the tests' mean relative RMS errors"
-    assert found.facts == [
+    assert facts(found) == [
+        ("Poisson's ratio nu12 (fixed)", 0.0),
+        ("thickness", "0.8 mm, constant"),
+        ("form of the moduli", "constant"),
+        ("matched", "measured points"),
+        ("matched", "measured points"),
         (f"objective: {objective_is}", fit.objective),
         ("method", "lm on membrane"),
-        ("form of the moduli", "constant"),
         ("starts", "2 feasible of 2"),
         ("analyses", sum(r.analyses for r in fit.best.records)),
         ("wall time, s", fit.wall_s),
-        ("Poisson's ratio nu12 (fixed)", 0.0),
-        ("thickness", "0.8 mm, constant"),
-        ("one: matched", "measured points"),
-        ("two: matched", "measured points"),
     ]
-    assert found.coefficients == [
-        ("beta_3", pytest.approx(1e-3 * fit.law.beta[3]), 0.005, 0.2),
-        ("beta_7", pytest.approx(1e-3 * fit.law.beta[7]), 0.03, 1.0),
-        ("beta_11", pytest.approx(1e-3 * fit.law.beta[11]), 0.02, 2.0),
+    assert titled(found, "Coefficients of the law").rows == [
+        ["beta_3", f"{1e-3 * fit.law.beta[3]:.6g}", 0.005, 0.2],
+        ["beta_7", f"{1e-3 * fit.law.beta[7]:.6g}", 0.03, 1.0],
+        ["beta_11", f"{1e-3 * fit.law.beta[11]:.6g}", 0.02, 2.0],
     ]
     assert fit.law.beta[7] == pytest.approx(190, abs=0.1)  # the middle of two specimens
     reached = np.log(22.9 / 20)
-    for strains, warp in ((found.strain_reached, reached), (found.valid_strain, 0.12)):
-        assert strains == {
-            "warp": pytest.approx(warp), "fill": pytest.approx(reached), "shear": 1e-6
-        }  # fmt: skip
-    assert found.starts == [
-        StartRow(r.number, r.objective, r.status, r.analyses) for r in fit.best.records
+    assert titled(found, "Where they end").rows == [
+        ["warp", pytest.approx(0.12), pytest.approx(reached)],
+        ["fill", pytest.approx(reached), pytest.approx(reached)],
+        ["shear", 1e-6, 1e-6],
+    ]
+    best_first = sorted(fit.best.records, key=lambda r: r.objective)
+    assert titled(found, "Starts, best first").rows == [
+        [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(best_first, 1)
     ]
     assert found.files == [
         ("result.json", "all numbers of this page, for programs"),
@@ -147,22 +177,52 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
         ("two-loads.csv", "load curves of the best fit"),
     ]
     assert found.versions == versions()
-    assert found.warnings == [note.line for note in fit.notes]
+    (warned,) = [p for p in found.parts if isinstance(p, Words) and p.warning]
+    assert warned.lines == [note.line for note in fit.notes]
     strips = [
         ("loads", "Load over gauge elongation: measured and modelled"),
         ("failure", "Tangent moduli up to the strains at the end of each strip"),
         ("orders", "Error of load polynomials by order, and with a specimen left out"),
     ]
     assert found.figures == [
-        ("optima.png", f"Optimum of every start: {objective_is}, from worst to best"),
         (
             "moduli.png",
             "Tangent moduli of the best fits over the strains reached, where a dot ends them; with "
             "their bands (95 %, noise and mesh together)",
         ),
-        ("pinned.png", "What each test pins down: one standard deviation of the moduli"),
         *((f"{test}-{name}.png", words) for test in ("one", "two") for name, words in strips),
+        ("pinned.png", "What each test pins down: one standard deviation of the moduli"),
+        ("optima.png", f"Optimum of every start: {objective_is}, from worst to best"),
     ]
+
+
+def test_the_answer_in_words(
+    together: bf.Fit, written: tuple[Report, Told], tmp_path: Path
+) -> None:
+    """At strains that tests reached, with bands, in MPa and per width; the card is inside."""
+    fit, (found, _) = together, written
+    sure = fit.best.certainty
+    assert sure is not None
+    table = titled(found, "Moduli")
+    assert table.header == [
+        "", "unit", "at 0 %", "at 1 %", "at 2 %", "at 5 %", "at 10 %", "known up to"
+    ]  # fmt: skip
+    assert "In brackets the 95 % band" in table.note and "0.8 mm" in table.note
+    warp, per_width, fill, _, shear, _ = table.rows
+    own = fit.law.beta[11]
+    lower, upper = (float(end[0]) for end in sure.band["E1"])
+    assert warp[:3] == [WORDS["E1"], "MPa", f"{own:.0f} ({lower:.0f} to {upper:.0f})"]
+    assert warp[3:7] == [warp[2]] * 4 and warp[7] == "12 %"
+    assert per_width[1:3] == ["kN/m", band_words(0.8 * own, 0.8 * lower, 0.8 * upper)]
+    assert fill[6] is not None and fill[7] == "14 %"
+    # No test shears: nothing is said beyond rest.
+    assert shear[3:7] == [None] * 4
+    assert found.summary.startswith("At 0 % strain: Young's modulus along the warp ")
+    (card,) = [part for part in found.parts if isinstance(part, Download)]
+    inside = tmp_path / card.file
+    inside.write_text(card.text)
+    assert card.file == "material.toml"
+    assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
 
 
 def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Report, Told]) -> None:
@@ -171,12 +231,16 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
     The noise is the misfit or the specimens' scatter about their polynomial, if that is larger.
     """
     fit, (found, told) = together, written
-    determined, left, pins = found.tables[:3]
+    determined = titled(found, "What the data determine")
+    left, pins = (
+        titled(found, "Residual beside the noise"),
+        titled(found, "What each test pins down"),
+    )
     noise = {}
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
             noise[prepared.part(strip.direction)] = max(strip.rms, strip.strip.scatter)
-    said = ", ".join(f"{value:.2g} N ({name})" for name, value in noise.items())
+    noises = ", ".join(f"{value:.2g} N ({name})" for name, value in noise.items())
     shown = {row[0]: row[1:] for row in left.rows}
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
@@ -194,7 +258,7 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
         "noise and residual.",
         text=(3, 4),
     )
-    assert determined.note == f"noise of {said}{NOISE_NOTE}"
+    assert determined.note == f"noise of {noises}{NOISE_NOTE}"
     alone = {}
     for part, value in noise.items():
         test, direction = part.split(": ")
@@ -258,8 +322,7 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
 
 def test_misfit_by_strip(together: bf.Fit, written: tuple[Report, Told]) -> None:
     fit, (found, _) = together, written
-    one = found.tables[3]
-    assert [table.title for table in found.tables[3:]] == ["Misfit by strip"] * 2 + [TITLE]
+    one, _ = [table for table in found.tables if table.title == "Misfit by strip"]
     assert one.header == [
         "strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial", "its RMSE, N",
         "points matched", "load at the end, N",
@@ -297,13 +360,18 @@ def test_starts_that_failed_other_programs_and_no_certainty(
     best = replace(together.best, records=[one, lost], ranked=[one], certainty=None)
     fit = replace(together, best=best)
     found = reported(fit, tmp_path, monkeypatch)
-    facts = dict(found.facts)
-    assert facts["starts"] == "1 feasible of 2" and facts["of them by membrane"] == 4
-    assert facts["of them from the cache"] == 3
+    pairs = dict(facts(found))
+    assert pairs["starts"] == "1 feasible of 2" and pairs["of them by membrane"] == 4
+    assert pairs["of them from the cache"] == 3
     (values,), _ = told.calls["plot_optima"]
     assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
-    assert [table.title for table in found.tables] == ["Residual beside the noise"]
+    assert [table.title for table in found.tables] == [
+        "Moduli", "Where they end", "Residual beside the noise", "Starts, best first",
+        "Coefficients of the law",
+    ]  # fmt: skip
+    answer = titled(found, "Moduli")
+    assert answer.rows[0][2] == f"{fit.law.beta[11]:.3g}" and "brackets" not in answer.note
     assert told.calls["plot_moduli"][1] == {"band": None}
     assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
     assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
@@ -318,20 +386,22 @@ def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) 
     found = reported(alone, tmp_path, monkeypatch)
     error = rms(alone, "two", "warp")
     assert alone.objective == pytest.approx(error, rel=2e-3)
-    assert found.summary == (
+    assert said(found)[0] == (
         f"Best of 1 starts: objective {alone.objective:.3g}; RMS errors in N: warp "
         f"{alone.objective:.3g}, together {alone.objective:.4g}."
     )
-    assert found.facts[0] == ("objective: sum of the strips' RMS errors, N", alone.objective)
-    assert found.facts[-1] == ("matched", "measured points")
-    names = ["optima.png", "moduli.png", "loads.png", "failure.png", "orders.png"]
+    told_facts = facts(found)
+    assert ("objective: sum of the strips' RMS errors, N", alone.objective) in told_facts
+    assert ("matched", "measured points") in told_facts
+    names = ["moduli.png", "loads.png", "failure.png", "orders.png", "optima.png"]
     assert [name for name, _ in found.figures] == names
     assert found.files[-1] == ("loads.csv", "load curves of the best fit")
     assert [t.title for t in found.tables] == [
-        "What the data determine", "Residual beside the noise", "Misfit by strip", TITLE
+        "Moduli", "Where they end", "Residual beside the noise", "Misfit by strip",
+        "What the data determine", "Starts, best first", "Coefficients of the law", TITLE,
     ]  # fmt: skip
-    said = f"objective {alone.objective:.4g}, RMS errors in N: warp {alone.objective:.4g}"
-    assert alone.card.source == f"bubblefit {bf.__version__} strips, project.toml, {said}"
+    source = f"objective {alone.objective:.4g}, RMS errors in N: warp {alone.objective:.4g}"
+    assert alone.card.source == f"bubblefit {bf.__version__} strips, project.toml, {source}"
 
 
 @pytest.mark.usefixtures("nothing_shown")
@@ -363,7 +433,7 @@ def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: 
 
 def test_a_modulus_known_no_better_than_before_is_unknown() -> None:
     """Before the tests each is known to 1000 %, less a thousandth for rounding."""
-    said = [page.sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]
+    said = [sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]
     assert said == ["1.2 %", "100 %", "998 %", "unknown", "unknown"]
 
 

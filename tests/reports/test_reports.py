@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import meshio
@@ -13,14 +11,10 @@ import pytest
 from bubblefit.errors import OutputError
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports import (
-    Report,
-    StartRow,
-    Table,
     plot_heights,
     plot_moduli,
     plot_optima,
     plot_profiles,
-    write_report,
     write_vtu,
 )
 from bubblefit.reports.cuts import node_cut, point_cut
@@ -289,67 +283,6 @@ def test_vtu_holds_the_deformed_mesh(tmp_path: Path):
         write_vtu(mesh, u, path, {"height": np.zeros(3)})
 
 
-def full_report() -> Report:
-    return Report(
-        title="Test <1> & more",
-        summary="Good.",
-        facts=[("objective e", 3.1234567e-12), ("method", "lm")],
-        coefficients=[("beta_0", -7.96788e-3, -1e-2, 0.0)],
-        moduli_error={"E1": 1.2e-6},
-        strain_reached={"warp": 0.0852, "fill": 0.313},
-        valid_strain={"fill": 0.153},
-        warnings=["beta_0 <is> on its bound"],
-        figures=[("figures/sorted optima.png", "Optima")],
-        tables=[Table("Surfaces", ["pressure", "R²"], [[22, 0.99971]], "Table 4.1")],
-        starts=[
-            StartRow(7, None, "the solver failed", 3),
-            StartRow(8, 2e-3, "slow", 30),
-            StartRow(9, 1e-9, "converged", 13),
-        ],
-        files=[("result.json", "everything")],
-        versions={"bubblefit": "0.1.0"},
-    )
-
-
-class Tags(HTMLParser):
-    """Checks that tags close in order, and collects links."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.links: list[str] = []
-
-    def handle_starttag(self, tag, attrs):
-        self.links += [v for k, v in attrs if k in ("src", "href")]
-        if tag not in ("meta", "img"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-
-@pytest.mark.parametrize("report", [full_report(), Report(title="Bare")], ids=["full", "bare"])
-def test_report_is_well_formed(tmp_path: Path, report: Report):
-    tags = Tags()
-    tags.feed(write_report(tmp_path, report).read_text(encoding="utf-8"))
-    assert tags.open == []
-    assert not any("://" in link or link.startswith("/") for link in tags.links)
-
-
-def test_report_shows_everything_and_escapes(tmp_path: Path):
-    page = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
-    for text in (
-        "Test &lt;1&gt; &amp; more", "3.123e-12", "-0.00796788", "0.00012 %", "0.0852",
-        "beta_0 &lt;is&gt;", "figures/sorted%20optima.png", "0.9997", "Table 4.1",
-        "the solver failed", "result.json", "bubblefit 0.1.0",
-    ):  # fmt: skip
-        assert text in page, text
-    row = re.search(r"<td>fill</td><td>(.*?)</td><td>(.*?)</td>", page)
-    assert row is not None and row.groups() == ("0.153", "0.313")
-    assert "<td>warp</td><td>0.0852</td><td>0.0852</td>" in page
-    assert page.index("converged") < page.index("slow") < page.index("the solver failed")
-
-
 def test_numbers():
     assert [number(v) for v in (None, float("nan"), 3, "x", 0.123456)] == [
         "–", "–", "3", "x", "0.1235",
@@ -372,9 +305,3 @@ def test_replacing_keeps_the_old_file_when_the_block_fails(tmp_path: Path):
         temporary.write_text("half")
         raise OSError(28, "No space left on device")
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
-
-
-def test_output_folder_that_cannot_be_made(tmp_path: Path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"report\.html: cannot be written"):
-        write_report(tmp_path / "file", Report(title="x"))

@@ -1,0 +1,86 @@
+// A surface to turn, with mouse, finger or arrow keys.
+const enlivenSolid = async (figure, data) => {
+  const points = await unpack(data.points);
+  const corners = (await unpack(data.faces)).map(Math.round);
+  const shades = await Promise.all(data.shades.map((shade) => unpack(shade.values)));
+  const svg = figure.querySelector("svg.solid"), group = svg.querySelector(".faces");
+  const slider = figure.querySelector("input"), label = figure.querySelector(".slider output");
+  const choice = figure.querySelector("select");
+  const { said, button } = toolbar(figure.querySelector(".one"));
+  said.setAttribute("aria-live", "polite");
+  svg.setAttribute("tabindex", "0");
+  const [loads, nodes] = data.points.shape, faces = data.faces.shape[0];
+  const paths = [...group.children], order = Array.from({ length: faces }, (_, k) => k);
+  const eye = { turn: data.turn, raise: data.raise, scale: data.scale };
+  const ends = data.shades.map((shade, k) => endsOf(shades[k], shade.shades));
+  let waiting = false;
+
+  const draw = () => {
+    waiting = false;
+    const load = Math.min(Number(slider.value), loads - 1), own = Number(choice.value);
+    const a = eye.turn * Math.PI / 180, b = eye.raise * Math.PI / 180;
+    const [ca, sa, cb, sb] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
+    const at = [], near = [];
+    for (let k = 0; k < nodes; k++) {
+      const [x, y, z] = [0, 1, 2].map((i) => points[3 * (load * nodes + k) + i] - data.middle[i]);
+      const away = -sa * x + ca * y;
+      at.push(`${(data.size[0] / 2 + eye.scale * (ca * x + sa * y)).toFixed(1)} ` +
+        `${(data.size[1] / 2 - eye.scale * (z * cb + away * sb)).toFixed(1)}`);
+      near.push(z * sb - away * cb);
+    }
+    const depth = order.map((_, f) =>
+      [0, 1, 2, 3].reduce((sum, i) => sum + near[corners[4 * f + i]], 0));
+    const rank = Array.from(depth.keys()).sort((p, q) => depth[p] - depth[q]);
+    const shade = data.shades[own], colours = data.colours[shade.shades];
+    rank.forEach((f, place) => {
+      order[place] = f;
+      const value = shades[own][load * faces + f];
+      paths[place].setAttribute("d",
+        `M${[0, 1, 2, 3].map((i) => at[corners[4 * f + i]]).join("L")}Z`);
+      paths[place].setAttribute("fill", Number.isNaN(value) ? "#999"
+        : colours[classOf(value, ends[own], colours.length)]);
+    });
+    label.textContent = data.loads[load];
+    tellScale(svg, ends[own], shade.unit, colours);
+  };
+  const later = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };
+  const turn = (by, up) => {
+    eye.turn += by;
+    eye.raise = Math.min(Math.max(eye.raise + up, -90), 90);
+    later();
+  };
+  const zoom = (factor) => { eye.scale *= factor; later(); };
+  const reset = () => {
+    Object.assign(eye, { turn: data.turn, raise: data.raise, scale: data.scale });
+    later();
+  };
+
+  svg.addEventListener("pointerdown", (event) => {
+    svg.setPointerCapture(event.pointerId);
+    svg.focus({ preventScroll: true });
+  });
+  svg.addEventListener("pointermove", (event) => {
+    if (svg.hasPointerCapture(event.pointerId)) {
+      turn(-0.5 * event.movementX, 0.5 * event.movementY);
+      return;
+    }
+    const place = paths.indexOf(event.target), own = Number(choice.value);
+    const load = Math.min(Number(slider.value), loads - 1);
+    said.textContent = place < 0 ? "" : `${data.shades[own].name}: ` +
+      `${shown(shades[own][load * faces + order[place]])} ${data.shades[own].unit}`;
+  });
+  svg.addEventListener("keydown", (event) => {
+    const keys = {
+      ArrowLeft: () => turn(5, 0), ArrowRight: () => turn(-5, 0), ArrowUp: () => turn(0, 5),
+      ArrowDown: () => turn(0, -5), "+": () => zoom(1.2), "-": () => zoom(1 / 1.2), 0: reset,
+    };
+    if (event.key in keys) { keys[event.key](); event.preventDefault(); }
+  });
+  slider.addEventListener("input", later);
+  choice.addEventListener("input", later);
+  button("+", "larger", () => zoom(1.2));
+  button("−", "smaller", () => zoom(1 / 1.2));
+  button("as at first", "turn it back", reset);
+  button("SVG", "save as SVG", () => saveSvg(fileName(data.name, data.loads[slider.value]), svg));
+  draw();
+};

@@ -1,0 +1,214 @@
+"""The page as text: everything shown, escaped, inside one file, and made again from its data."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, OutputError
+from bubblefit.reports import (
+    Chart,
+    Charts,
+    Download,
+    Facts,
+    Listing,
+    Picture,
+    Report,
+    Section,
+    Shade,
+    Solid,
+    Table,
+    Words,
+    dots,
+    line,
+    maps_of,
+    pack,
+    write_report,
+)
+from bubblefit.reports.html import write_page
+from bubblefit.reports.page_file import as_written, read_page_data
+from matplotlib.figure import Figure
+
+#: A square of four quads, raised more and more.
+PLACES = np.array([(x, y) for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
+QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+HEIGHTS = [k * (2.0 - (PLACES**2).sum(axis=1)) for k in (1.0, 2.0)]
+LOADS = ["22 kPa", "59 kPa"]
+
+
+def curves() -> Charts:
+    x = np.linspace(0.0, 0.1, 5)
+    best = line("best <1>", x, 300 - 1000 * x, band=(250 - 1000 * x, 350 - 1000 * x), ends=True)
+    chart = Chart("E1", "strain", "MPa", [best, dots("measured", x, 290 - 900 * x, 1)], "it falls")
+    return Charts("moduli", [chart], "Tangent moduli")
+
+
+def maps() -> object:
+    rows = [("dz", "mm", [h + 0.1 for h in HEIGHTS], HEIGHTS, [-0.1 * h for h in HEIGHTS])]
+    return maps_of("bubble", "pressure", LOADS, [PLACES] * 2, rows, ("x", "y"), "Maps", "a dome")
+
+
+def solid() -> Solid:
+    points = np.array([np.column_stack([PLACES, h]) for h in HEIGHTS])
+    shade = Shade("height", "mm", pack([h[QUADS].mean(axis=1) for h in HEIGHTS]))
+    return Solid("dome", LOADS, "pressure", pack(points), pack(QUADS), [shade], "Dome", "a dome")
+
+
+def full_report() -> Report:
+    return Report(
+        title="Test <1> & more",
+        summary="Good.",
+        facts=[("objective e", 3.1234567e-12), ("method", "lm")],
+        warnings=["beta_0 <is> on its bound"],
+        sections=[
+            Section("Curves", [curves(), Picture("figures/sorted optima.png", "Optima")]),
+            Section("Fields", [maps(), solid()]),
+            Section("Nothing", []),
+            Section("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
+            Section("More", [
+                Words(["said <so>"]), Words(["mind"], marked=True, warning=True),
+                Facts([("mass", 1.0)], "Weights"), Listing("a < b"),
+                Download("card.toml", "a = 'é'\n", "Save it"),
+            ]),
+        ],
+        files=[("result.json", "everything")],
+        versions={"bubblefit": "0.1.0"},
+    )  # fmt: skip
+
+
+class Tags(HTMLParser):
+    """Checks that tags close in order, and collects links and labels."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.pictures: list[dict[str, str]] = []
+
+    def handle_starttag(self, tag, attrs):
+        own = dict(attrs)
+        self.links += [v for k, v in attrs if k in ("src", "href", "xlink:href", "srcset")]
+        assert "style" not in own and not any(name.startswith("on") for name in own)
+        if tag == "img" or (tag == "svg" and own.get("class") != "plot"):
+            self.pictures.append(own)
+        if tag not in ("meta", "img", "input"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def drawn(folder: Path) -> Path:
+    """A picture where the report has it."""
+    path = folder / "figures" / "sorted optima.png"
+    path.parent.mkdir()
+    Figure((1, 1)).savefig(path)
+    return path
+
+
+@pytest.mark.parametrize("report", [full_report(), Report(title="Bare")], ids=["full", "bare"])
+def test_page_is_well_formed_and_loads_nothing(tmp_path: Path, report: Report):
+    drawn(tmp_path)
+    tags = Tags()
+    text = write_report(tmp_path, report).read_text(encoding="utf-8")
+    tags.feed(text)
+    assert tags.open == []
+    assert all(link.startswith("data:") for link in tags.links)
+    assert "@import" not in text and "url(" not in text
+    # Whoever does not see a figure reads what it shows.
+    assert all(own.get("alt") or own.get("aria-label") for own in tags.pictures)
+    assert len(tags.pictures) == (1 + 1 + 3 + 1 if report.sections else 0)
+
+
+def test_page_runs_nothing_but_its_own_script(tmp_path: Path):
+    """A hash of the very bytes between the tags; everything else is forbidden."""
+    import hashlib
+
+    text = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
+    rules = re.search(r'Security-Policy" content="(.*?)"', text)
+    assert rules is not None
+    allowed = dict(rule.split(" ", 1) for rule in rules[1].replace("&#39;", "'").split("; "))
+    assert allowed["default-src"] == "'none'" and allowed["img-src"] == "data:"
+    for tag, rule in (("script", "script-src"), ("style", "style-src")):
+        (inside,) = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
+        assert allowed[rule] == f"'sha256-{digest}'"
+
+
+def test_page_shows_everything_and_escapes(tmp_path: Path):
+    drawn(tmp_path)
+    page = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
+    for text in (
+        "Test &lt;1&gt; &amp; more", "3.123e-12", "beta_0 &lt;is&gt;", "0.9997", "Table 4.1",
+        "result.json", "bubblefit 0.1.0", "best &lt;1&gt;", "said &lt;so&gt;", "a &lt; b",
+        "Weights", 'download="card.toml"', "data:image/png;base64,", "59 kPa", "dz, measured",
+        r"best \u003c1\u003e",
+    ):  # fmt: skip
+        assert text in page, text
+    assert "Nothing" not in page and "<so>" not in page
+    card = re.search(r'href="data:application/octet-stream;base64,(.*?)"', page)
+    assert card is not None and base64.b64decode(card[1]).decode() == "a = 'é'\n"
+
+
+def test_a_picture_that_is_not_there_is_named(tmp_path: Path):
+    (tmp_path / "out").mkdir()
+    outside = drawn(tmp_path)
+    names = ["lost.png", "../figures/sorted optima.png", str(outside)]
+    report = Report("x", sections=[Section("s", [Picture(n, "Fig") for n in names])])
+    page = write_report(tmp_path / "out", report).read_text()
+    assert "<img" not in page
+    assert page.count("is not in the folder") == 3
+
+
+def test_the_page_is_made_again_of_its_data(tmp_path: Path):
+    drawn(tmp_path)
+    first = write_report(tmp_path, full_report()).read_bytes()
+    again = write_page(tmp_path, read_page_data(tmp_path), tmp_path / "again.html").read_bytes()
+    assert again == first
+    assert read_page_data(tmp_path) == as_written(full_report())
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("{", "is damaged"),
+        ("[]", "is damaged"),
+        ("{}", "is damaged"),
+        ('{"layout": 99, "title": "x"}', "another version's layout: expected 1, got 99"),
+        ('{"layout": 1, "title": 3}', "title"),
+        ('{"layout": 1, "title": "x", "sections": [{"title": "s", "parts": [{"part": "?"}]}]}',
+         "sections.0.parts.0"),
+    ],
+)  # fmt: skip
+def test_data_that_are_no_page(tmp_path: Path, content: str, said: str):
+    (tmp_path / "page.json").write_text(content)
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_page_data(tmp_path)
+
+
+def test_no_data(tmp_path: Path):
+    with pytest.raises(InputError, match=r"page\.json.*cannot be read"):
+        read_page_data(tmp_path)
+
+
+def test_data_are_strict_json(tmp_path: Path):
+    """What is no number is missing, in curves and in tables alike."""
+    chart = Chart("a", "x", "y", [line("b", [0, 1, np.nan], [np.inf, 2, 3])])
+    table = Table("t", ["a"], [[np.float64("nan")], [np.int64(3)]])
+    report = Report("x", sections=[Section("s", [Charts("c", [chart], ""), table])])
+    write_report(tmp_path, report)
+    content = json.loads((tmp_path / "page.json").read_text(), parse_constant=pytest.fail)
+    charts, shown = content["sections"][0]["parts"]
+    assert charts["charts"][0]["series"][0]["y"] == [None, 2.0, 3.0]
+    assert shown["rows"] == [[None], [3]]
+
+
+def test_output_folder_that_cannot_be_made(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"page\.json: cannot be written"):
+        write_report(tmp_path / "file", Report(title="x"))
