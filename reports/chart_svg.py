@@ -8,6 +8,7 @@ from markupsafe import Markup, escape
 
 from .axes import PLACES, Axis, axes_of
 from .charts import Chart, Numbers, Series
+from .markup import as_markup
 from .ticks import written
 
 WIDTH, HEIGHT = 460.0, 260.0
@@ -45,7 +46,7 @@ def chart_svg(chart: Chart) -> Markup:
     for look in ("faint", "band", "curve"):
         parts += [mark for s in chart.series for mark in _marks(s, x, y, look)]
     parts += ["</svg>", '<g class="pointer"></g>', "</svg>"]
-    return Markup("".join(parts))
+    return as_markup("".join(parts))
 
 
 def _up(place: float) -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import FileSystemLoader
-from markupsafe import Markup
 
 from ..rendering import TEMPLATES, environment
 from ..writing import replacing
@@ -20,6 +19,7 @@ from .chart_svg import chart_svg
 from .content import Report
 from .embedded import data_uri
 from .map_svg import map_svg
+from .markup import as_markup
 from .page_data import charts_data, maps_data, solid_data
 from .page_file import as_written, write_page_data
 from .solid_svg import solid_svg
@@ -75,7 +75,7 @@ def page_text(folder: Path, report: Report, today: date | None = None) -> str:
     script = f'"use strict";\n{{\n{script}}}\n'
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
-        "style": Markup(style), "script": Markup(script), "today": today or date.today(),
+        "style": as_markup(style), "script": as_markup(script), "today": today or date.today(),
         "policy": policy(style, script),
     }  # fmt: skip
     return html.get_template("report.html.j2").render(context)

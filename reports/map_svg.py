@@ -7,6 +7,7 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from .maps import Maps, Panel, Shades
+from .markup import as_markup
 from .shades import COLOURS, classes, ends
 from .ticks import written
 
@@ -58,7 +59,7 @@ def map_svg(maps: Maps, panel: Panel, load: int) -> Markup:
     parts.append(scale_bar(panel.shades, panel.unit, start, end) + "</g>")
     across = f'x="{LEFT + SIDE / 2:g}" y="{ABOVE + SIDE + 16:g}" text-anchor="middle"'
     parts.append(f'<text class="label" {across}>{escape(maps.x_label)} →</text></svg>')
-    return Markup("".join(parts))
+    return as_markup("".join(parts))
 
 
 def scale_bar(shades: Shades, unit: str, low: float, high: float) -> str:

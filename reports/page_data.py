@@ -12,6 +12,7 @@ from . import map_svg, solid_svg
 from .axes import axes_of
 from .charts import Charts
 from .maps import Maps, Solid
+from .markup import as_markup
 from .shades import COLOURS
 
 
@@ -66,4 +67,5 @@ def solid_data(part: Solid) -> Markup:
 def as_script(content: Any) -> Markup:
     """JSON that ends no script element, whatever it holds."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+    safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return as_markup(safe)

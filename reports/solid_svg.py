@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .map_svg import scale_bar
 from .maps import Solid
+from .markup import as_markup
 from .shades import COLOURS, classes, ends
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
         parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
     parts.append(f'</g><g class="scale" transform="translate({WIDTH - 66:g} {2 * MARGIN:g})">')
     parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
-    return Markup("".join(parts))
+    return as_markup("".join(parts))
 
 
 def middle_of(points: Array) -> Array:

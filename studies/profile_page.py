@@ -10,7 +10,7 @@ from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..identification.likelihood import THRESHOLD
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Table, write_report
+from ..reports import Picture, Report, Section, Table, write_report
 from ..reports.likelihoods import ProfilePanel, plot_likelihoods
 from ..writing import replacing, write_text
 from .profiled import METHOD
@@ -53,8 +53,7 @@ def _page(found: Profiles) -> Report:
             ("analyses", found.analyses),
         ],
         warnings=[note.line for note in found.notes],
-        figures=[(FIGURE, caption)],
-        tables=[_ends(found)],
+        sections=[Section("The profiles", [Picture(FIGURE, caption), _ends(found)])],
         files=[
             (TABLE, "the curves"),
             (NOTES, NOTES_ARE),
