@@ -11,7 +11,7 @@ from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Table, write_report
+from ..reports import Picture, Report, Section, Table, write_report
 from ..reports.bootstraps import plot_bootstrap
 from ..writing import replacing, write_text
 from .bootstrap_record import SAMPLES
@@ -55,8 +55,16 @@ def _page(done: Bootstrap) -> Report:
             ("samples that did not settle", done.unfinished),
         ],
         warnings=[note.line for note in done.notes],
-        figures=[(FIGURE, caption)],
-        tables=[_sigmas(done), _correlations(done)],
+        sections=[
+            Section(
+                "The samples",
+                [
+                    Picture(FIGURE, caption),
+                    _sigmas(done),
+                    _correlations(done),
+                ],
+            ),
+        ],
         files=[
             (TABLE, "moduli along their strains, with both bands"),
             (COEFFICIENTS, "the unknowns, with their correlations over the samples"),
