@@ -22,6 +22,6 @@ from .fitting import fit_options, run_fit
 def command(**options: Any) -> None:
     """Fit the moduli of PROJECT.toml to its bubble inflation tests only.
 
-    Writes what `bubblefit fit` writes, with surfaces.csv, cuts, heights and bubble.vtu.
+    Writes what `bubblefit fit` writes, with surfaces.csv, cuts, heights and bubble.pvd.
     """
     run_fit(options, "bubble")

@@ -217,7 +217,7 @@ class PreparedTest(Protocol):
         """Write the test's own figures, tables and files."""
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched value: part, where it is, quantity, measured, modelled, difference."""
+        """Every matched value: part, where, quantity, measured, modelled, difference, unit."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..errors import InputError
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
 from ..experiments.doubts import Judgement
 from ..identification.noise import Misfit, misfits
@@ -36,6 +37,10 @@ Array = NDArray[np.float64]
 
 #: Laws of the best starts that are drawn together.
 BEST = 5
+#: What `Fit.write_table` writes.
+TABLES = ("residuals", "moduli", "coefficients", "starts")
+#: What every row of the residuals ends with.
+COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
 #: Strains at which `Fit.moduli` lists the moduli.
 PLACES = 61
 
@@ -214,7 +219,12 @@ class Fit:
         return coefficients_of(self)
 
     def residuals(self) -> pd.DataFrame:
-        """Every matched value of every test: test, part, where, measured, modelled, difference."""
+        """Every matched value of every test, a row each.
+
+        Columns test, part, where it is (of a bubble frame, pressure_kPa, x_mm, y_mm; of a strip
+        elongation_mm; of a biaxial test the loads), quantity, measured, modelled, difference
+        (modelled less measured) and the unit of these three.
+        """
         import pandas as pd
 
         frames = []
@@ -223,7 +233,27 @@ class Fit:
             table = prepared.residuals(self.tests[name])
             table.insert(0, "test", name)
             frames.append(table)
-        return pd.concat(frames, ignore_index=True)
+        every = pd.concat(frames, ignore_index=True)
+        return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
+
+    def write_table(self, path: Path | str, table: str = "residuals") -> Path:
+        """Write one of the tables as .csv or .parquet, by the ending of the file's name.
+
+        Parameters
+        ----------
+        table : "residuals", "moduli", "coefficients" or "starts". Parquet needs pyarrow: pip
+            install 'bubblefit[parquet]'.
+
+        Raises
+        ------
+        InputError : another table or ending, or pyarrow is not there. OutputError : the file cannot
+            be written.
+        """
+        from .tables import write_table
+
+        if table not in TABLES:
+            raise InputError(None, "table", f"{table!r} is not one of: {', '.join(TABLES)}")
+        return write_table(getattr(self, table)(), path)
 
     def starts(self) -> pd.DataFrame:
         """How every start ended: start, objective, status, analyses, external_runs,

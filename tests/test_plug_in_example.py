@@ -107,7 +107,7 @@ def test_the_python_interface_fits_by_its_solver(plug_in):
         print(fit.objective, row.quantity, row.measured, row.modelled)
         """)  # fmt: skip
     objective, quantity, measured, modelled = out.split()
-    assert float(objective) < 1e-6 and quantity == "load_N"
+    assert float(objective) < 1e-6 and quantity == "load"
     assert float(measured) == pytest.approx(611.4)
     assert float(modelled) == pytest.approx(611.4, rel=1e-6)
 

@@ -56,7 +56,7 @@ def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
 
 
 def residual_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Every matched strain: part, loads, quantity, measured, modelled, difference (%)."""
+    """Every matched strain: part, loads, quantity, measured, modelled, difference, unit."""
     parts = []
     for p in paths:
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
@@ -67,10 +67,11 @@ def residual_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
                         "part": p.path.ratio,
                         "warp_load_kN_per_m": p.path.load[1:, 0],
                         "fill_load_kN_per_m": p.path.load[1:, 1],
-                        "quantity": f"{yarn}_strain_percent",
+                        "quantity": f"{yarn}_strain",
                         "measured": measured[1:, k],
                         "modelled": modelled[1:, k],
                         "difference": (modelled - measured)[1:, k],
+                        "unit": "%",
                     }
                 )
             )

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...reports import plot_heights, plot_profiles, write_vtu
+import numpy as np
+from numpy.typing import NDArray
+
+from ...reports import plot_heights, plot_profiles
 from ..base import Exhibit, Findings, FittedTest, Output, Shown
 from .findings import objective_of, recorded_of
+from .inflated import at_nodes, write_series
 from .objective import displacement_offset
 from .recorded_words import clock_pictures, recorded_table
 from .registration import registration_picture, registration_table
@@ -16,19 +20,21 @@ from .tables import misfit_table, surface_tables, write_surface_table
 if TYPE_CHECKING:
     from .prepared import PreparedBubble
 
-PROFILES, HEIGHTS, SURFACE = "profiles.png", "heights.png", "bubble.vtu"
+Array = NDArray[np.float64]
+
+PROFILES, HEIGHTS, SERIES = "profiles.png", "heights.png", "bubble.pvd"
 
 
 def exhibit(
     prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output
 ) -> Exhibit:
-    """Write the figures, surfaces.csv and bubble.vtu."""
+    """Write the figures, surfaces.csv and bubble.pvd with its files."""
     files = [
         *write_surface_table(prepared, out),
-        (out.name(SURFACE), "the inflated bubble at the last pressure, for ParaView"),
+        (out.name(SERIES), "the inflated bubble pressure by pressure, for ParaView"),
     ]
-    model = fitted_model(fitted)
-    write_vtu(model.mesh, fitted.histories[0].displacement[-1], out.path(SURFACE))
+    left = left_at_nodes(fitted)
+    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, out.path(SERIES), left)
     of_sheet = sheet_exhibit(prepared, fitted, out)
     figures = [*_figures(prepared, fitted, out), *of_sheet[0]]
     files += of_sheet[1]
@@ -46,6 +52,18 @@ def exhibit(
         tables=tables,
         files=files,
     )
+
+
+def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
+    """(nodes, 3) mm a reported pressure, measured less modelled; None where nothing is matched."""
+    objective, history = objective_of(fitted), fitted.histories[0]
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    left: list[Array | None] = [None] * len(history.displacement)
+    differences = objective.differences(history.displacement, fitted.nuisance)
+    for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
+        frame = number if target.frame is None else target.frame
+        left[frame] = at_nodes(nodes, target.at(nodes), -off)
+    return left
 
 
 def _figures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:

@@ -10,11 +10,12 @@ import pandas as pd
 from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...models.bubble import BubbleModel
-from ...reports import plot_profiles, write_vtu
+from ...reports import plot_profiles
 from ...solvers.base import History
 from ...writing import replacing
 from ..base import CardRun, Output, Simulation, Studied
 from ..notes import STRAINS, strains_of
+from .inflated import write_series
 from .sheet_section import Sheet
 from .test import PART, BubbleTest
 
@@ -55,7 +56,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """displacement.csv, bubble.vtu and profiles.png of every card, and the apex heights."""
+    """displacement.csv, bubble.pvd and profiles.png of every card, and the apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
     for i, name in enumerate(cards, start=1):
@@ -75,7 +76,7 @@ def simulate(
         }
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
-        write_vtu(model.mesh, history.displacement[-1], out.path(f"bubble{suffix}.vtu"))
+        write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
         plot_profiles(
             out.path(f"profiles{suffix}.png"),
             test.pressures,

@@ -200,13 +200,13 @@ class PreparedBubble:
         return findings_of(self, fitted)
 
     def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """Write cuts, heights, moduli, surfaces.csv and bubble.vtu."""
+        """Write cuts, heights, moduli, surfaces.csv and bubble.pvd."""
         from .figures import exhibit
 
         return exhibit(self, fitted, findings, out)
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched displacement component: pressure_kPa, x_mm, y_mm, direction, mm."""
+        """Every matched displacement component, see `tables.residual_table`."""
         from .tables import residual_table
 
         return residual_table(self, fitted)

@@ -62,30 +62,32 @@ def write_surface_table(prepared: PreparedBubble, out: Output) -> list[Shown]:
 def residual_table(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     """A row a place, pressure and direction.
 
-    Columns part, pressure_kPa, x_mm, y_mm, quantity (dx, dy, dz), measured_mm, modelled_mm,
-    difference_mm (modelled less measured, offset included).
+    Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
+    (dx, dy, dz), measured, modelled, difference (modelled less measured, offset included), unit.
     """
     objective = objective_of(fitted)
     (comparison,) = fitted.comparisons
     nodes = comparison.model.mesh.points[:, :2]
     frames = []
     every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
-    for target, modelled in zip(objective.targets, every, strict=True):
+    for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
         places = target.at(nodes)
         for axis, name in enumerate(("dx", "dy", "dz")):
             frames.append(
                 pd.DataFrame(
                     {
                         "part": "bubble",
+                        "frame": frame,
                         "pressure_kPa": 1e3 * target.pressure,
                         "x_mm": places[:, 0],
                         "y_mm": places[:, 1],
                         "quantity": name,
-                        "measured_mm": np.asarray(target.displacement)[:, axis],
-                        "modelled_mm": modelled[:, axis],
+                        "measured": np.asarray(target.displacement)[:, axis],
+                        "modelled": modelled[:, axis],
                     }
                 )
             )
     table = pd.concat(frames, ignore_index=True)
-    table["difference_mm"] = table["modelled_mm"] - table["measured_mm"]
+    table["difference"] = table["modelled"] - table["measured"]
+    table["unit"] = objective.unit
     return table

@@ -193,7 +193,7 @@ class PreparedStrips:
         return exhibit(self.test, self.fitted_strips(fitted), fitted, out)
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched load: part, elongation_mm, quantity, measured, modelled, difference."""
+        """Every matched load, see `tables.residual_table`."""
         from .tables import residual_table
 
         return residual_table(self.fitted_strips(fitted))

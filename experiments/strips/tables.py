@@ -56,7 +56,7 @@ def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
 
 
 def residual_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Every matched load: part, elongation_mm, quantity, measured, modelled, difference (N)."""
+    """Every matched load: part, elongation_mm, quantity, measured, modelled, difference, unit."""
     parts = []
     for fitted in strips:
         modelled, measured = fitted.objective.modelled(fitted.history), fitted.objective.load
@@ -65,10 +65,11 @@ def residual_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
                 {
                     "part": fitted.direction,
                     "elongation_mm": fitted.objective.elongation,
-                    "quantity": "load_N",
+                    "quantity": "load",
                     "measured": measured,
                     "modelled": modelled,
                     "difference": modelled - measured,
+                    "unit": fitted.objective.unit,
                 }
             )
         )

@@ -48,7 +48,7 @@ def test_a_study_writes_everything_it_promises(study):
     assert len(surfaces) == 21 and surfaces["R2"].min() > 0.99
     for name in ("optima.png", "moduli.png", "profiles.png", "heights.png", "report.html"):
         assert (out / name).stat().st_size > 1000, name
-    assert (out / "bubble.vtu").read_bytes().startswith(b"<?xml")
+    assert (out / "bubble.pvd").read_text().count("<DataSet") == 7
     assert "largest error of the moduli" in text
     assert not list(out.glob("*.part")) and not list(out.glob(".*"))
 

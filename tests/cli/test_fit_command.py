@@ -125,7 +125,7 @@ def test_the_files_agree(together):
     assert set(figures) == {p.name for p in out.glob("*.png")}
     own = {"strips-loads.png", "bubble-profiles.png", "bubble-heights.png", "strips-bias.png"}
     assert {"pinned.png", *own} <= set(figures)
-    assert (out / "strips-bias.vtu").exists() and (out / "bubble-bubble.vtu").exists()
+    assert (out / "strips-bias.vtu").exists() and (out / "bubble-bubble.pvd").exists()
     loads = pd.read_csv(out / "strips-loads.csv")
     assert set(loads["direction"]) == set(LENGTHS)
     residuals = pd.read_csv(out / "residuals.csv")

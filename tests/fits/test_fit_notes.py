@@ -69,7 +69,7 @@ def test_the_noise_that_is_given_makes_the_uncertainty(fitted, tmp_path: Path) -
 def test_the_residual_stands_beside_the_noise(fitted) -> None:
     fit, out = fitted
     (left,) = fit.result["misfit"].values()
-    misfit = np.concatenate([fit.residuals()["difference_mm"]])
+    misfit = np.concatenate([fit.residuals()["difference"]])
     assert left["rms"] == pytest.approx(np.sqrt(np.mean(misfit**2)), rel=1e-6)
     assert (left["noise"], left["noise_is"], left["unit"]) == (0.05, "assumed", "mm")
     times = f"{left['rms'] / 0.05:.2g} times the noise (0.05 mm, assumed)"

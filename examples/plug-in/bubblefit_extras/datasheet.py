@@ -168,10 +168,11 @@ class PreparedDatasheet:
             {
                 "part": [self.test.direction],
                 "strain": [self.test.strain],
-                "quantity": ["load_N"],
+                "quantity": ["load"],
                 "measured": [measured],
                 "modelled": [modelled],
                 "difference": [modelled - measured],
+                "unit": ["N"],
             }
         )
 

@@ -71,8 +71,9 @@ def test_numbers_tables_and_files_say_the_strains_in_percent(fitted, folder):
     np.testing.assert_allclose(part.warp_load_kN_per_m, loads[:, 0])
     residuals = fitted.residuals()
     assert len(residuals) == 5 * 2 * 29 and set(residuals.quantity) == {
-        "warp_strain_percent", "fill_strain_percent",
+        "warp_strain", "fill_strain",
     }  # fmt: skip
+    assert set(residuals.unit) == {"%"}
     off = residuals.modelled - residuals.measured
     np.testing.assert_allclose(residuals.difference, off, atol=1e-12)
     assert (out / "paths.png").is_file() and "Misfit by ratio" in (out / "report.html").read_text()

@@ -57,11 +57,12 @@ def test_misfit_by_pressure(objective: str, scales: tuple[float, ...]) -> None:
     each = residual_table(prepared, fitted)
     assert each.index.tolist() == [0, 1, 2, 3, 4, 5]
     assert list(each.columns) == [
-        "part", "pressure_kPa", "x_mm", "y_mm", "quantity", "measured_mm", "modelled_mm",
-        "difference_mm",
+        "part", "frame", "pressure_kPa", "x_mm", "y_mm", "quantity", "measured", "modelled",
+        "difference", "unit",
     ]  # fmt: skip
-    assert each.iloc[5].tolist()[:5] == ["bubble", 200.0, 7.0, 8.0, "dz"]
-    assert each.iloc[5].tolist()[5:] == pytest.approx([-5.0, -4.7, 0.3])
+    assert each.iloc[5].tolist()[:6] == ["bubble", 2, 200.0, 7.0, 8.0, "dz"]
+    assert each.iloc[5].tolist()[6:9] == pytest.approx([-5.0, -4.7, 0.3])
+    assert each["frame"].tolist() == [1, 1, 1, 2, 2, 2] and set(each["unit"]) == {"mm"}
     table = misfit_table(prepared, fitted)
     assert (table.title, table.header) == (
         "Misfit by pressure", ["pressure, kPa", "x", "y", "z"]

@@ -13,11 +13,14 @@ from bubblefit.errors import SolverFailure
 from bubblefit.experiments.base import CardRun, Output
 from bubblefit.experiments.bubble import KIND, forward
 from bubblefit.experiments.bubble.sheet_section import Sheet
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
 
 PART = "bubble"
+BETA = np.zeros(12)
+BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
 MODEL = BubbleModel(disk_mesh(100.0, 48, "quarter"), 0.8, (0.022, 0.3), (0.022, 0.3))
 #: In mm: a paraboloid of 10 and 30 mm, sheared aside by 1 mm at the end.
 ROUND = 1 - (MODEL.mesh.points[:, :2] ** 2).sum(axis=1) / 100.0**2
@@ -40,7 +43,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
 
 def simulated(folder: Path, sheet: object = Sheet(), **outcomes: Any) -> Any:
     test: Any = SimpleNamespace(name="b", pressures=MODEL.pressures, sheet=sheet)
-    cards: Any = dict.fromkeys(outcomes)
+    cards: Any = dict.fromkeys(outcomes, SimpleNamespace(law=HypoelasticLaw(BETA, 0.25)))
     runs = {(name, PART): CardRun(MODEL, outcome) for name, outcome in outcomes.items()}
     return KIND.simulate(test, cards, runs, Output(folder))
 
@@ -72,7 +75,7 @@ def test_one_card(tmp_path: Path, drawn: list[Any]) -> None:
     assert path == tmp_path / "profiles.png" and tuple(pressures) == MODEL.pressures
     np.testing.assert_array_equal(points, MODEL.mesh.points)
     np.testing.assert_array_equal(shown, history().displacement)
-    assert (tmp_path / "bubble.vtu").exists()
+    assert (tmp_path / "bubble.pvd").exists()
 
 
 def test_several_cards_one_of_which_fails(tmp_path: Path, drawn: list[Any]) -> None:
@@ -89,7 +92,11 @@ def test_several_cards_one_of_which_fails(tmp_path: Path, drawn: list[Any]) -> N
         "   300.0 kPa   apex   30.000 mm",
         "note: simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says",
     ]
-    assert {path.name for path in tmp_path.iterdir()} == {"displacement-2.csv", "bubble-2.vtu"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "displacement-2.csv",
+        "bubble-2.pvd",
+        "bubble-2-vtu",
+    }
     assert drawn[0][0] == tmp_path / "profiles-2.png"
 
 

@@ -101,10 +101,10 @@ def test_tables() -> None:
     rest = residual_table(both)
     assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
     assert list(rest.columns) == [
-        "part", "elongation_mm", "quantity", "measured", "modelled", "difference"
+        "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit"
     ]  # fmt: skip
-    assert rest.iloc[1].tolist() == ["warp", 4.0, "load_N", 400.0, pytest.approx(396.0),
-                                     pytest.approx(-4.0)]  # fmt: skip
+    assert rest.iloc[1].tolist() == ["warp", 4.0, "load", 400.0, pytest.approx(396.0),
+                                     pytest.approx(-4.0), "N"]  # fmt: skip
 
 
 def test_points_of_a_strip_and_those_left_out() -> None:
