@@ -19,7 +19,6 @@ import numpy as np
 from bubblefit.fits import stages
 from bubblefit.fits.coarse import CoarseToFine, coarse_problem
 from bubblefit.fits.distinct import SAME_MODULI, distinct, moduli_apart
-from bubblefit.fits.processes import _here
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup
 from bubblefit.fits.start import StartRecord, run_start
@@ -35,7 +34,13 @@ def every_start(setup: FitSetup) -> tuple[list[StartRecord], float]:
 
 def in_this_process() -> None:
     """Starts run one after the other where their time can be read."""
-    stages.run_tasks = lambda prepare, numbers, jobs: _here(prepare, numbers)  # type: ignore
+
+    def run_tasks(prepare, numbers, jobs):  # type: ignore[no-untyped-def]
+        task = prepare()
+        for number in numbers:
+            yield task(number, lambda _: None)
+
+    stages.run_tasks = run_tasks
 
     def run_starts(build, options, seed, numbers, jobs, mesh="full"):  # type: ignore[no-untyped-def]
         problem = build()

@@ -78,10 +78,14 @@ class RunningFiles:
             _append(self._rows, _table([[*said, *numbers]]))
 
     def finish(self) -> None:
-        """Close the files and put history.csv in order of start and analysis."""
+        """Close the files and put history.csv in order of start and analysis.
+
+        Of a start that began again, because its process died, the rows of the last time count.
+        """
         self.close()
         rows = self._read()
-        body = sorted(rows[1:], key=lambda r: (int(r[0]), int(r[1])))
+        last = {(int(row[0]), int(row[1])): row for row in rows[1:]}
+        body = [last[number] for number in sorted(last)]
         self.store.write(HISTORY, _table([rows[0], *body]))
 
     def close(self) -> None:

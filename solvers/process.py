@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -16,6 +14,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from ..errors import InputError
+from ..parent import kill_with_parent
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.
@@ -32,8 +31,8 @@ KILLS = {
     signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE,
     signal.SIGILL, signal.SIGXFSZ, signal.SIGXCPU,
 }  # fmt: skip
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
+#: Kills a process group when nobody holds the other end of its input any more.
+WATCHER = ("/bin/sh", "-c", 'read -r end; kill -9 "-$1"', "bubblefit-watch")
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,7 @@ def run_process(
     InputError : the program cannot be started (not there, no permission, another machine's).
     Unwanted : see `unless`.
     Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after the group is killed.
+    Where this process is killed outright, the group is killed, too.
     """
     begun = time.monotonic()
     with log.open("wb") as output:
@@ -116,12 +116,17 @@ def run_process(
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,
                 pass_fds=_kept_open.get(),
-                preexec_fn=_die_with_parent if _LIBC is not None else None,
+                preexec_fn=kill_with_parent,
             )
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
             raise InputError(Path(command[0]), "", problem) from None
         timed_out = False
+        try:
+            watcher, held = _watcher(process.pid)
+        except BaseException:
+            _kill(process)
+            raise
         try:
             while True:
                 try:
@@ -137,9 +142,12 @@ def run_process(
                     watch()
         finally:
             # Also after a clean end: what a wrapper script left behind must not go on writing.
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            _kill(process)
+            # Before the pipe is closed: the number of the group may be somebody else's by now.
+            if watcher is not None:
+                watcher.kill()
+                watcher.wait()
+            os.close(held)
     return Outcome(process.returncode, timed_out, time.monotonic() - begun)
 
 
@@ -168,7 +176,27 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
 
 
-def _die_with_parent() -> None:
-    # A worker that is killed outright (SIGKILL, out of memory) cannot end its solver any more.
-    if _LIBC is not None:
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _watcher(group: int) -> tuple[subprocess.Popen[bytes] | None, int]:
+    """What kills the group when we are killed outright, and our end of the pipe that it reads.
+
+    The kernel's own signal reaches the program that we started, not what a script has started.
+    """
+    read, held = os.pipe()
+    try:
+        return subprocess.Popen(
+            [*WATCHER, str(group)],
+            stdin=read,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        ), held
+    except OSError:  # no such shell: then it is the kernel's signal alone
+        return None, held
+    finally:
+        os.close(read)

@@ -21,6 +21,7 @@ from .offer import Offer
 from .once import with_cache
 from .plugins import plug_in_named, plug_ins
 from .run_cache import RunCache
+from .scratch import sweep_left
 from .settings import SolverSettings, check_programs
 
 #: What makes each of our own solvers from its options.
@@ -155,6 +156,8 @@ def usable_solver(
             raise InputError(path, error.field, error.problem) from None
         raise
     if solver.external:
+        place = (options or {}).get("scratch")
+        sweep_left(None if place is None else Path(place))
         found = checked(name, solver)
         if not (found.available and found.carries_law):
             raise SolverFailure(found.advice or "is not usable", name)

@@ -21,6 +21,7 @@ from pathlib import Path
 from ..caching import cache_folder
 from ..errors import OutputError
 from ..writing import write_text
+from .announcements import announce
 from .base import History
 from .history_file import Damaged, from_bytes, to_bytes
 
@@ -81,7 +82,7 @@ class RunCache:
             return None
         except (Damaged, OSError) as error:
             why = error.strerror if isinstance(error, OSError) else str(error)
-            log.warning("%s is dropped from the cache of runs and run again: %s", path, why)
+            announce(f"{path} is dropped from the cache of runs and run again: {why}")
             with suppress(OSError):
                 path.unlink()
             return None

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ..errors import OutputError, SolverFailure
 from .process import log_tail
+from .scratch_owner import OWNER, claim, clear, release, sweep
 
 log = logging.getLogger(__name__)
 
@@ -24,8 +25,9 @@ ROOM = 256 * 1024**2
 _INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM)
 #: Folders of runs under way. An interruption can fall between any two lines, also within the
 #: removal of a folder: what it leaves is removed at the end of the process.
-_under_way: set[Path] = set()
-os.register_at_fork(after_in_child=_under_way.clear)  # those are the parent's
+#: Each with the lock that says whose it is; a process that is killed outright leaves both, and the
+#: next one sweeps.
+_under_way: dict[Path, int | None] = {}
 
 
 def fresh_folder(name: str, parent: Path | None = None) -> Path:
@@ -61,13 +63,12 @@ def run_folder(
     """
     with _undisturbed():
         folder = fresh_folder(name, parent)
-        _under_way.add(folder)
+        _under_way[folder] = claim(folder)
     log.info("%s runs in %s", solver, folder)
     try:
         yield folder
     except SolverFailure as failure:
         kept = put_aside(folder)
-        _under_way.discard(folder)
         log.info("failed run kept in %s", kept)
         tail = failure.log_tail or log_tail(kept / logs)
         kind = type(failure)
@@ -76,7 +77,7 @@ def run_folder(
         remove(folder)  # interrupted, or never begun: there is nothing to look into
         raise
     if keep:
-        _under_way.discard(folder)
+        release(folder, _under_way.pop(folder, None))
         log.info("run kept in %s", folder)
     else:
         remove(folder)
@@ -94,22 +95,37 @@ def default_parent() -> Path:
 
 def put_aside(folder: Path) -> Path:
     """Where a failed run is kept: out of memory, onto the disk (where it is, if that is full)."""
+    lock = _under_way.pop(folder, None)
     if folder.parent != MEMORY:
+        release(folder, lock)
         return folder
     target = Path(tempfile.gettempdir()) / folder.name
+    own = None
     try:
-        shutil.copytree(folder, target)
+        target.mkdir(mode=0o700)
+        own = claim(target)  # a copy that is cut off is somebody's to sweep
+        shutil.copytree(folder, target, ignore=shutil.ignore_patterns(OWNER), dirs_exist_ok=True)
     except (OSError, shutil.Error):
-        shutil.rmtree(target, ignore_errors=True)
+        clear(target)
+        release(target, own)
+        release(folder, lock)
         return folder
-    shutil.rmtree(folder, ignore_errors=True)
+    release(target, own)
+    clear(folder)
+    release(folder, lock)
     return target
 
 
 def remove(folder: Path) -> None:
     """Remove a scratch folder with what is in it."""
-    shutil.rmtree(folder, ignore_errors=True)
-    _under_way.discard(folder)
+    clear(folder)
+    release(folder, _under_way.pop(folder, None))
+
+
+def sweep_left(place: Path | None = None) -> None:
+    """Remove the folders of runs whose process was killed, in the usual places and in `place`."""
+    usual = [MEMORY, Path(tempfile.gettempdir())]
+    sweep(usual if place is None else [*usual, place])
 
 
 @atexit.register
@@ -117,6 +133,17 @@ def remove_interrupted() -> None:
     """Remove the folders of runs that were under way; for a process that ends without its exit."""
     for folder in tuple(_under_way):
         remove(folder)
+
+
+def _those_of_the_parent() -> None:
+    # A copy of its lock would hold it where the parent is killed.
+    for lock in _under_way.values():
+        if lock is not None:
+            os.close(lock)
+    _under_way.clear()
+
+
+os.register_at_fork(after_in_child=_those_of_the_parent)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.uniaxial import UniaxialModel
 from bubblefit.solvers.base import Array, History, SolverCheck
 from bubblefit.solvers.process import log_tail, run_process
-from bubblefit.solvers.scratch import fresh_folder, put_aside, remove
+from bubblefit.solvers.scratch import run_folder
 
 NAME = "homogeneous"
 PROGRAM = Path(__file__).with_name("homogeneous_program.py")
@@ -54,12 +54,9 @@ class HomogeneousSolver:
         if not self.program.is_file():
             advice = f"{self.program} is not there; set program in [solver.{NAME}]"
             return SolverCheck(NAME, False, "", False, advice)
-        folder = fresh_folder(NAME)
-        try:
+        with run_folder(NAME, None, False, NAME, "log") as folder:
             outcome = run_process(self._command("--version"), folder, folder / "log", timeout=10.0)
             version = log_tail(folder / "log").strip()
-        finally:
-            remove(folder)
         well = outcome.exit_code == 0
         return SolverCheck(NAME, well, version, well, "" if well else "it does not start")
 
@@ -72,24 +69,23 @@ class HomogeneousSolver:
     ) -> History:
         """One analysis: mm, N, MPa in and out. SolverFailure unless all of it ended well."""
         job, yarn = self._job(model, law)
-        folder = fresh_folder(NAME, scratch)  # nothing of an earlier run can be there
-        (folder / "job.json").write_text(json.dumps(job))
-        log = folder / "job.log"
-        outcome = run_process(self._command("job.json"), folder, log, timeout or self.timeout)
-        results = folder / "job.csv"
-        if outcome.timed_out or outcome.exit_code != 0:
-            reason = "takes too long" if outcome.timed_out else "does not end well"
-            if outcome.exit_code == 3:
-                reason = "a modulus is not positive"
-            raise SolverFailure(reason, NAME, outcome.exit_code, log_tail(log), put_aside(folder))
-        try:
-            rows = np.loadtxt(results, delimiter=",", ndmin=2)
-        except (OSError, ValueError) as error:
-            raise SolverFailure(f"job.csv: {error}", NAME, 0, "", put_aside(folder)) from None
-        # Half a result must not look like one.
-        if rows.shape != (len(model.elongations), 3) or not np.isfinite(rows).all():
-            raise SolverFailure("job.csv is not complete", NAME, 0, "", put_aside(folder))
-        remove(folder)
+        # Nothing of an earlier run can be there; kept after a failure, removed after anything else.
+        with run_folder(NAME, scratch, False, NAME, "job.log") as folder:
+            (folder / "job.json").write_text(json.dumps(job))
+            log, seconds = folder / "job.log", timeout or self.timeout
+            outcome = run_process(self._command("job.json"), folder, log, seconds)
+            if outcome.timed_out or outcome.exit_code != 0:
+                reason = "takes too long" if outcome.timed_out else "does not end well"
+                if outcome.exit_code == 3:
+                    reason = "a modulus is not positive"
+                raise SolverFailure(reason, NAME, outcome.exit_code)
+            try:
+                rows = np.loadtxt(folder / "job.csv", delimiter=",", ndmin=2)
+            except (OSError, ValueError) as error:
+                raise SolverFailure(f"job.csv: {error}", NAME, 0) from None
+            # Half a result must not look like one.
+            if rows.shape != (len(model.elongations), 3) or not np.isfinite(rows).all():
+                raise SolverFailure("job.csv is not complete", NAME, 0)
         return _history(model, yarn, *rows.T)
 
     def _command(self, argument: str) -> list[str | Path]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import multiprocessing.util
 import os
 import signal
+import struct
 import time
 from functools import cache
 from pathlib import Path
@@ -14,7 +16,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.processes import _here, run_starts, run_tasks
+from bubblefit.fits.processes import run_starts, run_tasks
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.comparison import Comparison
@@ -26,6 +28,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.process import run_process
+from bubblefit.solvers.scratch import run_folder
+
+from .. import needs
 
 MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
 KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
@@ -107,23 +113,103 @@ def test_errors_cross_the_process_border_whole() -> None:
     assert caught.value.field == "quads"
 
 
-def test_without_shared_memory_one_process_does_it_all(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_no_shared_memory_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A container with /dev/shm missing or read-only cannot make the semaphores of a queue."""
 
     def refuse(*arguments: Any, **named: Any) -> None:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refuse)
-    ends = study_with(2, [0, 1])
-    assert all(value < 1e-6 for value, _, _ in ends.values())
-    assert "one process only" in caplog.text
+    assert sorted(filter(None, run_tasks(lambda: lambda n, tell: 10 * n, [1, 2, 3], 2))) == [
+        10,
+        20,
+        30,
+    ]
+
+
+def killed_once(folder: Path, where: str) -> Any:
+    """Task 2 kills its process the first time, before, amid or after what it says."""
+
+    def task(number: int, tell: Any) -> tuple[int, bytes]:
+        mark = folder / f"{number} was begun"
+        first = number == 2 and not mark.exists()
+        mark.touch()
+        if first and where == "before":
+            os.kill(os.getpid(), signal.SIGKILL)
+        tell(("told", number))
+        if first and where == "amid":
+            # The length of a record, and the first bytes of it.
+            os.write(tell.__self__.fileno(), struct.pack("!i", 1000) + b"x" * 10)
+            os.kill(os.getpid(), signal.SIGKILL)
+        if first and where == "after":
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number, bytes(10**5)
+
+    return task
+
+
+@pytest.mark.parametrize("where", ["before", "amid", "after"])
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, jobs) -> None:
+    found = []
+    for record in run_tasks(lambda: killed_once(tmp_path, where), [1, 2, 3, 4], jobs):
+        if record is not None:
+            found.append(record)
+    ended = [number for number, content in found if content == bytes(10**5)]
+    assert sorted(ended) == [1, 2, 3, 4]
+    (said,) = caplog.messages
+    assert said == (
+        "a worker process died (exit code -9; out of memory?); what it did is done again"
+    )
+    assert not multiprocessing.active_children()
+
+
+def test_what_cannot_cross_is_told_in_words() -> None:
+    class Own(Exception):
+        """Of a function: it cannot be pickled."""
+
+    def task(number: int, tell: Any) -> None:
+        raise Own("of its own sort")
+
+    with pytest.raises(BubblefitError, match="Own: of its own sort"):
+        list(run_tasks(lambda: task, [1], 1))
+
+
+def alive(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    """Whatever they do: one waits for a program outside, which ends with it, as its folder does."""
+    needs.linux("who is alive")
+
+    def task(number: int, tell: Any) -> None:
+        with run_folder("t", tmp_path, False, "t", "log") as folder:
+            tell((os.getpid(), folder))
+            run_process(["sleep", "300"], folder, folder / "log")
+
+    read, write = os.pipe()
+    parent = os.fork()
+    if parent == 0:
+        for record in run_tasks(lambda: task, [1, 2], 2):
+            if record is not None:
+                os.write(write, f"{record[0]}\n".encode())
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as told:
+        workers = [int(told.readline()) for _ in range(2)]
+        os.kill(parent, signal.SIGKILL)
+        os.waitpid(parent, 0)
+        deadline = time.monotonic() + 20
+        while any(map(alive, workers)) or list(tmp_path.iterdir()):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
 
 
 def test_the_processes_end_when_the_reader_stops() -> None:
-    import multiprocessing
-
     # Wherever the workers are: one was once told to end within a lock of its queue, and hung.
     for records in range(1, 7):
         running = run_starts(build, FitOptions(max_analyses=60), 5, [0, 1, 2, 3], 2)
@@ -170,13 +256,3 @@ def test_processes_end_by_themselves_when_all_is_done(tmp_path: Path) -> None:
 
     assert sorted(filter(None, run_tasks(ending, [1, 2, 3, 4], 2))) == [1, 2, 3, 4]
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_without_other_processes_every_record_comes_in_turn() -> None:
-    """What a task tells comes before what it returns."""
-
-    def task(number: int, tell: Any) -> int:
-        tell(f"within {number}")
-        return 10 * number
-
-    assert list(_here(lambda: task, [3, 1])) == ["within 3", 30, "within 1", 10]

@@ -65,6 +65,20 @@ def test_a_start_that_the_solvers_failure_ended_is_run_again(tmp_path: Path) -> 
     assert [row.split(",")[0] for row in rows] == ["0"]
 
 
+def test_a_start_that_began_again_has_its_rows_once(tmp_path: Path) -> None:
+    """Its process died, and another did it from the beginning."""
+    folder = Folder(tmp_path)
+    begin(folder)
+    first = [evaluation(1, 1), evaluation(0, 1), evaluation(1, 2)]
+    again = [evaluation(1, 1, 0.25), evaluation(1, 2, 0.125), evaluation(1, 3, 0.0625)]
+    for record in (*first, *again, finished(1), finished(0)):
+        folder.add(record)
+    folder.finish()
+    rows = list(csv.DictReader((tmp_path / HISTORY).open()))
+    told = [(row["start"], row["analysis"], float(row["objective"])) for row in rows]
+    assert told == [("0", "1", 0.5), ("1", "1", 0.25), ("1", "2", 0.125), ("1", "3", 0.0625)]
+
+
 def test_page_and_card_of_an_earlier_result_go(tmp_path: Path) -> None:
     """Beside a later fit that failed they would pass for its own."""
     begin(Folder(tmp_path)).clear()

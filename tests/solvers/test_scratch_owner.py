@@ -1,0 +1,210 @@
+"""What a killed process leaves goes with the next one; what is in use, or kept, stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from bubblefit.errors import SolverFailure
+from bubblefit.solvers import process, scratch, scratch_owner
+from bubblefit.solvers.scratch import run_folder, sweep_left
+from bubblefit.solvers.scratch_owner import OWNER, claim, clear, sweep
+
+from .. import needs
+
+BEGIN = """
+import sys, time
+from pathlib import Path
+from bubblefit.solvers.scratch import run_folder
+from bubblefit.solvers.process import run_process
+with run_folder("t", Path(sys.argv[1]), False, "t", "log") as folder:
+    (folder / "deep").mkdir()
+    (folder / "deep" / "file").write_text("content")
+    print(folder, flush=True)
+    words = "echo $$ > group; sleep 300 & sleep 300; true"
+    run_process(["/bin/sh", "-c", words], folder, folder / "log")
+"""
+
+
+def begun(place: Path) -> tuple[subprocess.Popen, Path]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", BEGIN, place], stdout=subprocess.PIPE, text=True
+    )
+    folder = Path(process.stdout.readline().strip())
+    deadline = time.monotonic() + 20
+    while not ((folder / "group").exists() and (folder / "group").read_text().endswith("\n")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return process, folder
+
+
+def members(group: int) -> int:
+    """How many processes of a group live."""
+    count = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            said = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        count += int(said[2]) == group and said[0] != "Z"
+    return count
+
+
+def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp_path) -> None:
+    """Also what a script has started, which the kernel's signal does not reach."""
+    needs.linux("processes by their group")
+    running, folder = begun(tmp_path)
+    group = int((folder / "group").read_text())
+    assert members(group) >= 2
+    sweep([tmp_path])
+    assert (folder / "deep" / "file").exists(), "of a process that lives"
+    running.kill()
+    running.wait()
+    running.stdout.close()
+    deadline = time.monotonic() + 10
+    while members(group):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert sweep([tmp_path]) == [folder]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_watcher_ends_with_the_run(tmp_path) -> None:
+    needs.linux("processes by their name")
+    with run_folder("t", tmp_path, False, "t", "log") as folder:
+        process.run_process(["/bin/sh", "-c", "true"], folder, folder / "log")
+        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+        names = [Path(f"/proc/{child}/cmdline").read_bytes() for child in children]
+        assert not [name for name in names if b"bubblefit-watch" in name]
+
+
+def test_without_a_shell_the_run_is_the_same(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(process, "WATCHER", (str(tmp_path / "no shell"),))
+    with run_folder("t", tmp_path, False, "t", "log") as folder:
+        assert process.run_process(["true"], folder, folder / "log").exit_code == 0
+
+
+def test_a_folder_under_way_is_this_processs(tmp_path) -> None:
+    with run_folder("t", tmp_path, False, "t", "log") as folder:
+        assert sweep([tmp_path]) == [] and folder.exists()
+    assert not folder.exists()
+
+
+def test_what_is_kept_is_never_swept(tmp_path, monkeypatch) -> None:
+    with run_folder("good", tmp_path, True, "t", "log") as good:
+        (good / "result").write_text("1")
+    with (
+        pytest.raises(SolverFailure) as failure,
+        run_folder("bad", tmp_path, False, "t", "log") as bad,
+    ):
+        (bad / "log").write_text("why\n")
+        raise SolverFailure("it failed", "t")
+    memory = tmp_path / "memory"
+    monkeypatch.setattr(scratch, "MEMORY", memory)
+    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path))
+    with (
+        pytest.raises(SolverFailure) as moved,
+        run_folder("moved", memory, False, "t", "log") as third,
+    ):
+        (third / "log").write_text("why\n")
+        raise SolverFailure("it failed", "t")
+    assert moved.value.scratch == tmp_path / third.name and not third.exists()
+    kept = [good, failure.value.scratch, moved.value.scratch]
+    for folder in kept:
+        os.utime(folder, (1e9, 1e9))
+        assert not (folder / OWNER).exists()
+    assert sweep([tmp_path, memory]) == []
+    assert [sorted(p.name for p in folder.iterdir()) for folder in kept] == [
+        ["result"], ["log"], ["log"]
+    ]  # fmt: skip
+
+
+def left(place: Path, **said: str) -> Path:
+    """A folder whose owner's file says what it says, locked by nobody."""
+    own = dict(zip(("machine", "boot", "process", "started"), scratch_owner._self(), strict=True))
+    folder = place / f"bubblefit-t-{len(list(place.iterdir()))}"
+    folder.mkdir()
+    (folder / OWNER).write_text("\n".join({**own, **said}.values()))
+    (folder / "file").touch()
+    return folder
+
+
+def test_whose_is_swept(tmp_path) -> None:
+    stays = [
+        left(tmp_path),  # of this process, on a file system without locks
+        left(tmp_path, machine="other", boot="other"),
+    ]
+    goes = [
+        left(tmp_path, started="1"),  # the number is another process's by now
+        left(tmp_path, process="999999999"),
+        left(tmp_path, boot="before the restart"),
+        left(tmp_path, machine="another container", process="999999999"),
+    ]
+    assert sorted(sweep([tmp_path])) == sorted(goes)
+    assert all(folder.exists() for folder in stays)
+
+
+def test_what_is_locked_stays_whatever_it_says(tmp_path) -> None:
+    """In another container a process of ours has another number."""
+    folder = left(tmp_path, process="999999999")
+    process = os.fork()
+    if process == 0:
+        import fcntl
+
+        with open(folder / OWNER, "r+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            (tmp_path / "locked").touch()
+            time.sleep(60)
+        os._exit(0)
+    while not (tmp_path / "locked").exists():
+        time.sleep(0.01)
+    assert sweep([tmp_path]) == []
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    assert sweep([tmp_path]) == [folder]
+
+
+def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path) -> None:
+    empty, cut, others = (tmp_path / f"bubblefit-{n}-1" for n in ("empty", "cut", "others"))
+    for folder in (empty, cut, others):
+        folder.mkdir()
+    (cut / OWNER).write_text("machine")
+    (others / "file").touch()
+    plain = tmp_path / "somebody-else"
+    plain.mkdir()
+    link = tmp_path / "bubblefit-link-1"
+    link.symlink_to(others)
+    assert sweep([tmp_path]) == []
+    for folder in (empty, cut, others, plain):
+        os.utime(folder, (1e9, 1e9))
+    assert sorted(sweep([tmp_path])) == [cut, empty]
+    assert others.exists() and plain.exists() and link.is_symlink()
+
+
+def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch) -> None:
+    folder = tmp_path / "bubblefit-t-1"
+    (folder / "deep").mkdir(parents=True)
+    (folder / "file").touch()
+    lock = claim(folder)
+    monkeypatch.setattr(scratch_owner.shutil, "rmtree", lambda path, **_: None)  # cut off
+    clear(folder)
+    assert [path.name for path in folder.iterdir() if path.is_file()] == [OWNER]
+    os.close(lock)
+
+
+def test_the_usual_places_are_swept(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(scratch, "MEMORY", tmp_path / "memory")
+    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))
+    folders = []
+    for name in ("memory", "disk", "own"):
+        (tmp_path / name).mkdir()
+        folders.append(left(tmp_path / name, process="999999999"))
+    sweep_left()
+    assert [folder.exists() for folder in folders] == [False, False, True]
+    sweep_left(tmp_path / "own")
+    assert not folders[2].exists()
