@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+from bubblefit.fits.executor import cores
 from bubblefit.fits.processes import run_starts
-from bubblefit.fits.project import cores
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.methods import FitOptions
 from known_solution import known_project, known_setup

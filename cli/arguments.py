@@ -28,6 +28,10 @@ TRUST: Decorator = click.option(
     "--trust", multiple=True, metavar="NAME", help="Let a doubt of the data pass; several."
 )
 JOBS: Decorator = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
+SCHEDULER: Decorator = click.option(
+    "--scheduler", envvar="BUBBLEFIT_SCHEDULER", metavar="ADDRESS",
+    help="Dask scheduler whose workers do the runs [this machine].",
+)  # fmt: skip
 OVERWRITE: Decorator = click.option(
     "--overwrite", is_flag=True, help="Replace what the output folder holds."
 )

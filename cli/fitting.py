@@ -18,6 +18,7 @@ from .arguments import (
     OVERWRITE,
     PROJECT,
     QUIET,
+    SCHEDULER,
     TESTS,
     TRUST,
     Decorator,
@@ -45,6 +46,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
         click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
         JOBS,
+        SCHEDULER,
         click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
         solver_choice,
         click.option(
@@ -87,6 +89,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
             seed=options["seed"],
             method=options["method"],
             jobs=options["jobs"],
+            scheduler=options["scheduler"],
             trust=options["trust"],
             out=folder,
             resume=options["resume"],

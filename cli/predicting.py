@@ -16,6 +16,7 @@ from .arguments import (
     JOBS,
     OVERWRITE,
     QUIET,
+    SCHEDULER,
     Decorator,
     out_option,
     solver_choice,
@@ -43,6 +44,7 @@ def prediction_options(command: Callable[..., Any]) -> Callable[..., Any]:
             help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
         ),
         JOBS,
+        SCHEDULER,
         solver_choice,
         click.option(
             "--fail-above",
@@ -87,6 +89,7 @@ def run_predictions(
             cards,
             samples=options["samples"],
             jobs=options["jobs"],
+            scheduler=options["scheduler"],
             out=folder,
             resume=options["resume"],
             overwrite=options["overwrite"],

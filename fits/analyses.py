@@ -45,7 +45,7 @@ class Analyses:
 
     def __init__(self, project: Project, progress: Progress | None = None) -> None:
         name = project.fit.solver
-        options = project.solver_options.get(name, {})
+        options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
         self.total = self.count = 0
         self._progress = progress

@@ -40,6 +40,7 @@ def fit(
     seed: int | None = None,
     method: str | None = None,
     jobs: int | None = None,
+    scheduler: str | None = None,
     trust: Sequence[str] = (),
     out: Path | str | None = None,
     resume: bool = False,
@@ -54,6 +55,7 @@ def fit(
     tests : names of tests, or a kind of test; every test that can be fitted unless given.
     starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
         cores unless the project says otherwise.
+    scheduler : address of a Dask scheduler, whose workers run the starts instead of this machine.
     trust : names of doubts about the data that stop nothing, beside those of the project.
     out : folder in which every analysis and start is written as it ends, so that an interrupted
         fit can be gone on with (`resume`); nothing is written without it.
@@ -76,6 +78,8 @@ def fit(
     begun = time.perf_counter()
     trusted = [*project.fit.trust, *trust]
     project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
+    project = project.with_scheduler(scheduler)
+    project.executor.check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     with timed("tests and their data made ready"):
         setup = prepare_fit(project, chosen)

@@ -25,8 +25,8 @@ from .facts import solver_facts
 from .failure_page import failure_page
 from .logged import log_run
 from .prediction_result import Predictions, predicted_kind
-from .processes import Task, run_tasks
-from .project import Project, cores
+from .processes import Task
+from .project import Project
 from .record import Record, data_rows, this_run
 from .run_records import RunRecords
 from .written import settings_of_predictions
@@ -56,6 +56,7 @@ def predict(
     *,
     samples: int | None = None,
     jobs: int | None = None,
+    scheduler: str | None = None,
     out: Path | str | None = None,
     resume: bool = False,
     overwrite: bool = False,
@@ -77,6 +78,7 @@ def predict(
         certain directions are run instead, but not by another program. 0: the spread is not asked
         for.
     jobs : processes; as the project says unless given, else all cores.
+    scheduler : address of a Dask scheduler, whose workers do the runs instead of this machine.
     out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
         nothing is written without it.
     overwrite : replace what the folder holds.
@@ -95,6 +97,8 @@ def predict(
     SolverFailure : the solver is not there, or no run ended well.
     """
     begun = time.perf_counter()
+    project = project.with_scheduler(scheduler)
+    project.executor.check()
     chosen = predicted_tests(project, tests)
     solver = _usable(project)
     pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
@@ -237,7 +241,7 @@ def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
 def _usable(project: Project) -> Solver:
     """The project's solver; what is wrong with it shows here, in one line."""
     name = project.fit.solver
-    options = project.solver_options.get(name, {})
+    options = project.options_of(name)
     return usable_solver(name, options, project.path, cache=project.run_cache)
 
 
@@ -273,8 +277,8 @@ def _run(
             end(number, record, True)
     missing = [number for number in range(len(pairs)) if number not in ended]
     prepare = functools.partial(_runner, project, pairs)
-    some = jobs or project.fit.jobs or cores()
-    told: Iterable[Any] = run_tasks(prepare, missing, some, "runs") if missing else ()
+    executor = project.with_fit(jobs=jobs).executor
+    told: Iterable[Any] = executor.run_tasks(prepare, missing, "runs", _lost) if missing else ()
     for item in told:
         if item is None:
             progress(None)
@@ -284,6 +288,10 @@ def _run(
             records.write(marks[number], record)
         end(number, record, False)
     return [ended[number] for number in range(len(pairs))]
+
+
+def _lost(number: int, why: str) -> tuple[int, RunRecord]:
+    return number, RunRecord(0.0, why)
 
 
 def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
@@ -300,7 +308,7 @@ def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
 def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
     """The project's solver for each end of its band, made once."""
     name = project.fit.solver
-    options = project.solver_options.get(name, {})
+    options = project.options_of(name)
     made: dict[str, Solver] = {}
 
     def solver_of(end: BandEnd | None) -> Solver:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,10 +13,12 @@ from ..experiments.registry import kinds
 from ..materials.forms.registry import form_settings
 from ..reading import content_of
 from ..sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
+from ..solvers.licence_settings import SCHEDULER
 from ..solvers.overrides import overridden
 from ..solvers.registry import solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from .cards import NamedCard, read_cards
+from .executor import Executor
 from .file import ProjectFile, parse
 from .schema import FitSection, LawSection
 from .written import Written, section_as_run
@@ -39,6 +39,7 @@ class Project:
     path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
     law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
         of a solver, what it is made with. written : what the file says; None without one.
+    scheduler : address of the Dask scheduler whose workers do the runs; None: this machine does.
 
     Raises
     ------
@@ -54,6 +55,7 @@ class Project:
     cards: Mapping[str, NamedCard]
     solver_options: Mapping[str, Mapping[str, Any]]
     written: Written | None = None
+    scheduler: str | None = None
 
     def __post_init__(self) -> None:
         if self.fit.method == "lm" and self.fit.constraints == "boolean":
@@ -73,6 +75,20 @@ class Project:
         """
         said = self.fit.cache
         return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
+
+    @property
+    def executor(self) -> Executor:
+        """Where starts and other runs are done side by side."""
+        return Executor(self.fit.jobs, self.scheduler)
+
+    def options_of(self, solver: str) -> dict[str, Any]:
+        """What a solver is made with; a cluster counts its licences."""
+        counted = {} if self.scheduler is None else {SCHEDULER: self.scheduler}
+        return {**self.solver_options.get(solver, {}), **counted}
+
+    def with_scheduler(self, address: str | None) -> Project:
+        """The project, run by the workers of a Dask scheduler; as it is without an address."""
+        return self if address is None else replace(self, scheduler=address)
 
     def with_fit(self, **changes: Any) -> Project:
         """The project with other settings of its fit; None leaves a setting as it is."""
@@ -240,11 +256,3 @@ def _names(kind: str, sections: Sequence[Any]) -> list[str]:
     """A test without a name is called by its kind, with a number where there are several."""
     alone = len(sections) == 1
     return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
-
-
-@functools.cache
-def cores() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

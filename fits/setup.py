@@ -105,7 +105,7 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
         solution cannot be run.
     """
     fit = project.fit
-    options = project.solver_options.get(fit.solver, {})
+    options = project.options_of(fit.solver)
     # Once here, in one line, rather than as the failure of every analysis.
     usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
     shared_unknowns(project)  # says now what is wrong with them
@@ -123,7 +123,7 @@ def make_solver(project: Project, name: str | None = None) -> Solver:
     InputError : there is none of that name.
     """
     named = name or project.fit.solver
-    return solver_named(named, project.run_cache, **project.solver_options.get(named, {}))
+    return solver_named(named, project.run_cache, **project.options_of(named))
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:

@@ -14,8 +14,7 @@ from dataclasses import replace
 from ..identification.problem import FitProblem
 from .coarse import coarse_problem
 from .distinct import distinct
-from .processes import Task, run_starts, run_tasks
-from .project import cores
+from .processes import Task
 from .setup import FitSetup
 from .start import EvaluationRecord, Stage, StartRecord, run_start
 
@@ -36,7 +35,7 @@ def every_start(
     done : starts that have ended before. ran : is given every record as it ends, None now and then.
     told : is given a stage as it begins, and the records of it that were there before.
     """
-    fit, jobs = setup.project.fit, setup.project.fit.jobs or cores()
+    fit, executor = setup.project.fit, setup.project.executor
     full, coarse = (
         {r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
         for mesh in ("full", "coarse")
@@ -45,7 +44,7 @@ def every_start(
         for record in full.values():
             told(record)
         missing = [n for n in range(fit.starts) if n not in full]
-        full |= _ended(run_starts(setup.problem, setup.options, fit.seed, missing, jobs), ran)
+        full |= _ended(executor.run_starts(setup.problem, setup.options, fit.seed, missing), ran)
         return [full[n] for n in sorted(full)]
 
     told(Stage("starts on the coarse mesh", fit.starts))
@@ -53,7 +52,7 @@ def every_start(
         told(record)
     missing = [n for n in range(fit.starts) if n not in coarse]
     build = functools.partial(_coarse_problem, setup)
-    coarse |= _ended(run_starts(build, setup.options, fit.seed, missing, jobs, "coarse"), ran)
+    coarse |= _ended(executor.run_starts(build, setup.options, fit.seed, missing, "coarse"), ran)
 
     groups = distinct(setup.problem(), list(coarse.values()), fit.tolerance)
     told(Stage("distinct optima on the full mesh", len(groups)))
@@ -62,7 +61,13 @@ def every_start(
             told(fitted)
     open_groups = [g for g in groups if _fit_of(g, full) is None]
     prepare = functools.partial(_going_on, setup, open_groups)
-    full |= _ended(run_tasks(prepare, range(len(open_groups)), jobs), ran)
+
+    def lost(number: int, why: str) -> StartRecord:
+        coarse = open_groups[number][-1]
+        return replace(coarse, objective=None, status=why, failure=why, mesh="full")
+
+    numbers = range(len(open_groups))
+    full |= _ended(executor.run_tasks(prepare, numbers, "optima", lost), ran)
     ended = [record for group in groups for record in one_fit(group, full)]
     return sorted(ended, key=lambda record: record.number)
 

@@ -25,7 +25,7 @@ from .base import (
     SolverCheck,
 )
 from .licence_settings import SCHEDULER, LicenceSettings, licence_settings
-from .process import kept_open
+from .process import check_wanted, kept_open
 from .scratch import remove
 
 T = TypeVar("T")
@@ -160,6 +160,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
 
     def waiting() -> None:
         nonlocal said
+        check_wanted()
         if not said:
             announce(f"waiting for a licence of {name}", me)
         said = True

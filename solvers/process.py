@@ -81,6 +81,12 @@ def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
         _unwanted.reset(before)
 
 
+def check_wanted() -> None:
+    """Raise `Unwanted` where nobody waits for the result any more."""
+    if _unwanted.get()():
+        raise Unwanted
+
+
 def run_process(
     command: Sequence[str | Path],
     folder: Path,
@@ -136,8 +142,7 @@ def run_process(
                     if timeout is not None and time.monotonic() - begun > timeout:
                         timed_out = True
                         break
-                if _unwanted.get()():
-                    raise Unwanted
+                check_wanted()
                 if watch is not None:
                     watch()
         finally:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ..fits.project import cores
 from ..fits.result import Fit
 from ..fits.setup import FitSetup, fingerprints
 from .folds import FoldError, validate
@@ -33,7 +32,7 @@ def validated_folds(
     if known is not None:
         return known
     ended: dict[int, FoldError] = {}
-    for event in validate(setup, folds, starts, setup.project.fit.jobs or cores()):
+    for event in validate(setup, folds, starts):
         if event is not None:
             ended[event.fold] = event
         tell(event)

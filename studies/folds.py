@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import NoFeasibleStart
 from ..experiments.base import Masks
 from ..fits.law import law_of
-from ..fits.processes import run_tasks
 from ..fits.setup import FitSetup
 from ..identification.feasibility import feasible_start
 from ..identification.fit import fit_from
@@ -49,7 +48,7 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
     return folds_of(whose, min([count, *several]), setup.project.fit.seed)
 
 
-def validate(setup: FitSetup, count: int, starts: int, jobs: int) -> Iterator[FoldError | None]:
+def validate(setup: FitSetup, count: int, starts: int) -> Iterator[FoldError | None]:
     """Fit without the points of each fold and judge at these points; None now and then.
 
     What follows from the data (strain range and breaks of the law, what a relative error is over)
@@ -62,7 +61,7 @@ def validate(setup: FitSetup, count: int, starts: int, jobs: int) -> Iterator[Fo
     """
     parts = folds(setup, count)
     prepare = functools.partial(_task, setup, parts, starts)
-    return run_tasks(prepare, range(len(parts)), jobs, "folds")
+    return setup.project.executor.run_tasks(prepare, range(len(parts)), "folds")
 
 
 def _task(

@@ -19,7 +19,6 @@ from ..experiments.base import Masks, PreparedTest
 from ..experiments.divisible import Divisible
 from ..experiments.notes import strains_of
 from ..fits.best import LEAST_STRAIN
-from ..fits.processes import run_tasks
 from ..fits.result import Fit
 from ..fits.setup import FitSetup
 from .folds import fit_of
@@ -87,7 +86,7 @@ def judged_with(found: Fit, part: Part) -> HeldOut:
 
 
 def foretold(
-    setup: FitSetup, parts: Sequence[Part], numbers: Sequence[int], starts: int, jobs: int
+    setup: FitSetup, parts: Sequence[Part], numbers: Sequence[int], starts: int
 ) -> Iterator[tuple[int, HeldOut] | None]:
     """Fit without each part and judge there: its number and how it did; None now and then.
 
@@ -96,7 +95,7 @@ def foretold(
     numbers : of the parts that are left out. starts : random starts of each fit.
     """
     prepare = functools.partial(_task, setup, parts, starts)
-    return run_tasks(prepare, numbers, jobs, "parts")
+    return setup.project.executor.run_tasks(prepare, numbers, "parts")
 
 
 def _task(

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..fits.project import cores
 from ..fits.setup import FitSetup, fingerprints
 from ..notes import Note, NoteKind
 from .held_out import HeldOut
@@ -32,8 +31,7 @@ def recorded(
     known = {k: ended[name_of(setup, part)] for k, part in enumerate(parts)
              if name_of(setup, part) in ended}  # fmt: skip
     missing = [k for k in range(len(parts)) if k not in known]
-    jobs = setup.project.fit.jobs or cores()
-    for event in foretold(setup, parts, missing, starts, jobs) if missing else ():
+    for event in foretold(setup, parts, missing, starts) if missing else ():
         if event is not None:
             number, judged = event
             known[number] = judged

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..fits.processes import Task, run_tasks
-from ..fits.project import Project, cores
+from ..fits.executor import cores
+from ..fits.processes import Task
+from ..fits.project import Project
 from ..fits.setup import FitSetup
 from ..identification.bands import bands_of
 from ..identification.likelihood import Side, extreme, modulus_row, profile_side
@@ -58,8 +59,7 @@ def profile(
     prepare = functools.partial(_task, found, places)
     sides: dict[int, Side] = {}
     tell = progress or (lambda done, total, what: None)
-    at_once = project.fit.jobs or cores()
-    for record in run_tasks(prepare, numbers, at_once, "profiles"):
+    for record in project.executor.run_tasks(prepare, numbers, "profiles"):
         if isinstance(record, tuple):
             sides[record[0]] = record[1]
         now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""
@@ -69,7 +69,11 @@ def profile(
         for k, (name, strain) in enumerate(places)
     )
     # Every process runs the optimum once more.
-    analyses = found.analyses + min(at_once, len(numbers)) + sum(p.analyses for p in each)
+    analyses = (
+        found.analyses
+        + min(project.fit.jobs or cores(), len(numbers))
+        + sum(p.analyses for p in each)
+    )
     return Profiles(
         project.title,
         project.path,

@@ -196,7 +196,7 @@ def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path
     """A start whose moduli give another objective from the unloaded state: exit 4, a page."""
     ended = replace(fitted.best.ranked[0], objective=fitted.objective + 1e-3)
     monkeypatch.setattr(
-        "bubblefit.fits.stages.run_starts", lambda *a: iter([replace(ended, number=0)])
+        "bubblefit.fits.executor.Executor.run_starts", lambda *a: iter([replace(ended, number=0)])
     )
     arguments = ("bubble", fitted.project.path, "--starts", 1, "--out", "out", "--json")
     in_process("bubble", fitted.project.path, "--starts", 1, "--out", "out", cwd=tmp_path, code=4)

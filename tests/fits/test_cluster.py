@@ -1,0 +1,336 @@
+"""Tasks on a Dask cluster: the same as here, whoever dies on the way.
+
+The workers are processes of this machine, started again when they die as a queue's jobs would be.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bubblefit as bf
+import cloudpickle
+import pytest
+from bubblefit.errors import BubblefitError, InputError
+from bubblefit.fits import cluster, cluster_worker
+from bubblefit.fits.executor import Executor
+from bubblefit.fits.start import StartRecord
+from bubblefit.solvers import licences
+from bubblefit.solvers.announcements import Announcement, announce, hearing
+from bubblefit.solvers.process import run_process
+
+from .. import counted_program, needs
+from ..commands import in_process
+from ..complaints import complaint
+from ..counted_program import CountedSolver, seen
+
+#: The workers do not have the tests: their functions travel with what they are.
+for module in (sys.modules[__name__], counted_program):
+    cloudpickle.register_pickle_by_value(module)
+
+NOBODY = "tcp://127.0.0.1:1"
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of one with two workers."""
+    distributed: Any = needs.library("distributed")
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(n_workers=2, processes=True, **options) as local:
+        yield local.scheduler_address
+
+
+def tasks(scheduler: str, prepare: Callable[[], Any], count: int, **more: Any) -> list[Any]:
+    """What the tasks 0 .. count - 1 tell and give."""
+    told = Executor(scheduler=scheduler).run_tasks(prepare, range(count), **more)
+    return [record for record in told if record is not None]
+
+
+# Results
+
+
+def test_a_fit_on_a_cluster_is_the_fit_here(
+    scheduler: str, together: bf.Fit, strips_project: bf.Project, tmp_path: Path
+) -> None:
+    fitted = bf.fit(strips_project, scheduler=scheduler, out=tmp_path / "out")
+    here = bf.fit(strips_project, jobs=1, out=tmp_path / "here")
+    history = [(tmp_path / name / "history.csv").read_bytes() for name in ("out", "here")]
+    assert history[0] == history[1]
+    assert fitted.objective == here.objective
+    assert fitted.law.beta.tolist() == here.law.beta.tolist()
+
+
+def test_what_a_task_tells_comes_once_and_before_its_end(scheduler: str) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> int:
+            for k in range(2):
+                tell((number, k))
+            return number
+
+        return task
+
+    records = tasks(scheduler, prepare, 5)
+    assert len(records) == 15
+    for number in range(5):
+        at = records.index((number, 0))
+        assert records[at : at + 3] == [(number, 0), (number, 1), number]
+
+
+def test_it_is_got_ready_once_a_worker(scheduler: str) -> None:
+    def prepare() -> Any:
+        made = [os.getpid(), 0]
+
+        def task(number: int, tell: Any) -> list[int]:
+            made[1] += 1
+            return list(made)
+
+        return task
+
+    counts: dict[int, list[int]] = {}
+    for pid, count in tasks(scheduler, prepare, 8):
+        counts.setdefault(pid, []).append(count)
+    assert sum(map(len, counts.values())) == 8
+    for own in counts.values():
+        assert sorted(own) == list(range(1, len(own) + 1))
+
+
+def test_what_a_worker_announces_is_heard_here(scheduler: str) -> None:
+    def prepare() -> Any:
+        return lambda number, tell: announce("waiting", f"run {number}") or time.sleep(0.5) or 1
+
+    heard: list[Announcement] = []
+    with hearing(heard.append):
+        assert tasks(scheduler, prepare, 1) == [1]
+    assert Announcement("waiting", "run 0") in heard
+
+
+def test_no_more_at_once_than_asked_for(scheduler: str, tmp_path: Path) -> None:
+    executor = Executor(1, scheduler)
+    folder = tmp_path / "runs"
+    list(executor.run_tasks(lambda: solving(CountedSolver(folder)), range(4)))
+    assert seen(folder).most == 1
+
+
+def solving(solver: Any) -> Any:
+    return lambda number, tell: solver.run(number, None)
+
+
+# Whoever dies
+
+
+def test_a_worker_that_dies_costs_its_run_only(scheduler: str, tmp_path: Path) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> int:
+            tell(("begun", number))
+            if number == 3 and not (tmp_path / "died").exists():
+                (tmp_path / "died").touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+            return number
+
+        return task
+
+    begun, heard = time.monotonic(), list[Announcement]()
+    with hearing(heard.append):
+        records = tasks(scheduler, prepare, 8)
+    assert time.monotonic() - begun < 10  # it is noticed and reported by then
+    assert sorted(r for r in records if isinstance(r, int)) == list(range(8))
+    assert sorted(r[1] for r in records if isinstance(r, tuple)) == list(range(8))
+    (words,) = [said.words for said in heard if "died" in said.words]
+    assert words.startswith("worker tcp://127.0.0.1:")
+    assert words.endswith(" died; task 3 of the starts is done again elsewhere")
+
+
+def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler: str, tmp_path: Path) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> int:
+            if number == 1:
+                with (tmp_path / "tries").open("a") as file:
+                    file.write("x")
+                os._exit(9)
+            return number
+
+        return task
+
+    records = tasks(scheduler, prepare, 4, what="runs", lost=lambda n, why: (n, why))
+    assert sorted(r for r in records if isinstance(r, int)) == [0, 2, 3]
+    ((number, why),) = [r for r in records if isinstance(r, tuple)]
+    assert number == 1 and why.startswith("3 workers died of it, the last was tcp://")
+    assert (tmp_path / "tries").read_text() == "xxx"
+
+
+def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch) -> None:
+    def lose(self: Any, prepare: Any, numbers: Any, what: str, lost: Any) -> Any:
+        return iter([lost(number, "3 workers died of it") for number in numbers])
+
+    monkeypatch.setattr(Executor, "run_tasks", lambda self, p, n, lost: lose(self, p, n, "", lost))
+    options: Any = None
+    (record,) = Executor().run_starts(lambda: options, options, 5, [7], "coarse")
+    why = "3 workers died of it"
+    assert record == StartRecord(
+        7, (5, 7), None, why, 0, (), (), 0.0, failure=why, mesh="coarse"
+    )  # fmt: skip
+
+
+def test_an_error_of_a_task_is_an_error_here(scheduler: str) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> int:
+            raise InputError("mesh.vtu", "quads", "made to fail")
+
+        return task
+
+    with pytest.raises(InputError, match=r"^mesh.vtu: quads: made to fail$") as caught:
+        tasks(scheduler, prepare, 2)
+    assert caught.value.field == "quads"
+
+
+def test_a_scheduler_that_goes_is_an_error_soon() -> None:
+    distributed: Any = needs.library("distributed")
+    options = {"n_workers": 1, "processes": False, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(**options) as local:
+        running = Executor(scheduler=local.scheduler_address).run_tasks(
+            lambda: lambda number, tell: time.sleep(0.1) or number, range(1000), "parts"
+        )
+        while next(running) is None:
+            pass
+        local.close()
+        begun = time.monotonic()
+        with pytest.raises(BubblefitError, match="does not answer any more; finished parts") as end:
+            list(running)
+    assert time.monotonic() - begun < 10 and end.value.exit_code == 4
+
+
+def test_programs_end_when_nobody_wants_their_results(scheduler: str, tmp_path: Path) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> int:
+            script = f"echo $$ > {tmp_path}/{number}.pid; exec sleep 60"
+            run_process(["sh", "-c", script], tmp_path, tmp_path / f"{number}.log")
+            return number
+
+        return task
+
+    running = Executor(scheduler=scheduler).run_tasks(prepare, range(2))
+    wait_for(lambda: next(running) is None and len(list(tmp_path.glob("*.pid"))) == 2)
+    wait_for(lambda: all(path.read_text().strip() for path in tmp_path.glob("*.pid")))
+    running.close()
+    for path in tmp_path.glob("*.pid"):
+        wait_for(lambda path=path: not Path(f"/proc/{path.read_text().strip()}").exists())
+
+
+# Who is used
+
+
+def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) -> None:
+    ours = cluster_worker.version()
+    others = {
+        "bubblefit": (ours[0], "0.1.9", ours[2]),
+        "Python": ("3.9.1", *ours[1:]),
+        "code": (*ours[:2], "other"),
+    }
+    words = {
+        "bubblefit": f"it has bubblefit {ours[1]}, here it is 0.1.9",
+        "Python": f"it has Python {ours[0]}, here it is 3.9.1",
+        "code": "it has another code of bubblefit",
+    }
+    for what, other in others.items():
+        monkeypatch.setattr(cluster_worker, "version", lambda other=other: other)
+        heard: list[Announcement] = []
+        with hearing(heard.append):
+            said = complaint(tasks, scheduler, lambda: None, 3)
+        assert said.startswith("--scheduler: worker tcp://127.0.0.1:") and words[what] in said
+        assert sum("is not used" in one.words for one in heard) == 2
+
+
+def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> None:
+    class Elsewhere:
+        def __reduce__(self) -> Any:
+            return __import__, ("no_such_module",)
+
+    monkeypatch.setattr(cluster_worker, "version", Elsewhere)
+    said = complaint(tasks, scheduler, lambda: None, 3)
+    assert "it has no bubblefit of this version (" in said
+
+
+def test_workers_that_come_later_are_waited_for_and_used() -> None:
+    distributed: Any = needs.library("distributed")
+    options = {"processes": False, "dashboard_address": ":0", "silence_logs": 50}
+    heard: list[Announcement] = []
+    with distributed.LocalCluster(n_workers=0, **options) as local, hearing(heard.append):
+        running = Executor(scheduler=local.scheduler_address).run_tasks(
+            lambda: lambda number, tell: 10 * number, [1, 2, 3]
+        )
+        assert next(running) is None
+        assert heard[-1].words == "waiting for a worker of the cluster"
+        local.scale(1)
+        assert sorted(filter(None, running)) == [10, 20, 30]
+        assert heard[-1] == Announcement("", heard[0].of)
+
+
+def test_without_a_scheduler_the_command_ends_at_once(
+    strips_project: bf.Project, tmp_path: Path, monkeypatch
+) -> None:
+    begun = time.monotonic()
+    arguments = ("fit", strips_project.path, "--out", tmp_path / "out")
+    done = in_process(*arguments, "--scheduler", NOBODY, cwd=tmp_path, code=2)
+    assert f"--scheduler: no Dask scheduler answers at {NOBODY}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1 and not (tmp_path / "out").exists()
+    assert time.monotonic() - begun < 15
+    monkeypatch.setenv("BUBBLEFIT_SCHEDULER", "nonsense://x")
+    done = in_process(*arguments, cwd=tmp_path, code=2)
+    assert "no Dask scheduler answers at nonsense://x" in done.stderr
+
+
+def test_without_dask_the_extra_is_named(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    said = complaint(cluster.check, NOBODY)
+    assert said == "--scheduler: Dask is not installed; pip install 'bubblefit[cluster]'"
+
+
+# Licences
+
+
+def test_a_scheduler_counts_licences(scheduler: str, tmp_path: Path) -> None:
+    """Every worker locks files of its own here: nobody but the scheduler counts."""
+    runs = tmp_path / "runs"
+
+    def prepare() -> Any:
+        given = {
+            "licences": 1, "licence_folder": str(tmp_path / f"locks-{os.getpid()}"),
+            "licence_scheduler": scheduler,
+        }  # fmt: skip
+        return solving(licences.licensed(CountedSolver(runs, 0.1), "counted", given))
+
+    tasks(scheduler, prepare, 6)
+    found = seen(runs)
+    assert found.most == 1 and found.ended == {str(n): 1 for n in range(6)}
+    assert len(list(tmp_path.glob("locks-*"))) == 2
+
+
+def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path) -> None:
+    def take(count: int) -> None:
+        given = licences.licence_settings(
+            "acme", {"licences": count, "licence_folder": str(tmp_path)}
+        )
+        with licences.held("acme", given, scheduler):
+            pass
+
+    take(2)
+    assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
+
+
+def test_a_fit_hands_its_scheduler_to_the_solver(strips_project: bf.Project) -> None:
+    project = strips_project.with_scheduler("tcp://there:1")
+    assert project.executor.scheduler == project.options_of("marc")["licence_scheduler"]
+    assert "licence_scheduler" not in strips_project.options_of("marc")
+    assert "licence_scheduler" not in project.solver_options["marc"]
+
+
+def wait_for(there: Callable[[], object]) -> None:
+    end = time.monotonic() + 30
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.01)
