@@ -19,6 +19,7 @@ import numpy as np
 from bubblefit.fits import stages
 from bubblefit.fits.coarse import CoarseToFine, coarse_problem
 from bubblefit.fits.distinct import SAME_MODULI, distinct, moduli_apart
+from bubblefit.fits.executor import Executor
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup
 from bubblefit.fits.start import StartRecord, run_start
@@ -35,19 +36,12 @@ def every_start(setup: FitSetup) -> tuple[list[StartRecord], float]:
 def in_this_process() -> None:
     """Starts run one after the other where their time can be read."""
 
-    def run_tasks(prepare, numbers, jobs):  # type: ignore[no-untyped-def]
+    def run_tasks(self, prepare, numbers, *_, **__):  # type: ignore[no-untyped-def]
         task = prepare()
         for number in numbers:
             yield task(number, lambda _: None)
 
-    stages.run_tasks = run_tasks
-
-    def run_starts(build, options, seed, numbers, jobs, mesh="full"):  # type: ignore[no-untyped-def]
-        problem = build()
-        for number in numbers:
-            yield run_start(problem, options, seed, number, lambda _: None, mesh)
-
-    stages.run_starts = run_starts
+    Executor.run_tasks = run_tasks  # type: ignore[method-assign]
 
 
 def main(arguments: Sequence[str]) -> None:

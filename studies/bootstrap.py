@@ -11,8 +11,9 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..fits.processes import Task, run_tasks
-from ..fits.project import Project, cores
+from ..fits.executor import cores
+from ..fits.processes import Task
+from ..fits.project import Project
 from ..fits.store import Store
 from ..identification.methods.descent import descend
 from ..identification.resampling import Group, Unit, drawn, factors_of, rows_of
@@ -77,14 +78,13 @@ def bootstrap(
     tell(len(done), samples, "")
     missing = [n for n in range(samples) if n not in done]
     prepare = functools.partial(_task, found, groups, project.fit.seed)
-    jobs = project.fit.jobs or cores()
-    for sample in run_tasks(prepare, missing, jobs, "samples"):
+    for sample in project.executor.run_tasks(prepare, missing, "samples"):
         if isinstance(sample, Sample):
             done[sample.number] = sample
             record.write(sample)
         tell(len(done), samples, "")
     # Every process runs the optimum once more.
-    before = found.analyses + min(jobs, len(missing))
+    before = found.analyses + min(project.fit.jobs or cores(), len(missing))
     return Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before)
 
 
