@@ -11,8 +11,7 @@ import sys
 import time
 
 import numpy as np
-from bubblefit.fits.executor import cores
-from bubblefit.fits.processes import run_starts
+from bubblefit.fits.executor import Executor
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.methods import FitOptions
 from known_solution import known_project, known_setup
@@ -43,7 +42,7 @@ def main() -> None:
         begun = time.perf_counter()
         records = [
             record
-            for record in run_starts(build, METHODS[name], seed, range(starts), cores())
+            for record in Executor().run_starts(build, METHODS[name], seed, range(starts))
             if isinstance(record, StartRecord)
         ]
         wall = time.perf_counter() - begun

@@ -9,8 +9,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from bubblefit.fits.executor import cores
-from bubblefit.fits.processes import run_starts
+from bubblefit.fits.executor import Executor
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.methods import FitOptions
 from known_solution import known_project, known_setup
@@ -30,7 +29,7 @@ def main() -> None:
     for seed in range(1, seeds + 1):
         records = [
             record
-            for record in run_starts(setup.problem, options, seed, range(starts), cores())
+            for record in Executor().run_starts(setup.problem, options, seed, range(starts))
             if isinstance(record, StartRecord)
         ]
         e = np.array([np.inf if r.objective is None else r.objective for r in records])

@@ -20,7 +20,7 @@ from ..errors import BubblefitError, InputError
 from ..solvers.announcements import Announcement, announce, pass_on
 from . import cluster_worker
 from .cluster_worker import NotJoined
-from .processes import Task
+from .workers import Task
 
 log = logging.getLogger(__name__)
 CONNECT_S = 5.0

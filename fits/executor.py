@@ -11,9 +11,10 @@ from typing import Any
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem
 from . import processes
-from .processes import Record, Task
-from .start import MeshName, StartRecord, run_start
+from .start import EvaluationRecord, MeshName, StartRecord, run_start
+from .workers import Task
 
+Record = EvaluationRecord | StartRecord
 #: Makes the record of a task that nobody could do, of its number and why.
 Lost = Callable[[int, str], Any]
 

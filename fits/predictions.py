@@ -25,10 +25,10 @@ from .facts import solver_facts
 from .failure_page import failure_page
 from .logged import log_run
 from .prediction_result import Predictions, predicted_kind
-from .processes import Task
 from .project import Project
 from .record import Record, data_rows, this_run
 from .run_records import RunRecords
+from .workers import Task
 from .written import settings_of_predictions
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import multiprocessing
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -10,48 +9,13 @@ from multiprocessing import connection
 from typing import Any
 
 from ..errors import BubblefitError
-from ..identification.methods import FitOptions
-from ..identification.problem import FitProblem
 from ..solvers.announcements import Announcement, announce, pass_on
 from ..solvers.scratch import sweep_left
-from .start import EvaluationRecord, MeshName, StartRecord, run_start
 from .workers import GRACE_S, Ended, Task, Worker
 
-__all__ = ["Task", "run_starts", "run_tasks"]
-Record = EvaluationRecord | StartRecord
 WAIT_S = 0.5
 #: How often a task is tried in all where the process that does it dies.
 TRIES = 2
-
-
-def run_starts(
-    build: Callable[[], FitProblem],
-    options: FitOptions,
-    seed: int,
-    numbers: Sequence[int],
-    jobs: int,
-    mesh: MeshName = "full",
-) -> Iterator[Record | None]:
-    """Fit every start; yield records as they come, None now and then while nothing does.
-
-    Parameters
-    ----------
-    build : makes the problem; called once in every process.
-    jobs : processes beside this one, which only listens.
-    mesh : of the problem, for the records.
-
-    Raises
-    ------
-    BubblefitError : as `run_tasks`.
-    """
-    return run_tasks(functools.partial(_starting, build, options, seed, mesh), numbers, jobs)
-
-
-def _starting(
-    build: Callable[[], FitProblem], options: FitOptions, seed: int, mesh: MeshName
-) -> Task:
-    problem = build()
-    return lambda number, tell: run_start(problem, options, seed, number, tell, mesh)
 
 
 def run_tasks(

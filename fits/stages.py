@@ -14,9 +14,9 @@ from dataclasses import replace
 from ..identification.problem import FitProblem
 from .coarse import coarse_problem
 from .distinct import distinct
-from .processes import Task
 from .setup import FitSetup
 from .start import EvaluationRecord, Stage, StartRecord, run_start
+from .workers import Task
 
 Event = EvaluationRecord | StartRecord
 Records = Iterator[Event | None]

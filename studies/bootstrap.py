@@ -12,9 +12,9 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from ..fits.executor import cores
-from ..fits.processes import Task
 from ..fits.project import Project
 from ..fits.store import Store
+from ..fits.workers import Task
 from ..identification.methods.descent import descend
 from ..identification.resampling import Group, Unit, drawn, factors_of, rows_of
 from ..identification.weighted import WeightedProblem

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..fits.executor import cores
-from ..fits.processes import Task
 from ..fits.project import Project
 from ..fits.setup import FitSetup
+from ..fits.workers import Task
 from ..identification.bands import bands_of
 from ..identification.likelihood import Side, extreme, modulus_row, profile_side
 from ..identification.weighted import WeightedProblem

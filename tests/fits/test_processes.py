@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.processes import run_starts, run_tasks
+from bubblefit.fits.executor import Executor
+from bubblefit.fits.processes import run_tasks
 from bubblefit.fits.start import StartRecord
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.comparison import Comparison
@@ -53,6 +54,10 @@ def build(solver: MembraneSolver | None = None) -> FitProblem:
     comparison = Comparison("bubble", MODEL, solver or MembraneSolver(), FieldObjective(data))
     unknowns = Unknowns.of(Polynomial(0), KNOWN.nu12, [0.13] * 3, BOUNDS, [comparison])
     return FitProblem((comparison,), KNOWN, unknowns)
+
+
+def run_starts(problem: Any, options: FitOptions, seed: int, numbers: list[int], jobs: int) -> Any:
+    return Executor(jobs).run_starts(problem, options, seed, numbers)
 
 
 def study_with(jobs: int, numbers: list[int]) -> dict[int, tuple]:
