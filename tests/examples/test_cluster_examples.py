@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
+import runpy
 import shlex
 import subprocess
 from pathlib import Path
@@ -27,12 +27,13 @@ def options_of(words: list[str]) -> dict[str, Any]:
 
 def test_jobs_of_a_queue_are_workers_that_hold_a_licence() -> None:
     jobqueue: Any = needs.library("dask_jobqueue")
-    spec: Any = importlib.util.spec_from_file_location("queue_fit", HERE / "queue_fit.py")
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
-    more = {"job_extra_directives": example.MORE, "scheduler_options": {"dashboard_address": ":0"}}
+    example = runpy.run_path(str(HERE / "queue_fit.py"))
+    more = {
+        "job_extra_directives": example["MORE"],
+        "scheduler_options": {"dashboard_address": ":0"},
+    }
     for name, mark in {"SLURMCluster": "#SBATCH", "PBSCluster": "#PBS"}.items():
-        with getattr(jobqueue, name)(**example.JOB, **more) as cluster:
+        with getattr(jobqueue, name)(**example["JOB"], **more) as cluster:
             script = cluster.job_script()
             assert cluster.scheduler_address in script
         assert f"{mark} -L marc:1\n" in script and "--nthreads 1 " in script

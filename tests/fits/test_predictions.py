@@ -14,7 +14,7 @@ from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.base import Exhibit, RunRecord
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.notes import notes_of_record
-from bubblefit.fits import predictions
+from bubblefit.fits import executor, processes
 from bubblefit.fits.cards import chosen_cards
 from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import RunEvent, predict
@@ -163,8 +163,8 @@ def test_processes(project: Project, monkeypatch, asked, said, some: int) -> Non
         yield None
         yield from (run(number, lambda _: None) for number in numbers)
 
-    monkeypatch.setattr(predictions, "run_tasks", side_by_side)
-    monkeypatch.setattr(predictions, "cores", lambda: 7)
+    monkeypatch.setattr(processes, "run_tasks", side_by_side)
+    monkeypatch.setattr(executor, "cores", lambda: 7)
     predict(project.with_fit(jobs=said), ["high"], jobs=asked, progress=events.append)
     assert told == [(some, "runs")]
     assert [event is None for event in events] == [False, True, False, False]

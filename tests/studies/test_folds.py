@@ -53,7 +53,7 @@ def test_a_fold_errs_by_what_the_specimens_differ_by(tmp_path: Path) -> None:
     (tmp_path / "project.toml").write_text(PROJECT)
     project = read_project(tmp_path / "project.toml")
     setup = prepare_fit(project, project.chosen(None, fitted=True))
-    folds = [fold for fold in validate(setup, 5, 1, 1) if fold is not None]
+    folds = [fold for fold in validate(setup, 5, 1) if fold is not None]
     assert [fold.fold for fold in folds] == [0, 1]  # as many as specimens
     root_mean_square = float(np.sqrt(np.mean(strain**2)))
     for fold in folds:
