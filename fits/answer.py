@@ -23,6 +23,8 @@ WORDS: Mapping[str, str] = {
 }
 #: Logarithmic strains at which the answer is given, as far as the tests reached.
 STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
+#: Within what stays on one line.
+SPACE = "\u00a0"
 #: The strain of the summary, and what it is called.
 FIRST = 0.01
 
@@ -42,7 +44,7 @@ def band_words(value: float, lower: float, upper: float) -> str:
     """A value with its band, as many digits as it bears."""
     if not np.isfinite([lower, upper]).all():
         return f"{value:.3g}"
-    return f"{_short(value)} ({_short(lower)} to {_short(upper)})"
+    return f"{_short(value)}{SPACE}({_short(lower)}{SPACE}to{SPACE}{_short(upper)})"
 
 
 def _short(value: float) -> str:

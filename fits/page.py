@@ -16,8 +16,8 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, write_notes
 from ..reports import (
+    Charts,
     Download,
-    Picture,
     Report,
     Section,
     percent,
@@ -27,6 +27,8 @@ from ..reports import (
     write_report,
 )
 from ..reports.content import Part
+from ..reports.moduli_charts import moduli_charts, pinned_charts
+from ..reports.optima_charts import optima_chart
 from ..writing import replacing
 from .answer import answer_table, answer_words, reached_table
 from .citation import citation
@@ -42,6 +44,7 @@ Array = NDArray[np.float64]
 
 CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
 COEFFICIENTS = "coefficients.csv"
+MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
 #: Strains at which curves are drawn.
 SMOOTH = 121
 SAVE_CARD = "Save the material card (material.toml)"
@@ -53,6 +56,9 @@ FILES = (
     (RESIDUALS, "every matched value beside the model's"),
     (NOTES, NOTES_ARE),
     ("history.csv", "one row an analysis"),
+    (MODULI_PICTURE, "picture of the moduli"),
+    (OPTIMA, "picture of the optima"),
+    (PINNED, "picture of what each test pins down"),
 )
 
 
@@ -117,12 +123,12 @@ def _shown(exhibits: Mapping[str, Exhibit]) -> list[Part]:
     ]
 
 
-def _optima(fit: Fit, folder: Path) -> Picture:
-    plot_optima(folder / "optima.png", optima(fit))
-    return Picture("optima.png", optima_words(fit))
+def _optima(fit: Fit, folder: Path) -> Charts:
+    plot_optima(folder / OPTIMA, optima(fit))
+    return optima_chart(optima(fit), optima_words(fit))
 
 
-def _moduli(fit: Fit, folder: Path) -> Picture:
+def _moduli(fit: Fit, folder: Path) -> Charts:
     """The moduli over the strains that they are fitted to, as far as the card is valid."""
     strains = _strains(fit)
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
@@ -135,20 +141,16 @@ def _moduli(fit: Fit, folder: Path) -> Picture:
                 for name, x in zip(COMPONENTS, strains, strict=True)
             ]
         ).transpose(1, 0, 2)
-    plot_moduli(
-        folder / "moduli.png",
-        strains,
-        curves,
-        None if known is None else modulus_curves(known, strains),
-        band=None if known is not None else band,
-    )
+    truth = None if known is None else modulus_curves(known, strains)
+    shown = None if known is not None else band
+    plot_moduli(folder / MODULI_PICTURE, strains, curves, truth, band=shown)
     words = ""
     if known is None and band is not None:
         words = (
             f", where a dot ends them; with their bands ({percent(LEVEL)}, noise and mesh together)"
         )
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    return Picture("moduli.png", caption)
+    return moduli_charts(strains, curves, truth, shown, caption)
 
 
 def _strains(fit: Fit, count: int = SMOOTH) -> Array:
@@ -160,7 +162,7 @@ def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
     return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
 
 
-def _pinned(fit: Fit, folder: Path) -> list[Picture]:
+def _pinned(fit: Fit, folder: Path) -> list[Charts]:
     if not (pins := fit.pinned):
         return []
     sigma = {
@@ -168,6 +170,6 @@ def _pinned(fit: Fit, folder: Path) -> list[Picture]:
         for source, sigmas in pins.items()
     }
     count = next(iter(sigma.values())).shape[1]
-    plot_pinned(folder / "pinned.png", _strains(fit, count), sigma)
+    plot_pinned(folder / PINNED, _strains(fit, count), sigma)
     caption = "What each test pins down: one standard deviation of the moduli"
-    return [Picture("pinned.png", caption)]
+    return [pinned_charts(_strains(fit, count), sigma, caption)]

@@ -13,7 +13,7 @@ from .ticks import written
 
 Array = NDArray[np.float64]
 
-SIDE, ABOVE, BELOW, LEFT, RIGHT = 190.0, 22.0, 34.0, 8.0, 62.0
+SIDE, ABOVE, BELOW, LEFT, RIGHT = 190.0, 22.0, 34.0, 8.0, 80.0
 
 
 def frame_of(maps: Maps, values: Array, load: int) -> Array:

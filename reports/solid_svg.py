@@ -36,7 +36,7 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
         d = "L".join(f"{x:.1f} {y:.1f}" for x, y in flat[faces[k]])
         fill = colours[number[k]] if number[k] >= 0 else "#999"
         parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
-    parts.append(f'</g><g class="scale" transform="translate({WIDTH - 66:g} {2 * MARGIN:g})">')
+    parts.append(f'</g><g class="scale" transform="translate({WIDTH - 84:g} {2 * MARGIN:g})">')
     parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
     return as_markup("".join(parts))
 

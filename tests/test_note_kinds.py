@@ -23,7 +23,7 @@ from bubblefit.fits.predictions import predict
 from bubblefit.fits.project import read_project
 from bubblefit.fits.simulation import simulate_cards
 from bubblefit.notes import FEW, Note, NoteKind, lines
-from bubblefit.reports import Picture
+from bubblefit.reports import Charts
 from bubblefit.solvers import registry
 from bubblefit.studies import law_page
 from bubblefit.studies.poisson import vary_nu12
@@ -186,7 +186,7 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
     for name in ("_optima", "_moduli"):
-        patch.setattr(fit_page, name, lambda *_: Picture("a.png", "a picture"))
+        patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
     patch.setattr(fit_page, "_pinned", lambda *_: [])
     patch.setattr(type(fit.setup.tests[0]), "show", lambda *_: Exhibit())
     page = fit.report(folder)

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 
 from ...materials.law import HypoelasticLaw
 from ...reports import BiaxialPanel, plot_biaxial
+from ...reports.biaxial_charts import biaxial_charts
 from ...writing import replacing
 from ..base import Exhibit, Output
 from .objective import PERCENT
 from .prepared import FittedPath
 from .tables import misfit_table, path_table
 from .test import BiaxialTest
+
+CAPTION = "Strain over the larger load: measured and modelled"
 
 
 def exhibit(
@@ -32,7 +35,10 @@ def exhibit(
     plot_biaxial(out.path("paths.png"), panels)
     return Exhibit(
         facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
-        figures=[(out.name("paths.png"), "Strain over the larger load: measured and modelled")],
         tables=[misfit_table(paths)],
-        files=[(out.name("paths.csv"), "loads and strains of every ratio, measured and modelled")],
+        files=[
+            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
+            (out.name("paths.png"), "picture of the ratios"),
+        ],
+        parts=[biaxial_charts(f"{test.name} ratios", panels, CAPTION)],
     )

@@ -8,13 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...reports import plot_heights, plot_profiles
+from ...reports.content import Part
 from ..base import Exhibit, Findings, FittedTest, Output, Shown
+from .charts import profile_charts, residual_chart
 from .findings import objective_of, recorded_of
 from .inflated import at_nodes, write_series
+from .maps import field_maps
 from .objective import displacement_offset
 from .recorded_words import clock_pictures, recorded_table
 from .registration import registration_picture, registration_table
 from .sheet_report import fitted_model, sheet_exhibit, sheet_lines
+from .solid import bubble_solid
 from .tables import misfit_table, surface_tables, write_surface_table
 
 if TYPE_CHECKING:
@@ -36,8 +40,8 @@ def exhibit(
     left = left_at_nodes(fitted)
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, out.path(SERIES), left)
     of_sheet = sheet_exhibit(prepared, fitted, out)
-    figures = [*_figures(prepared, fitted, out), *of_sheet[0]]
-    files += of_sheet[1]
+    files += [*_pictures(prepared, fitted, out), *of_sheet[1]]
+    figures = list(of_sheet[0])
     tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
@@ -46,12 +50,13 @@ def exhibit(
     if taken is not None:
         tables.insert(0, recorded_table(taken))
         figures += clock_pictures(taken, out)
-    return Exhibit(
-        facts=_facts(prepared, findings),
-        figures=figures,
-        tables=tables,
-        files=files,
-    )
+    parts: list[Part] = [
+        profile_charts(prepared, fitted),
+        field_maps(prepared, fitted),
+        bubble_solid(prepared, fitted, left),
+        residual_chart(prepared, fitted),
+    ]
+    return Exhibit(_facts(prepared, findings), figures, tables, files, parts)
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
@@ -66,8 +71,8 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
     return left
 
 
-def _figures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
-    """Cuts and heights against what was measured."""
+def _pictures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
+    """Cuts and heights against what was measured, as pictures beside the page."""
     test, offset = prepared.test, displacement_offset(fitted.nuisance)
     displacement = fitted.histories[0].displacement
     label = "known solution" if prepared.known is not None else "measured"

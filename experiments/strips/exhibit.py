@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...reports import plot_loads
+from ...reports import StripCurves, plot_loads
+from ...reports.load_charts import load_charts
 from ...writing import replacing
 from ..base import Exhibit, FittedTest, Output, Shown
 from .figures import draw_bias, draw_moduli, draw_orders, load_panels
@@ -14,6 +15,7 @@ from .prepared import FittedStrip
 from .tables import load_table, misfit_table
 from .test import StripsTest
 
+LOADS = "Load over gauge elongation: measured and modelled"
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 
@@ -23,8 +25,13 @@ def exhibit(
     """Write loads.csv, bias.vtu and the pictures; what the page says of them."""
     with replacing(out.path("loads.csv")) as path:
         load_table(strips).to_csv(path, index=False)
-    figures = [_loads(strips, out)]
-    files = [(out.name("loads.csv"), "load curves of the best fit")]
+    panels = _panels(strips)
+    plot_loads(out.path("loads.png"), panels)
+    figures: list[Shown] = []
+    files = [
+        (out.name("loads.csv"), "load curves of the best fit"),
+        (out.name("loads.png"), "picture of the load curves"),
+    ]
     for strip in strips:
         if strip.direction == "bias":
             picture, vtu = out.path("bias.png"), out.path("bias.vtu")
@@ -42,14 +49,13 @@ def exhibit(
         figures=figures,
         tables=[misfit_table(strips)],
         files=files,
+        parts=[load_charts(f"{test.name} loads", panels, LOADS)],
     )
 
 
-def _loads(strips: Sequence[FittedStrip], out: Output) -> Shown:
+def _panels(strips: Sequence[FittedStrip]) -> list[StripCurves]:
     """Load curves against what was measured."""
     models = {
         s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
     }
-    panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
-    plot_loads(out.path("loads.png"), panels)
-    return out.name("loads.png"), "Load over gauge elongation: measured and modelled"
+    return load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})

@@ -93,8 +93,9 @@ def test_the_files_of_a_study_agree(study):
 
     page = (out / "report.html").read_text()
     figures = re.findall(r'title="([^"]+\.png)"', page)
-    assert set(figures) == {p.name for p in out.glob("*.png")}
-    assert {"loads.png", "bias.png", "failure.png", "moduli.png", "optima.png"} <= set(figures)
+    drawn = {p.name for p in out.glob("*.png")}
+    assert {"loads.png", "bias.png", "failure.png", "moduli.png", "optima.png"} <= drawn
+    assert {"bias.png", "failure.png"} <= set(figures) <= drawn
     listed = page[page.index("Files of the folder") :]
     for name in re.findall(r"<tr><td>(.*?)</td>", listed):
         assert (out / name).exists(), name

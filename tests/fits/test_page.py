@@ -15,11 +15,12 @@ from bubblefit.fits.answer import WORDS, band_words
 from bubblefit.fits.coefficients import TITLE, two_digits
 from bubblefit.fits.determined import sigma_words
 from bubblefit.fits.numbers import versions
-from bubblefit.reports import Download, Facts, Report, Table, Words, percent
+from bubblefit.reports import Charts, Download, Facts, Report, Table, Words, percent
 
 from ..projects import ELONGATION, MODULI
 
 ENDS = {"one": 2.9, "two": 2.5}
+LOADS = "Load over gauge elongation: measured and modelled"
 NOISE_NOTE = (
     " on everything matched; a law or a model of the wrong form is not in it; single "
     "coefficients are far less certain than the moduli they make. Mesh: by how much a modulus "
@@ -73,6 +74,11 @@ def titled(report: Report, title: str) -> Table:
 def facts(report: Report) -> list[tuple[str, object]]:
     """Of all sections, in order."""
     return [pair for part in report.parts if isinstance(part, Facts) for pair in part.pairs]
+
+
+def captions(report: Report) -> dict[str, str]:
+    """Of all charts, by name."""
+    return {part.name: part.caption for part in report.parts if isinstance(part, Charts)}
 
 
 def said(report: Report) -> list[str]:
@@ -174,25 +180,32 @@ def test_two_tests(together: bf.Fit, written: tuple[Report, Told]) -> None:
         ("residuals.csv", "every matched value beside the model's"),
         ("notes.csv", "what a reader of the numbers should know, note by note"),
         ("one-loads.csv", "load curves of the best fit"),
+        ("one-loads.png", "picture of the load curves"),
         ("two-loads.csv", "load curves of the best fit"),
+        ("two-loads.png", "picture of the load curves"),
     ]
     assert found.versions == versions()
     (warned,) = [p for p in found.parts if isinstance(p, Words) and p.warning]
     assert warned.lines == [note.line for note in fit.notes]
     strips = [
-        ("loads", "Load over gauge elongation: measured and modelled"),
         ("failure", "Tangent moduli up to the strains at the end of each strip"),
         ("orders", "Error of load polynomials by order, and with a specimen left out"),
     ]
-    assert found.figures == [
-        (
-            "moduli.png",
+    assert captions(found) == {
+        "moduli": (
             "Tangent moduli of the best fits over the strains reached, where a dot ends them; with "
-            "their bands (95 %, noise and mesh together)",
+            "their bands (95 %, noise and mesh together)"
         ),
-        *((f"{test}-{name}.png", words) for test in ("one", "two") for name, words in strips),
-        ("pinned.png", "What each test pins down: one standard deviation of the moduli"),
-        ("optima.png", f"Optimum of every start: {objective_is}, from worst to best"),
+        "one loads": LOADS,
+        "two loads": LOADS,
+        "pinned": (
+            "What each test pins down: one standard deviation of the moduli; above 1000 % a "
+            "modulus is not determined, and no line drawn"
+        ),
+        "optima": f"Optimum of every start: {objective_is}, from worst to best",
+    }
+    assert found.figures == [
+        (f"{test}-{name}.png", words) for test in ("one", "two") for name, words in strips
     ]
 
 
@@ -211,7 +224,11 @@ def test_the_answer_in_words(
     warp, per_width, fill, _, shear, _ = table.rows
     own = fit.law.beta[11]
     lower, upper = (float(end[0]) for end in sure.band["E1"])
-    assert warp[:3] == [WORDS["E1"], "MPa", f"{own:.0f} ({lower:.0f} to {upper:.0f})"]
+    assert warp[:3] == [
+        WORDS["E1"],
+        "MPa",
+        f"{own:.0f} ({lower:.0f} to {upper:.0f})".replace(" ", "\u00a0"),
+    ]
     assert warp[3:7] == [warp[2]] * 4 and warp[7] == "12 %"
     assert per_width[1:3] == ["kN/m", band_words(0.8 * own, 0.8 * lower, 0.8 * upper)]
     assert fill[6] is not None and fill[7] == "14 %"
@@ -373,7 +390,7 @@ def test_starts_that_failed_other_programs_and_no_certainty(
     answer = titled(found, "Moduli")
     assert answer.rows[0][2] == f"{fit.law.beta[11]:.3g}" and "brackets" not in answer.note
     assert told.calls["plot_moduli"][1] == {"band": None}
-    assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
+    assert captions(found)["moduli"].endswith("over the strains reached")
     assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
     assert fit.coefficients()["sigma"].isna().all()
@@ -393,9 +410,9 @@ def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) 
     told_facts = facts(found)
     assert ("objective: sum of the strips' RMS errors, N", alone.objective) in told_facts
     assert ("matched", "measured points") in told_facts
-    names = ["moduli.png", "loads.png", "failure.png", "orders.png", "optima.png"]
-    assert [name for name, _ in found.figures] == names
-    assert found.files[-1] == ("loads.csv", "load curves of the best fit")
+    assert [name for name, _ in found.figures] == ["failure.png", "orders.png"]
+    assert list(captions(found)) == ["moduli", "two loads", "optima"]
+    assert found.files[-2] == ("loads.csv", "load curves of the best fit")
     assert [t.title for t in found.tables] == [
         "Moduli", "Where they end", "Residual beside the noise", "Misfit by strip",
         "What the data determine", "Starts, best first", "Coefficients of the law", TITLE,
@@ -412,7 +429,7 @@ def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Pa
     (_, curves, known), drawn = told.calls["plot_moduli"]
     np.testing.assert_array_equal(known, curves[0])
     assert drawn == {"band": None}
-    assert dict(found.figures)["moduli.png"].endswith("over the strains reached")
+    assert captions(found)["moduli"].endswith("over the strains reached")
 
 
 def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: Path) -> None:
