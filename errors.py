@@ -5,6 +5,8 @@ from __future__ import annotations
 import unicodedata
 from pathlib import Path
 
+#: Letters of a field that a message shows: a key may be as long as its file.
+LONGEST, LONGEST_LINE = 200, 4000
 #: Kinds of characters that would break a line, or steer a terminal.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 
@@ -29,8 +31,9 @@ class InputError(BubblefitError):
 
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
         self.path, self.field, self.problem = path, field, problem
-        where = ": ".join(str(part) for part in (path, field) if part)
-        super().__init__(one_line(f"{where}: {problem}" if where else problem))
+        shown = field if len(field) <= LONGEST else f"{field[:LONGEST]}..."
+        where = ": ".join(str(part) for part in (path, shown) if part)
+        super().__init__(one_line(f"{where}: {problem}" if where else problem)[:LONGEST_LINE])
 
     def __reduce__(self) -> tuple:
         """As for SolverFailure: rebuilt from the fields on the other side of a process border."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
     ------
     InputError : some of both, or a test named twice.
     """
-    named = [name.partition("=") for name in given if "=" in name and not Path(name).exists()]
+    named = [name.partition("=") for name in given if "=" in name and not os.path.exists(name)]
     if named and len(named) < len(given):
         raise InputError(None, "--data", "give one DIR for all tests, or TEST=DIR for each")
     if len(given) > 1 and not named:

@@ -66,6 +66,9 @@ PRESSURE_UNITS = {
 #: Seconds in one of each unit of time.
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
+#: Letters of a name, and names of a table: what is longer is none, and would take its time.
+LONGEST, MOST_NAMES = 300, 2000
+
 _KNOWN = r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,5}"
@@ -79,12 +82,16 @@ def split_unit(name: str) -> tuple[str, str]:
     >>> split_unit("Load (kN)"), split_unit("Weg in mm"), split_unit("load_N"), split_unit("Time")
     (('Load', 'kN'), ('Weg', 'mm'), ('load', 'N'), ('Time', ''))
     """
+    if len(name) > LONGEST:
+        return name, ""
     found = _IN_BRACKETS.match(name) or _AT_THE_END.match(name)
     return (found[1].strip(), found[2].strip()) if found else (name, "")
 
 
 def means(name: str, quantity: str) -> bool:
     """Whether a column holds `quantity`, one of those in `WORDS`, `PAIRS` and `LABELS`."""
+    if len(name) > LONGEST:
+        return False
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]

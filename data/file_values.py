@@ -10,13 +10,15 @@ import numpy as np
 
 from ..errors import InputError
 from .channels import Channel, in_unit
-from .column_names import split_unit
+from .column_names import MOST_NAMES, split_unit
 from .tables import HOLES, read_lines
 from .text_layouts import SEPARATORS, TOP, Lines, cells_of
 
 #: Units of readings that a scale makes something of.
 VOLTS = ("V", "mV")
-_NUMBER = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?"
+#: Letters of a line in which a value is looked for.
+LONGEST = 1000
+_NUMBER = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
 
 
 def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> float:
@@ -51,7 +53,11 @@ def _in_column(path: Path, lines: Lines, name: str) -> tuple[float, str, str] | 
             where = [i for i, cell in enumerate(names) if name in (cell, split_unit(cell)[0])]
             below = [cells_of(text, separator) or [] for _, text in lines[index + 1 : index + 3]]
             numbers = any(re.fullmatch(_NUMBER, cell) for cell in names)
-            if len(names) < 2 or numbers or not any(_is_of_numbers(row, names) for row in below):
+            if (
+                not 2 <= len(names) <= MOST_NAMES
+                or numbers
+                or not any(_is_of_numbers(row, names) for row in below)
+            ):
                 continue
             if len(where) > 1:
                 problem = f"{len(where)} columns are called {name!r}"
@@ -102,7 +108,7 @@ def _above(
         rf"(?<!\w){re.escape(name)}(?:_({known}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
         rf"[\s:=;,]*({_NUMBER})(?:[\s;,]*({known})(?!\w))?"
     )
-    every = [(found, line) for line, text in lines[:TOP] if (found := says.search(text))]
+    every = [(found, line) for line, text in lines[:TOP] if (found := says.search(text[:LONGEST]))]
     if not every:
         return None
     values = {float(found[3].replace(",", ".")) for found, _ in every}

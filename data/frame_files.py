@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,14 +29,14 @@ def frame_files(
     files: list[Path] = []
     for own in given:
         name = own if folder is None else str(folder / own)
-        if not Path(name).exists() and glob.has_magic(name):
+        if not os.path.exists(name) and glob.has_magic(name):
             # The folder's own name is no pattern.
             wanted = own if folder is None else str(Path(glob.escape(str(folder))) / own)
             found = [Path(f) for f in glob.glob(wanted, recursive=True) if not Path(f).is_dir()]
             if not found:
                 raise InputError(None, field, f"no file matches {name!r}")
             files += sorted(found, key=_numbers)
-        elif Path(name).is_dir():
+        elif os.path.isdir(name):
             problem = f"expected files; quote a pattern such as {str(Path(name) / '*.csv')!r}"
             raise InputError(name, field, f"is a folder, {problem}")
         else:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from .column_names import split_unit
+from .column_names import LONGEST, split_unit
 
 #: mm in one of each unit of length, by its name in small letters.
 LENGTHS = {
@@ -72,6 +72,8 @@ def heading_of(name: str, unit: str = "") -> Heading:
 
     unit : from a row of units below the names; one in the name itself comes first.
     """
+    if len(name) > LONGEST:
+        return Heading(name, unit, "")
     plain, own = split_unit(name)
     at_the_end = _UNIT_AT_THE_END.match(name)
     if not own and at_the_end:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from ..errors import InputError
-from .column_names import LENGTH_UNITS, LOAD_UNITS, TIME_UNITS, columns_of, split_unit
+from .column_names import LENGTH_UNITS, LOAD_UNITS, MOST_NAMES, TIME_UNITS, columns_of, split_unit
 from .decimal_marks import is_number
 
 #: Line number from 1 and cells.
@@ -47,6 +47,8 @@ def _names_all(
     names: list[str], named: Mapping[str, str], quantities: Sequence[str]
 ) -> list[list[int]]:
     """The columns of each quantity; none where a quantity has no column of its own."""
+    if len(names) > MOST_NAMES:
+        return []
     columns = [columns_of(names, quantity, named) for quantity in quantities]
     # A sentence that speaks of load and extension is one cell, and no header.
     several = all(columns) and len(set().union(*columns)) >= len(quantities)

@@ -101,6 +101,24 @@ class TextTable:
         return TextTable(self.path, self.cells[keep], self.lines[keep], self.decimal)
 
 
+#: Cells that may be missing from the ends of rows, beyond as many as a file has letters.
+MOST_MISSING = 10**7
+
+
+def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> None:
+    """That a table is not mostly holes: a long row of names makes cells for every short row.
+
+    line : of the names. width : how many. rows : below them, of so many letters in all.
+
+    Raises
+    ------
+    InputError : it is.
+    """
+    if width * rows > letters + MOST_MISSING:
+        problem = f"{width} names, and {rows} rows that are far shorter; is it a table?"
+        raise InputError(path, f"line {line}", problem)
+
+
 def read_table(path: Path | str, comment: str = "#") -> TextTable:
     """Read a table with a header line; blank lines and those that start with `comment` are skipped.
 
@@ -116,6 +134,8 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
         found = "only a header line" if numbered else "nothing"
         problem = f"expected a header line and rows of numbers, found {found}"
         raise InputError(path, "", problem)
+    letters = sum(len(text) for _, text in numbered)
+    check_width(path, numbered[0][0], numbered[0][1].count(",") + 1, len(numbered), letters)
     lines = np.array([number for number, _ in numbered])
     body = StringIO("\n".join(text for _, text in numbered))
     try:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from .column_names import MOST_NAMES
 from .decimal_marks import decimal_mark, is_number
 from .frame_headings import LENGTHS, PIXELS, Heading, columns_of, heading_of
-from .tables import read_lines
+from .tables import check_width, read_lines
 
 #: Line number from 1 and text.
 Lines = list[tuple[int, str]]
@@ -104,6 +105,7 @@ def find_layout(
     if not body:
         problem = "expected a header line and rows of numbers, found only a header line"
         raise InputError(path, f"line {header}", problem)
+    check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
     mark = decimal or _decimal(path, body, separator, headings, columns)
     return TextLayout(separator, headings, columns, header, body, mark)
 
@@ -116,7 +118,7 @@ def _best_header(
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:TOP]):
             names = cells_of(text, separator)
-            if names is None or len(names) < 2 or _is_numbers(names):
+            if names is None or not 2 <= len(names) <= MOST_NAMES or _is_numbers(names):
                 continue
             columns = columns_of([heading_of(name) for name in names], named, upper)
             known = {key.split()[0] for key, where in columns.items() if where}

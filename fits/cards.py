@@ -16,6 +16,7 @@ from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED
 from ..materials.forms.registry import form_named
 from ..materials.law import HypoelasticLaw
+from ..reading import is_file
 from ..sections import Number, Positive, Section, StrainTriple
 from .store import usual_folder
 
@@ -68,7 +69,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     own = {name: named.card for name, named in project.cards.items()}
     if not cards and not own:
         fitted = usual_folder(project.path) / FITTED
-        if not fitted.is_file():
+        if not is_file(fitted):
             problem = (
                 f"the project has no card and there is none in {fitted}: fit first (bubblefit "
                 "fit), name a card's file with --card, or add [[card]]"
@@ -82,7 +83,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     for given in cards:
         if str(given) in own:
             continue
-        if not Path(given).is_file():
+        if not is_file(Path(given)):
             problem = f"there is no card (and no file) {str(given)!r}; the project has: "
             raise InputError(project.path, "--card", problem + (", ".join(own) or "none"))
         card = read_card(Path(given))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -13,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
 from ..plugins import plug_in_named
-from ..reading import LARGEST_WRITTEN, content_of
+from ..reading import toml_of
 from ..section_errors import first_error
 from .cards import CardSection
 from .schema import CommonSections
@@ -77,7 +76,7 @@ def parse(path: Path) -> ProjectFile:
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(content_of(path, LARGEST_WRITTEN).decode("utf-8"))
+        return toml_of(path)
     except FileNotFoundError:
         problem = "no such file; `bubblefit init DIR` writes an example to start from"
         raise InputError(path, "", problem) from None

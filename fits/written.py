@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
+from ..reading import is_file
 from ..sections import beside
 from ..solvers.registry import solver_sections
 
@@ -69,8 +70,8 @@ def _beside_project(value: Any, base: Path, folder: Path) -> Any:
         return {key: _beside_project(own, base, folder) for key, own in value.items()}
     if isinstance(value, list):
         return [_beside_project(own, base, folder) for own in value]
-    if isinstance(value, str) and Path(value).suffix and not (folder / value).exists():
-        return os.path.abspath(base / value) if (base / value).is_file() else value
+    if isinstance(value, str) and Path(value).suffix and not os.path.exists(folder / value):
+        return os.path.abspath(base / value) if is_file(base / value) else value
     return value
 
 
@@ -139,7 +140,7 @@ def _solver_options(project: Project) -> Settings:
 def _in_full(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _in_full(own) for key, own in value.items()}
-    if isinstance(value, str) and os.sep in value and Path(value).exists():
+    if isinstance(value, str) and os.sep in value and os.path.exists(value):
         return os.path.abspath(value)
     return value
 

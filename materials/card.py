@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,7 @@ from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
-from ..reading import LARGEST_WRITTEN, content_of
+from ..reading import toml_of
 from ..section_errors import first_error
 from ..sections import MODULUS_UNITS, ModulusUnit, Section
 from ..writing import replacing
@@ -176,7 +175,7 @@ def read_card(path: Path) -> MaterialCard:
     """
     path = Path(path)
     try:
-        content = tomllib.loads(content_of(path, LARGEST_WRITTEN).decode("utf-8"))
+        content = toml_of(path)
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through

@@ -11,7 +11,7 @@ from typing import Any
 import jinja2
 
 from ..errors import InputError
-from ..reading import LARGEST_WRITTEN, content_of
+from ..reading import LARGEST_WRITTEN, content_of, is_file
 from ..rendering import TEMPLATES, environment
 
 
@@ -36,7 +36,7 @@ def render(
     """
     folders = [TEMPLATES / solver]
     if folder is not None:
-        if not (folder / name).is_file():
+        if not is_file(folder / name):
             problem = f"holds no {name}; copy {TEMPLATES / solver / name} there and change it"
             raise InputError(folder, "templates", problem)
         folders.insert(0, folder)

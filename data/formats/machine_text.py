@@ -20,7 +20,7 @@ from ..decimal_marks import decimal_mark
 from ..machine_headers import SEPARATORS, Block, cells_of, find_blocks, find_header, nothing_found
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
-from ..tables import TextTable, read_lines
+from ..tables import TextTable, check_width, read_lines
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
@@ -60,6 +60,7 @@ def read(path: Path, options: TableOptions) -> MachineTable:
                 problem += "; decimal commas need another separator, or quotation marks"
             raise InputError(path, f"line {number}", problem)
     width = len(names)
+    check_width(path, header_line, width, len(rest), sum(len(row) for _, row in rest))
     cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
     line_numbers = np.array([number for number, _ in rest])
     needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]

@@ -29,7 +29,7 @@ from ..frames import Frame, FrameOptions
 from ..registry import Format, register_format
 from ..tables import read_lines
 
-_VARIABLES = re.compile(rb"^\s*VARIABLES\s*=", re.IGNORECASE | re.MULTILINE)
+_VARIABLES = re.compile(rb"^[ \t]*+VARIABLES[ \t]*+=", re.IGNORECASE | re.MULTILINE)
 _WORD = re.compile(r"^\s*(TITLE|VARIABLES|ZONE|DATASETAUXDATA|TEXT|GEOMETRY)\b", re.IGNORECASE)
 _KEY = re.compile(r'\b([A-Z]+)\s*=\s*("[^"]*"|\([^)]*\)|[^\s,"(]+)', re.IGNORECASE)
 _NUMBERS = re.compile(r"^(?:[\s\d+\-.,e]|nan)*$", re.IGNORECASE)

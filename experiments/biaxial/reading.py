@@ -10,6 +10,7 @@ from ...data.biaxial.paths import BiaxialPath, cycles_of, evaluated_paths
 from ...data.biaxial.ratios import plain_ratio
 from ...data.biaxial.table import BiaxialTable, read_biaxial_table
 from ...errors import InputError
+from ...reading import is_file
 from ...sections import beside
 from ..base import Place
 from ..formats import named_format
@@ -38,7 +39,7 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
         folder = beside(place.path.parent, data.folder)
     tables, named = [], []
     for path, field, ratio in _listed(place, data, folder):
-        if not path.is_file():
+        if not is_file(path):
             if not place.need_data:
                 return BiaxialData((), (), ())
             problem = f"there is no file {path}; --data DIR names another folder"

@@ -15,6 +15,7 @@ from ...data.machine_loads import read_times
 from ...data.name_numbers import number_in_name
 from ...data.pressure_log import LogOptions, apex_heights, read_pressure_log
 from ...errors import InputError
+from ...reading import is_file
 from ..base import Place
 from ..channels import channel_of
 from ..formats import named_format
@@ -128,6 +129,6 @@ def log_files(section: LogSection | None, place: Place, folder: Path) -> tuple[P
 def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
     """A file beside the frames, in the folder of the data, or beside the project."""
     for home in (folder, place.path.parent):
-        if (home / name).is_file():
+        if is_file(home / name):
             return home / name
     raise place.error(field, f"there is no file {folder / name}; --data DIR names another folder")

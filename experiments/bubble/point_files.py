@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import string
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from ...data.frame_files import frame_files
 from ...data.frames import FrameOptions
 from ...data.registration.register import RegistrationOptions
 from ...errors import InputError
+from ...reading import is_file
 from ...sections import LENGTH_UNITS
 from ..base import Place
 from ..formats import named_format
@@ -149,7 +151,7 @@ def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
     folder = _folder(points, place)
     advice = "give the folder of the measured data with --data DIR"
     needed = place.need_data
-    if needed and not folder.is_dir():
+    if needed and not os.path.isdir(folder):
         raise place.error("data.points", f"there is no folder {folder}; {advice}")
     if points.files is None:
         files = [folder / name for name in names]
@@ -162,6 +164,6 @@ def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
             where = f"{error.path} " if error.path is not None else ""
             raise place.error(error.field, f"{where}{error.problem}; {advice}") from None
     for file in files:
-        if needed and not file.is_file():
+        if needed and not is_file(file):
             raise place.error("data.points", f"there is no file {file}; {advice}")
     return tuple(files)

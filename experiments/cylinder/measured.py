@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...data.bending import BendingCurve, read_bending_curves
+from ...reading import is_file
 from ..base import Place
 from ..channels import channel_of
 from ..formats import named_format
@@ -28,7 +29,7 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
         file, key = folder / name, f"measured.files[{k}]"
         if Path(name) in map(Path, names[:k]):
             raise place.error(key, f"{name!r} is listed twice; it would count double")
-        if not file.is_file():
+        if not is_file(file):
             if not place.need_data:
                 continue
             raise place.error(key, f"there is no file {file}; --data DIR names another folder")

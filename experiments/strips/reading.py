@@ -12,6 +12,7 @@ from ...data.load_polynomials import LoadPolynomial, fit_load_polynomial, specim
 from ...data.published_polynomials import read_published_polynomials
 from ...errors import InputError
 from ...models.uniaxial import WIDTH
+from ...reading import is_file
 from ...sections import beside
 from ..base import Place
 from ..formats import named_format
@@ -43,7 +44,7 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
         folder = beside(place.path.parent, data.folder)
     tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
     listed = listed_files(place, data, folder)
-    missing = next((file for file in listed if not file.path.is_file()), None)
+    missing = next((file for file in listed if not is_file(file.path)), None)
     if missing is not None:
         if place.need_data or not _complete(tables):
             problem = f"there is no file {missing.path}; --data DIR names another folder"

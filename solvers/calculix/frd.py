@@ -22,6 +22,8 @@ from ...errors import InputError
 Array = NDArray[np.float64]
 SHORT, LONG, FLOAT, DOUBLE = range(4)
 ROW = 6  # values in a text line
+#: Bytes of results that any file may come to when nodes without a value are padded.
+ROOM = 2**28
 #: Nodes of each element type of the format.
 NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
 
@@ -62,7 +64,7 @@ class FrdFile:
             self._data = self.path.read_bytes()
         except OSError as error:
             raise InputError(self.path, "", f"cannot be read: {error.strerror}") from None
-        self._at = 0
+        self._at = self._held = 0
         self.mesh = self._header()
         self._first = self._at
 
@@ -72,7 +74,7 @@ class FrdFile:
         ended : the analysis ended, and the file with its mark. If it did not, the file may stop
             after any whole result, and the increment that this one belongs to is the last.
         """
-        self._at = self._first
+        self._at, self._held = self._first, 0
         frame: FrdFrame | None = None
         step = increment = 0
         while ended or self._at < len(self._data):
@@ -124,11 +126,17 @@ class FrdFile:
         for _ in range(self._int(line[13:18])):
             # Calculated components (the length of a vector) are named but not stored.
             components -= self._line()[33:38].strip() == "1"
+        if components < 0:
+            raise self._wrong(f"{name} of {components} components")
         numbers, values = self._rows(count, components, flag)
         place = np.searchsorted(self.mesh.numbers, numbers)
         known = place < len(self.mesh.numbers)
         if not known.all() or (self.mesh.numbers[place] != numbers).any():
             raise self._wrong(f"{name} at a node that the mesh does not have")
+        # Results at few nodes are padded: so much is no result but a header that says it is.
+        self._held += 8 * len(self.mesh.numbers) * max(components, 1)
+        if self._held > max(ROOM, 100 * len(self._data)):
+            raise self._wrong(f"{name} of {components} components is more than the file can hold")
         whole = np.full((len(self.mesh.numbers), components), np.nan)
         whole[place] = values
         frame.fields[name] = whole

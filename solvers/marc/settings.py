@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
-from ...reading import LARGEST_WRITTEN, content_of
+from ...reading import is_file, toml_of
 from ...section_errors import first_error
 from ..licence_settings import ExternalSettings
 from ..offer import Offer
@@ -158,7 +157,7 @@ def site_settings(path: Path) -> dict[str, Any]:
     InputError : no such file, not TOML, a key that there is not.
     """
     try:
-        content = tomllib.loads(content_of(path, LARGEST_WRITTEN).decode("utf-8"))
+        content = toml_of(path)
     except OSError as error:
         raise InputError(path, VARIABLE, f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
@@ -178,9 +177,9 @@ def _check_files(settings: MarcSettings) -> None:
         if name not in BLOCKS:
             problem = f"there is no block {name!r}; there are {', '.join(BLOCKS)}"
             raise InputError(None, "solver.marc.include", problem)
-        if not Path(file).is_file():
+        if not is_file(Path(file)):
             raise InputError(Path(file), f"solver.marc.include.{name}", "there is no such file")
-    if settings.templates is not None and not Path(settings.templates).is_dir():
+    if settings.templates is not None and not os.path.isdir(settings.templates):
         raise InputError(Path(settings.templates), "templates", "there is no such folder")
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-_EXIT = re.compile(r"exit\s+number\s*:?\s*(\d+)", re.IGNORECASE)
+_EXIT = re.compile(r"exit\s++number\s*+:?\s*+(\d{1,9})(?!\d)", re.IGNORECASE)
 COLUMNS = 13
 
 
@@ -42,7 +42,10 @@ def increments(sts: Path) -> list[Increment]:
 
 
 def exit_number(*files: Path) -> int | None:
-    """The last exit number in the first of the files that has one; None: it never ended."""
+    """The last exit number in the first of the files that has one; None: it never ended.
+
+    Of nine digits at most: Marc's have four.
+    """
     for file in files:
         numbers = _EXIT.findall(_text(file))
         if numbers:
