@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..caching import compiled
-from .forms.base import map_in_range
 from .law import HypoelasticLaw
+from .law_slopes import law_slopes
 from .point_law import (
     BEFORE1,
     BEFORE2,
@@ -80,34 +80,26 @@ def biaxial_response(
         "thickness" (per mm).
     """
     asked = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
-    of_beta = map_in_range(law.form, law.strain_range.tolist())
-    rows = np.zeros((*of_beta.shape[:3], len(parameters)))
-    for j, name in enumerate(parameters):
-        if name.startswith("beta_"):
-            rows[..., j] = of_beta[..., int(name.removeprefix("beta_"))]
-        elif name == "thickness":
-            # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is.
-            rows[..., j] = of_beta @ law.beta / thickness
-    by_nu = np.array([float(name == "nu12") for name in parameters])
+    rows, by_coupling = law_slopes(law, parameters, thickness)
     strain, stress = np.full((2, len(asked), 2), np.nan)
     slope = np.full((len(asked), 2, len(parameters)), np.nan)
     stable = np.zeros(len(asked), dtype=bool)
     reached = _path(
-        law.pieces, law.nu12, law.area_power, thickness, asked, rows, by_nu, strain, stress, slope,
-        stable,
+        law.pieces, law.coupling, law.area_power, thickness, asked, rows, by_coupling, strain,
+        stress, slope, stable,
     )  # fmt: skip
     return BiaxialResponse(strain, stress, slope, int(reached), stable)
 
 
 @compiled()
 def _forces(  # type: ignore[no-untyped-def]
-    pieces, nu, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
+    pieces, coupling, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
 ):
     """Forces per width less the load into rest (2,), their derivatives by h into k (2, 2).
 
     False where a modulus is not positive.
     """
-    if not stress_update(pieces, nu, h, h_old, s_old, s, tangent, slopes):
+    if not stress_update(pieces, coupling, h, h_old, s_old, s, tangent, slopes):
         return False
     for i in range(2):
         arm = thickness * math.exp(power * (h[0] + h[1]) - h[i])
@@ -125,10 +117,10 @@ def _size(rest):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _path(  # type: ignore[no-untyped-def]
-    pieces, nu, power, thickness, loads, rows, by_nu, strain, stress, slope, stable
+    pieces, coupling, power, thickness, loads, rows, by_coupling, strain, stress, slope, stable
 ):
     """Load by load; how many have an equilibrium."""
-    count = len(by_nu)
+    nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
     h, h_old, trial, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     tangent, slopes = np.empty((3, 3)), np.empty(SLOPES)
     rest, k, step = np.empty(2), np.empty((2, 2)), np.empty(2)
@@ -140,7 +132,7 @@ def _path(  # type: ignore[no-untyped-def]
         largest = max(largest, max(abs(load[0]), abs(load[1])))
         h[:] = h_old
         good = _forces(
-            pieces, nu, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
+            pieces, coupling, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
         )
         for _ in range(ROUNDS):
             if not good or _size(rest) <= TOLERANCE * largest:
@@ -153,8 +145,8 @@ def _path(  # type: ignore[no-untyped-def]
             for _ in range(HALVINGS):
                 trial[0], trial[1] = h[0] + share * step[0], h[1] + share * step[1]
                 good = _forces(
-                    pieces, nu, power, thickness, load, h_old, s_old, trial, s, tangent, slopes,
-                    rest, k,
+                    pieces, coupling, power, thickness, load, h_old, s_old, trial, s, tangent,
+                    slopes, rest, k,
                 )  # fmt: skip
                 if good and (_size(rest) < before or before < 1e-9 * largest):
                     break

@@ -143,6 +143,11 @@ class HypoelasticLaw:
         size = np.maximum(np.abs(before), np.abs(after))
         return bool((np.abs(after - before) > JUMP * size).any())
 
+    @cached_property
+    def coupling(self) -> Array:
+        """(1,), read-only: what couples warp and fill, as the compiled law reads it: nu12."""
+        return _read_only([self.nu12])
+
     @property
     def area_power(self) -> float:
         """Power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
@@ -186,7 +191,7 @@ class HypoelasticLaw:
             np.ascontiguousarray(np.atleast_2d(a), dtype=float)
             for a in (strain_old, strain_new, stress_old)
         )
-        return _increments(self.pieces, self.nu12, old, new, stress)
+        return _increments(self.pieces, self.coupling, old, new, stress)
 
     def second_piola_kirchhoff(
         self,
@@ -211,24 +216,30 @@ class HypoelasticLaw:
         zero = np.zeros((len(f), 3))
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
-        return _pull_backs(self.pieces, self.nu12, self.area_power, right, old, stress)
+        return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
+
+
+def _read_only(numbers: ArrayLike) -> Array:
+    array = np.array(numbers, dtype=float)
+    array.flags.writeable = False
+    return array
 
 
 @compiled()
-def _increments(pieces, nu, old, new, stress_old):  # type: ignore[no-untyped-def]
+def _increments(pieces, coupling, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
     stress, tangent = np.empty((n, 3)), np.empty((n, 3, 3))
     slopes = np.empty(SLOPES)
     for i in range(n):
         if not stress_update(
-            pieces, nu, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
+            pieces, coupling, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
         ):
             stress[i], tangent[i] = np.nan, np.nan
     return stress, tangent
 
 
 @compiled()
-def _pull_backs(pieces, nu, power, right, old, stress_old):  # type: ignore[no-untyped-def]
+def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))
     strain, stress = np.empty((n, 3)), np.empty((n, 3))
@@ -239,7 +250,7 @@ def _pull_backs(pieces, nu, power, right, old, stress_old):  # type: ignore[no-u
         q = 0.5 * (right[i, 0, 0] - right[i, 1, 1])
         c = right[i, 0, 1]
         if not membrane_stress(
-            m, q, c, pieces, nu, power, old[i], stress_old[i], strain[i], stress[i],
+            m, q, c, pieces, coupling, power, old[i], stress_old[i], strain[i], stress[i],
             pk2[i], stiffness[i], p, law, slopes, pull, work,
         ):  # fmt: skip
             pk2[i], stiffness[i], strain[i], stress[i] = np.nan, np.nan, np.nan, np.nan

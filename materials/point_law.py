@@ -116,7 +116,7 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
 @compiled()
 def stress_update(
     pieces: Array,
-    nu: float,
+    coupling: Array,
     h: Array,
     h_old: Array,
     s_old: Array,
@@ -126,16 +126,17 @@ def stress_update(
 ) -> bool:
     """One increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
-    pieces (3, P, 5) MPa as in `point_moduli`; h, h_old (3,) strain, s_old (3,)
-    stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3) and slopes (SLOPES,);
-    BEFORE1.. are the derivatives of the moduli by h_old. False when a modulus, or
-    1 - nu12 nu21, is not positive.
+    pieces (3, P, 5) MPa as in `point_moduli`; coupling (1,) what couples warp and fill: nu12;
+    h, h_old (3,) strain, s_old (3,) stress at the start. Writes s_new (3,), tangent = d s_new/d h
+    (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old. False when
+    a modulus, or 1 - nu12 nu21, is not positive.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
     if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
         return False
+    nu = coupling[0]
     nu_nu = nu * nu * fill / warp
     den = 1.0 - nu_nu
     if not den > 1e-3:
@@ -216,7 +217,7 @@ def membrane_stress(
     q: float,
     c: float,
     pieces: Array,
-    nu: float,
+    coupling: Array,
     area_power: float,
     h_old: Array,
     s_old: Array,
@@ -238,7 +239,7 @@ def membrane_stress(
     """
     if not log_strain(m, q, c, h, p):
         return False
-    if not stress_update(pieces, nu, h, h_old, s_old, s_new, law_tangent, slopes):
+    if not stress_update(pieces, coupling, h, h_old, s_old, s_new, law_tangent, slopes):
         return False
     ratio = math.exp(area_power * (h[0] + h[1]))
     growth = (area_power, area_power, 0.0)

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @compiled()
 def relaxed_update(
-    pieces: Array, nu: float, share: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, share: float, h: Array, h_old: Array, s_old: Array,
     he: Array, s_new: Array, carried: Array, tangent: Array, slopes: Array, strain_slope: Array,
 ) -> int:  # fmt: skip
     """As `stress_update`, for a membrane that wrinkles.
@@ -46,14 +46,14 @@ def relaxed_update(
     for i in range(3):
         he[i] = h[i]
         strain_slope[i, i] = 1.0
-    if not stress_update(pieces, nu, h, h_old, s_old, s_new, tangent, slopes):
+    if not stress_update(pieces, coupling, h, h_old, s_old, s_new, tangent, slopes):
         return -1
     if least_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * tangent[0, 0]:
         carried[:] = s_new
         return 0
     t0, t1, t2 = s_new[0], s_new[1], s_new[2]
     state, away = 1, (0.0, 0.0)
-    if slack(pieces, nu, h_old, s_old, he, s_new, tangent, slopes):
+    if slack(pieces, coupling, h_old, s_old, he, s_new, tangent, slopes):
         w0, w1, w2 = he[0] - h[0], he[1] - h[1], 0.5 * (he[2] - h[2])
         if least_principal(w0, w1, w2) >= -ROUNDING:
             state = 2
@@ -65,9 +65,10 @@ def relaxed_update(
     if state == 1:
         s_new[0], s_new[1], s_new[2] = t0, t1, t2
         if not wrinkled(
-            pieces, nu, h, h_old, s_old, away, he, s_new, tangent, slopes, strain_slope
+            pieces, coupling, h, h_old, s_old, away, he, s_new, tangent, slopes, strain_slope
         ):  # fmt: skip
             return -1
+    nu = coupling[0]
     warp = increment_modulus(pieces, 0, 0.0, 0.0)[0]
     fill = increment_modulus(pieces, 1, 0.0, 0.0)[0]
     rest = np.zeros((3, 3))
@@ -89,7 +90,7 @@ def relaxed_update(
 
 @compiled()
 def relaxed_membrane_stress(
-    m: float, q: float, c: float, pieces: Array, nu: float, area_power: float,
+    m: float, q: float, c: float, pieces: Array, coupling: Array, area_power: float,
     share: float, h_old: Array, s_old: Array, h: Array, he: Array, s_new: Array, pk2: Array,
     stiffness: Array, p: Array, law_tangent: Array, slopes: Array, pull: Array, work: Array,
 ) -> int:  # fmt: skip
@@ -101,7 +102,7 @@ def relaxed_membrane_stress(
         return -1
     carried, slope = np.empty(3), np.empty((3, 3))
     state = relaxed_update(
-        pieces, nu, share, h, h_old, s_old, he, s_new, carried, law_tangent, slopes, slope
+        pieces, coupling, share, h, h_old, s_old, he, s_new, carried, law_tangent, slopes, slope
     )
     if state < 0:
         return -1

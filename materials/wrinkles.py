@@ -42,7 +42,7 @@ def _normal(angle: float, n: Array, m: Array) -> None:
 
 @compiled()
 def _across(
-    pieces: Array, nu: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     n: Array, size: float, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> float:  # fmt: skip
     """Size of a wrinkle strain along n that leaves no stress across it; NaN if not found."""
@@ -50,7 +50,7 @@ def _across(
     for _ in range(ITERATIONS):
         for i in range(3):
             he[i] = h[i] + size * n[i]
-        if not stress_update(pieces, nu, he, h_old, s_old, s, tangent, slopes):
+        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
             return math.nan
         across, slope = 0.0, 0.0
         for i in range(3):
@@ -73,7 +73,7 @@ def _along(s: Array, m: Array) -> float:
 
 @compiled()
 def _start(
-    pieces: Array, nu: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     n: Array, m: Array, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Angle and size between the two tried normals where the shear along changes its sign."""
@@ -82,7 +82,7 @@ def _start(
         angle = k * math.pi / NORMALS
         _normal(angle, n, m)
         size = _across(
-            pieces, nu, h, h_old, s_old, n, 0.0, he, s, tangent, slopes
+            pieces, coupling, h, h_old, s_old, n, 0.0, he, s, tangent, slopes
         )  # fmt: skip
         if math.isnan(size) or size <= 0.0 or s[0] + s[1] < 0.0:
             before = math.nan
@@ -98,7 +98,7 @@ def _start(
 
 @compiled()
 def _wrinkle(
-    pieces: Array, nu: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     angle: float, size: float, n: Array, m: Array,
     he: Array, s: Array, tangent: Array, slopes: Array, inverse: Array,
 ) -> tuple[float, float]:  # fmt: skip
@@ -108,7 +108,7 @@ def _wrinkle(
         _normal(angle, n, m)
         for i in range(3):
             he[i] = h[i] + size * n[i]
-        if not stress_update(pieces, nu, he, h_old, s_old, s, tangent, slopes):
+        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
             return math.nan, math.nan
         across = n[0] * s[0] + n[1] * s[1] + n[2] * s[2]
         shear = _along(s, m)
@@ -137,14 +137,14 @@ def _wrinkle(
 
 @compiled()
 def slack(
-    pieces: Array, nu: float, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, h_old: Array, s_old: Array,
     he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> bool:  # fmt: skip
     """Strain of the fabric without any stress, into he."""
     for i in range(3):
         he[i] = h_old[i]
     for _ in range(ITERATIONS):
-        if not stress_update(pieces, nu, he, h_old, s_old, s, tangent, slopes):
+        if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
             return False
         det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
         if not (det > 0.0 and tangent[2, 2] > 0.0):
@@ -163,7 +163,7 @@ def slack(
 
 @compiled()
 def wrinkled(
-    pieces: Array, nu: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
     strain_slope: Array,
 ) -> bool:  # fmt: skip
@@ -175,24 +175,24 @@ def wrinkled(
     # First the normal of the smaller principal stress that the taut fabric would have.
     angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))
     _normal(angle, n, m)
-    size = _across(pieces, nu, h, h_old, s_old, n, 0.0, he, s_new, tangent, slopes)
+    size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s_new, tangent, slopes)
     if not math.isnan(size):
         angle, size = _wrinkle(
-            pieces, nu, h, h_old, s_old, angle, size, n, m,
+            pieces, coupling, h, h_old, s_old, angle, size, n, m,
             he, s_new, tangent, slopes, inverse,
         )  # fmt: skip
     if math.isnan(size):
         # Hardly taut along the wrinkle: the normal is nearly that of the slack state.
         s_new[:] = 0.0
         angle, size = _wrinkle(
-            pieces, nu, h, h_old, s_old, away[0], away[1], n, m,
+            pieces, coupling, h, h_old, s_old, away[0], away[1], n, m,
             he, s_new, tangent, slopes, inverse,
         )  # fmt: skip
     if math.isnan(size):
-        angle, size = _start(pieces, nu, h, h_old, s_old, n, m, he, s_new, tangent, slopes)
+        angle, size = _start(pieces, coupling, h, h_old, s_old, n, m, he, s_new, tangent, slopes)
         if not math.isnan(size):
             angle, size = _wrinkle(
-                pieces, nu, h, h_old, s_old, angle, size, n, m,
+                pieces, coupling, h, h_old, s_old, angle, size, n, m,
                 he, s_new, tangent, slopes, inverse,
             )  # fmt: skip
     if math.isnan(size):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...materials.forms.base import map_in_range
+from ...materials.law_slopes import law_slopes
 from .element_slopes import element_slopes
 from .newton import Membrane
 from .sensitivity import POINT, advance, explicit
@@ -39,16 +39,7 @@ class Derivatives:
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
-        of_beta = map_in_range(law.form, law.strain_range.tolist())
-        self.rows = np.zeros((*of_beta.shape[:3], len(names)))
-        for j, name in enumerate(names):
-            if name.startswith("beta_"):
-                self.rows[..., j] = of_beta[..., int(name.removeprefix("beta_"))]
-            elif name == "thickness":
-                # A membrane knows moduli times thickness only: a thicker sheet moves as a stiffer
-                # one does (its stress is another, but nothing here is told of stress).
-                self.rows[..., j] = of_beta @ law.beta / float(np.mean(membrane.thickness))
-        self.by_nu = np.array([float(name == "nu12") for name in names])
+        self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
         self.strain, self.stress, self.fresh = np.zeros(shape), np.zeros(shape), np.empty(shape)
         self.point = np.empty((len(membrane.quads), 4, POINT))
@@ -61,9 +52,9 @@ class Derivatives:
         """Explicit derivative of the residual at the equilibrium u, (3 n, np)."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         explicit(
-            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.pieces, law.nu12,
-            law.area_power, m.strain_old, m.stress_old, self.rows, self.by_nu, self.push,
-            self.strain, self.stress, self.fresh, self.point, self.rate,
+            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.pieces,
+            law.coupling, law.area_power, m.strain_old, m.stress_old, self.rows, self.by_coupling,
+            self.push, self.strain, self.stress, self.fresh, self.point, self.rate,
         )  # fmt: skip
         if self.sheet is not None:
             self.rate[:, self.sheet.columns] += self.sheet.at_fixed_displacement(u, pressure)
@@ -113,7 +104,7 @@ class Sheet:
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         by_sheet(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure, law.pieces,
-            law.nu12, law.area_power, m.strain_old, m.stress_old, self.surface, self.slopes,
+            law.coupling, law.area_power, m.strain_old, m.stress_old, self.surface, self.slopes,
             self.area, self.green, self.rate,
         )  # fmt: skip
         return self.rate

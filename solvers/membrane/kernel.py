@@ -42,7 +42,7 @@ def metric(f):  # type: ignore[no-untyped-def]
 @compiled(fastmath=FAST)
 def assemble(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure,
-    pieces, nu, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
+    pieces, coupling, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
     share, wrinkle,
 ):  # fmt: skip
     """Internal minus pressure forces at `position`, and the tangent.
@@ -84,14 +84,14 @@ def assemble(  # type: ignore[no-untyped-def]
             m, q, c = metric(f)
             if share >= 0.0:
                 if relaxed_membrane_stress(
-                    m, q, c, pieces, nu, power, share, h_old[e, g], s_old[e, g], total,
+                    m, q, c, pieces, coupling, power, share, h_old[e, g], s_old[e, g], total,
                     h_new[e, g], s_new[e, g], pk2, stiff, p, law, steep, pull, work,
                 ) < 0:  # fmt: skip
                     return -1.0
                 for k in range(3):
                     wrinkle[e, g, k] = h_new[e, g, k] - total[k]
             elif not membrane_stress(
-                m, q, c, pieces, nu, power, h_old[e, g], s_old[e, g], h_new[e, g],
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h_new[e, g],
                 s_new[e, g], pk2, stiff, p, law, steep, pull, work,
             ):  # fmt: skip
                 return -1.0

@@ -76,7 +76,7 @@ class Membrane:
         law, e = self.law, self.elements
         force = assemble(
             self.reference + u, self.quads, e.values, e.slopes, e.area, self.section, pressure,
-            law.pieces, law.nu12, law.area_power, self.strain_old,
+            law.pieces, law.coupling, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
             -1.0 if self.wrinkle_stiffness is None else self.wrinkle_stiffness, self.wrinkle,

@@ -37,17 +37,18 @@ POINT = 24
 
 @compiled(fastmath=FAST)
 def explicit(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, pieces, nu, power,
-    h_old, s_old, rows, by_nu, push, dh_old, ds_old, ds_new, point, rate,
+    position, quads, values, slopes, area, thickness, pieces, coupling, power,
+    h_old, s_old, rows, by_coupling, push, dh_old, ds_old, ds_new, point, rate,
 ):  # fmt: skip
     """Derivative of the residual at fixed displacement.
 
-    rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_nu (np,) that
-    of Poisson's ratio, push the number of the parameter that is a pressure, or -1; dh_old, ds_old
-    (elements, 4, 3, np) derivatives at the start of the increment; writes ds_new (same shape; the
-    part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
+    rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_coupling
+    (1, np) those of what couples warp and fill, push the number of the parameter that is a
+    pressure, or -1; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of the increment;
+    writes ds_new (same shape; the part at fixed displacement), point (elements, 4, POINT) and
+    rate (3 n, np).
     """
-    count = len(by_nu)
+    nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
     h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
     weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
@@ -67,7 +68,7 @@ def explicit(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, pieces, nu, power, h_old[e, g], s_old[e, g], h, s_new,
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
                 pk2, stiff, p, law, steep, pull, work,
             )  # fmt: skip
             for i in range(3):

@@ -16,8 +16,8 @@ from .kernel import base_vectors, metric
 
 @compiled(fastmath=FAST)
 def by_sheet(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, pressure, pieces, nu, power, h_old, s_old,
-    surface, slopes_by, area_by, green, rate,
+    position, quads, values, slopes, area, thickness, pressure, pieces, coupling, power, h_old,
+    s_old, surface, slopes_by, area_by, green, rate,
 ):  # fmt: skip
     """Derivative of the residual at fixed displacement and fixed strain before the increment.
 
@@ -44,7 +44,7 @@ def by_sheet(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, pieces, nu, power, h_old[e, g], s_old[e, g], h, s_new,
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
                 pk2, stiff, p, law, steep, pull, work,
             )  # fmt: skip
             normal[0] = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]

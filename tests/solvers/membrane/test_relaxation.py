@@ -22,7 +22,7 @@ def update(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
     he, s, carried = (np.empty(3) for _ in range(3))
     tangent, slope, unused = np.empty((3, 3)), np.empty((3, 3)), np.empty(SLOPES)
     state = relaxed_update(
-        law.pieces, law.nu12, share, np.array(h, float), np.array(h_old, float),
+        law.pieces, law.coupling, share, np.array(h, float), np.array(h_old, float),
         np.array(s_old, float), he, s, carried, tangent, unused, slope,
     )  # fmt: skip
     return state, he, s, carried, tangent, slope
