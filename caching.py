@@ -17,6 +17,7 @@ ROOT = Path(__file__).parent
 #: while numba's own cache looks only at the file a function stands in.
 KERNELS = (
     "materials/point_moduli.py",
+    "materials/point_ratio.py",
     "materials/point_law.py",
     "materials/wrinkles.py",
     "materials/relaxation.py",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import History, Solver
+from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import usable_solver
 from .logged import timed
 from .project import Project
@@ -57,6 +57,7 @@ class Analyses:
         ------
         SolverFailure : it does not end well.
         """
+        check_carries(self.solver, law)
         self.count += 1
         with timed(f"analysis {self.count}, {part}, by {self.solver.name}"):
             return self._run(part, model, law, increments)

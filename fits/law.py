@@ -12,7 +12,7 @@ from ..experiments.base import Reach
 from ..experiments.notes import STRAINS
 from ..identification.unknowns import LawBounds
 from ..materials.forms.base import Form
-from ..materials.forms.registry import form_named, form_settings
+from ..materials.forms.registry import form_named, form_settings, of_strain
 from ..materials.law import HypoelasticLaw
 from .project import Project
 from .schema import BoundsSection
@@ -74,7 +74,7 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
         known = [e for reach in reaches if (e := reach.strain[i]) is not None]
         if known:
             ends.append(max(known))
-        elif project.law.form == "constant":
+        elif not of_strain(project.law.form):
             ends.append(UNBOUNDED_RANGE)
         else:
             problem = (

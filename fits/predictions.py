@@ -18,7 +18,7 @@ from ..experiments.registry import kind_named
 from ..experiments.spread import laws_around
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import BandedSolver, BandEnd, Solver
+from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from .cards import Cards, card_sources, chosen_cards
 from .facts import solver_facts
@@ -167,6 +167,7 @@ def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -
 
 def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
     """One test with one card; a run that does not end well is a record of its failure."""
+    check_carries(solver, card.law)
     begun = time.perf_counter()
     try:
         outcome: Any = solver.run(model, card.law)
@@ -177,7 +178,7 @@ def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) ->
 
 def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
     """A mark of everything that a run's result depends on, by content."""
-    material = (law.pieces, law.nu12, law.thickness_change)
+    material = (law.pieces, law.coupling, law.thickness_change)
     return digest_of(kind.depends_on(model), material, solver.identity)
 
 

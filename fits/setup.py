@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..content import digest_of
+from ..errors import InputError
 from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
 from ..identification.comparison import Comparison
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem
 from ..identification.unknowns import LawBounds, Unknowns
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import DifferentiatingSolver, Solver
+from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from .law import bounds_of, law_of
 from .project import Project
@@ -107,9 +108,13 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
     fit = project.fit
     options = project.options_of(fit.solver)
     # Once here, in one line, rather than as the failure of every analysis.
-    usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
+    solver = usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
     shared_unknowns(project)  # says now what is wrong with them
     law = law_of(project, [test.reach for test in tests])
+    try:
+        check_carries(solver, law)
+    except InputError as error:
+        raise InputError(project.path, "law.form", error.problem) from None
     bounds = bounds_of(project, law.form)
     make = functools.partial(make_solver, project)
     return FitSetup(project, law, bounds, tuple(test.prepare(law, make) for test in tests))

@@ -14,7 +14,7 @@ from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
 from ..notes import Note, NoteKind, rows, write_notes
 from ..notes import lines as note_lines
-from ..solvers.base import History
+from ..solvers.base import History, check_carries
 from ..solvers.registry import usable_solver
 from ..solvers.run_cache import run_cache
 from ..writing import write_text
@@ -37,6 +37,7 @@ def simulate(
     SolverFailure : an analysis does not end well.
     """
     runs = usable_solver(solver, options, cache=run_cache())
+    check_carries(runs, card.law)
     models = test.models(card.thickness)
     return {part: runs.run(model, card.law) for part, model in models.items()}
 

@@ -24,6 +24,8 @@ from .law_slopes import law_slopes
 from .point_law import (
     BEFORE1,
     BEFORE2,
+    BY1,
+    BY2,
     D11,
     D11_E1,
     D11_E2,
@@ -33,7 +35,11 @@ from .point_law import (
     D22_E1,
     D22_E2,
     D22_NU,
+    RATIO1,
+    RATIO2,
     SLOPES,
+    TURN1,
+    TURN2,
     stress_update,
 )
 from .point_moduli import by_pieces
@@ -173,13 +179,16 @@ def _path(  # type: ignore[no-untyped-def]
             arm1 = thickness * math.exp(power * (h[0] + h[1]) - h[1])
             for j in range(count):
                 o0, o1 = dh[0, j], dh[1, j]
-                warp = own[0, j] + o0 * slopes[BEFORE1]
-                fill = own[1, j] + o1 * slopes[BEFORE2]
+                warp = own[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
+                fill = own[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
                 d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu[j] * slopes[D11_NU]
                 d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu[j] * slopes[D22_NU]
                 d12 = nu * d22 + by_nu[j] * slopes[D22]
                 a0 = ds[0, j] + d11 * w + d12 * f - slopes[D11] * o0 - slopes[D12] * o1
                 a1 = ds[1, j] + d12 * w + d22 * f - slopes[D12] * o0 - slopes[D22] * o1
+                turn = slopes[BY1] * (a0 + ds[0, j]) + slopes[BY2] * (a1 + ds[1, j])
+                a0 += turn * slopes[TURN1]
+                a1 += turn * slopes[TURN2]
                 r0, r1 = arm0 * a0, arm1 * a1
                 dh[0, j] = (k[0, 1] * r1 - k[1, 1] * r0) / det
                 dh[1, j] = (k[1, 0] * r0 - k[0, 0] * r1) / det

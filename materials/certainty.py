@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .forms.base import COMPONENTS, UNLIMITED
+from .forms.base import COMPONENTS, UNLIMITED, ratios_of
 from .law import HypoelasticLaw
 
 Array = NDArray[np.float64]
@@ -87,9 +87,10 @@ def certainty_of(law: HypoelasticLaw, coefficients: Array, words: str = "") -> C
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
     relative = np.vstack(
         [
-            law.modulus_rows(name, strain)[:, list(law.form.free)]
-            / law.modulus(name, strain)[:, None]
+            law.modulus_rows(name, strain, ratio)[:, list(law.form.free)]
+            / law.modulus(name, strain, ratio)[:, None]
             for name, strain in strains_of(law).items()
+            for ratio in ratios_of(law.form, name)
         ]
     )
     _, sizes, turned = np.linalg.svd(relative @ spread.T, full_matrices=False)
@@ -107,8 +108,12 @@ def strains_of(law: HypoelasticLaw) -> dict[str, Array]:
 
 
 def positive(law: HypoelasticLaw) -> bool:
-    """Whether every modulus is above zero as far as the law is known."""
-    return all((law.modulus(name, strain) > 0).all() for name, strain in strains_of(law).items())
+    """Whether every modulus is above zero as far as the law is known, at every load ratio."""
+    return all(
+        (law.modulus(name, strain, ratio) > 0).all()
+        for name, strain in strains_of(law).items()
+        for ratio in ratios_of(law.form, name)
+    )
 
 
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:

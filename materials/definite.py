@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .forms.base import Form, moduli_on_grid
+from .forms.base import EVEN, RATIO_ENDS, Form, modulus_rows
 
 Array = NDArray[np.float64]
 
@@ -20,9 +20,20 @@ def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Arr
 
     That is E1 E2 > (nu12 E2)^2. A fabric that is pulled contracts, so that the modulus across is
     that at zero strain, and the condition is linear: E1(0) > nu12^2 E2(eps2) in a pull along the
-    fill, E1(eps1) > nu12^2 E2(0) along the warp.
+    fill, E1(eps1) > nu12^2 E2(0) along the warp. Moduli that go with the load ratio are those of
+    the pull, and those of equal loads without strain, where every path begins.
     """
-    grid = moduli_on_grid(form, strain_range)
-    e1, e2 = grid["E1"], grid["E2"]
     share = DEFINITE * nu12**2
-    return np.vstack([e1[0] - share * e2, e1 - share * e2[0]])
+    none, most = RATIO_ENDS
+
+    def rows(name: str, strain: ArrayLike, ratio: float) -> Array:
+        return modulus_rows(form, name, strain, strain_range, ratio)
+
+    warp, fill = (form.grid(k, strain_range[k]) for k in range(2))
+    return np.vstack(
+        [
+            rows("E1", [0.0], none) - share * rows("E2", fill, most),
+            rows("E1", warp, most) - share * rows("E2", [0.0], none),
+            rows("E1", [0.0], EVEN) - share * rows("E2", [0.0], EVEN),
+        ]
+    )

@@ -22,7 +22,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..caching import compiled
 from ..errors import InputError
-from .forms.base import COMPONENTS, UNLIMITED, Form, held_strain, modulus_rows, pieces_of
+from .forms.base import (
+    COMPONENTS,
+    EVEN,
+    SHEAR,
+    UNLIMITED,
+    Form,
+    held_strain,
+    modulus_rows,
+    pieces_of,
+    ratio_map,
+)
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.trilinear import TriLinear
 from .point_law import SLOPES, membrane_stress, stress_update
@@ -145,8 +155,11 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Array:
-        """(1,), read-only: what couples warp and fill, as the compiled law reads it: nu12."""
-        return _read_only([self.nu12])
+        """(3,), read-only: what couples warp and fill, as the compiled law reads it.
+
+        nu12, and what E1 and E2 gain (MPa) by their normalised load ratios.
+        """
+        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta])
 
     @property
     def area_power(self) -> float:
@@ -157,16 +170,26 @@ class HypoelasticLaw:
         """The same law with other coefficients (MPa)."""
         return replace(self, beta=np.asarray(beta, dtype=float))
 
-    def modulus(self, name: str, strain: ArrayLike) -> Array:
-        """Tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape."""
+    def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
+        """Tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape.
+
+        ratio : the normalised load ratio of the modulus' own yarn; equal loads unless given.
+        """
         pieces = self.pieces[COMPONENTS[name]]
         held = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
         c = pieces[np.searchsorted(pieces[:-1, 0], held), 1:]
-        return np.asarray(((c[..., 0] * held + c[..., 1]) * held + c[..., 2]) * held + c[..., 3])
+        own = ((c[..., 0] * held + c[..., 1]) * held + c[..., 2]) * held + c[..., 3]
+        gain = 0.0 if name == SHEAR else float(self.coupling[1 + COMPONENTS[name]])
+        return np.asarray(own + (ratio - EVEN) * gain)
 
-    def modulus_rows(self, name: str, strain: ArrayLike) -> Array:
-        """(n, size): d modulus / d beta at strains (n,), held ones included."""
-        return modulus_rows(self.form, name, strain, self.strain_range.tolist())
+    def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
+        """(n, size): d modulus / d beta at strains (n,), held ones included; as `modulus`."""
+        return modulus_rows(self.form, name, strain, self.strain_range.tolist(), ratio)
+
+    @property
+    def of_load_ratio(self) -> bool:
+        """Whether the form lets E1 or E2 depend on the ratio of the loads along warp and fill."""
+        return bool(ratio_map(self.form).any())
 
     def E1(self, strain: ArrayLike) -> Array:
         """Warp tangent modulus (MPa) of eps1."""

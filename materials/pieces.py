@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .forms.base import COMPONENTS
 from .law import HypoelasticLaw
 
@@ -16,7 +17,17 @@ def curve_pieces(law: HypoelasticLaw, name: str) -> Array:
 
     A row is the upper end of a piece and its four coefficients, highest power of the strain
     first; below zero strain and beyond the last end the modulus is held.
+
+    Raises
+    ------
+    InputError : moduli that pieces of strain do not tell, because they depend on the load ratio.
     """
+    if law.of_load_ratio:
+        problem = (
+            f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
+            "the loads, and here they are moduli of strain"
+        )
+        raise InputError(None, "form", problem)
     rows = law.pieces[COMPONENTS[name]]
     # What repeats the last piece ends where it does.
     return np.asarray(rows[: 1 + int((np.diff(rows[:, 0]) > 0).sum())])

@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 
 from ..caching import compiled
 from .point_moduli import increment_modulus
+from .point_ratio import mean_ratio
 
 Array = NDArray[np.float64]
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities.
-SLOPES = 13
-(D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU) = (
-    range(SLOPES)
-)
+SLOPES = 19
+(
+    D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU,
+    RATIO1, RATIO2, TURN1, TURN2, BY1, BY2,
+) = range(SLOPES)  # fmt: skip
 # NaN must stay visible (a failed iterate is recognised by it), so no "nnan"/"ninf".
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
@@ -126,14 +128,25 @@ def stress_update(
 ) -> bool:
     """One increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
-    pieces (3, P, 5) MPa as in `point_moduli`; coupling (1,) what couples warp and fill: nu12;
-    h, h_old (3,) strain, s_old (3,) stress at the start. Writes s_new (3,), tangent = d s_new/d h
-    (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old. False when
-    a modulus, or 1 - nu12 nu21, is not positive.
+    pieces (3, P, 5) MPa as in `point_moduli`; coupling (3,) what couples warp and fill: nu12,
+    and what E1 and E2 gain (MPa) by their normalised load ratios (`point_ratio`); h, h_old (3,)
+    strain, s_old (3,) stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3) and
+    slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old, RATIO.. the load ratios
+    less those at 1:1, TURN.. and BY.. u and w of `mean_ratio`. False when a modulus, or
+    1 - nu12 nu21, is not positive.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
+    slopes[RATIO1:] = 0.0
+    if coupling[1] != 0.0 or coupling[2] != 0.0:
+        (
+            slopes[RATIO1], slopes[RATIO2], slopes[TURN1], slopes[TURN2], slopes[BY1], slopes[BY2],
+        ) = mean_ratio(
+            warp, fill, coupling, s_old[0], s_old[1], h[0] - h_old[0], h[1] - h_old[1]
+        )  # fmt: skip
+        warp += coupling[1] * slopes[RATIO1]
+        fill += coupling[2] * slopes[RATIO2]
     if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
         return False
     nu = coupling[0]
@@ -159,6 +172,11 @@ def stress_update(
     tangent[1, 0] = d12 + warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
     tangent[1, 1] = d22 + fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
     tangent[2, 2] = shear + shear_slope * dh2
+    if coupling[1] != 0.0 or coupling[2] != 0.0:
+        for j in range(2):
+            more = slopes[BY1] * tangent[0, j] + slopes[BY2] * tangent[1, j]
+            tangent[0, j] += slopes[TURN1] * more
+            tangent[1, j] += slopes[TURN2] * more
     tangent[0, 2] = tangent[1, 2] = tangent[2, 0] = tangent[2, 1] = 0.0
     slopes[D11], slopes[D12], slopes[D22], slopes[G12] = d11, d12, d22, shear
     slopes[D11_E1], slopes[D11_E2] = d11_e1, d11_e2

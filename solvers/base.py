@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 
@@ -199,6 +200,29 @@ class BandedSolver(Solver, Protocol):
     def band(self, model: Any) -> Sequence[BandEnd]:
         """Its ends, first what is predicted; none where the model has one answer."""
         ...
+
+
+def carries_load_ratios(solver: Solver) -> bool:
+    """Whether a solver takes laws whose moduli depend on the ratio of the loads.
+
+    It says so by an attribute `load_ratios` that is true.
+    """
+    return bool(getattr(solver, "load_ratios", False))
+
+
+def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
+    """Refuse a law whose moduli depend on the load ratio where the solver knows strain alone.
+
+    Raises
+    ------
+    InputError : it does.
+    """
+    if law.of_load_ratio and not carries_load_ratios(solver):
+        problem = (
+            f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
+            f"the loads, and {solver.name} takes moduli of strain"
+        )
+        raise InputError(None, "form", problem)
 
 
 @runtime_checkable

@@ -19,6 +19,7 @@ from .base import (
     ProgramSolver,
     Solver,
     SolverCheck,
+    carries_load_ratios,
 )
 from .identity import code_mark, program_mark
 from .run_cache import RunCache
@@ -71,6 +72,11 @@ class Once:
     def identity(self) -> str:
         """Of the solver."""
         return str(self.solver.identity)
+
+    @property
+    def load_ratios(self) -> bool:
+        """Of the solver."""
+        return carries_load_ratios(self.solver)
 
     def check(self) -> SolverCheck:
         """Of the solver."""

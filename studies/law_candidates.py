@@ -7,14 +7,18 @@ from typing import Any
 
 from ..errors import InputError
 from ..fits.project import Project
-from ..materials.forms.registry import form_names, form_settings
+from ..fits.setup import make_solver
+from ..materials.forms.registry import form_names, form_settings, of_load_ratio
+from ..solvers.base import carries_load_ratios
 
 #: Of a spline, where neither the project nor the caller says how many.
 KNOTS = 6
 
 
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
-    """The project with each of the forms asked for, by name; with all forms unless any is.
+    """The project with each of the forms asked for, by name; with all unless any is.
+
+    All are those that the project's solver carries.
 
     names : of forms; "spline:8" is a spline of eight knots for each modulus.
 
@@ -28,7 +32,7 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
         raise InputError(project.path, "law.bounds", problem)
     own = project.law.model_extra or {}
     chosen: dict[str, Project] = {}
-    for asked in names or form_names():
+    for asked in names or _carried(project):
         form, _, knots = asked.partition(":")
         settings: dict[str, Any] = {}
         if form not in form_names():
@@ -43,6 +47,11 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
             asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
         chosen[asked] = project.with_law(form, settings)
     return chosen
+
+
+def _carried(project: Project) -> list[str]:
+    carries = carries_load_ratios(make_solver(project))
+    return [name for name in form_names() if carries or not of_load_ratio(name)]
 
 
 def plain(name: str) -> str:

@@ -13,7 +13,7 @@ from ...errors import InputError, one_line
 from ...notes import Note, NoteKind
 from ..card import MaterialCard
 from ..certainty import LEVEL, strains_of
-from ..forms.base import COMPONENTS, UNLIMITED
+from ..forms.base import COMPONENTS, UNLIMITED, ratios_of
 
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
@@ -73,11 +73,13 @@ def check_positive(card: MaterialCard) -> None:
     for name, component in COMPONENTS.items():
         end = law.strain_range[component]
         strain = np.linspace(0.0, end if end < UNLIMITED else 0.0, CHECKED)
-        values = law.modulus(name, strain)
-        if not (values > 0).all():
-            worst = int(np.argmin(values))
-            problem = f"{name} is {values[worst]:.4g} MPa at log strain {strain[worst]:.4g}"
-            raise InputError(None, "beta", f"{problem}, where the card is to hold; expected > 0")
+        for ratio in ratios_of(law.form, name):
+            values = law.modulus(name, strain, ratio)
+            if not (values > 0).all():
+                worst = int(np.argmin(values))
+                problem = f"{name} is {values[worst]:.4g} MPa at log strain {strain[worst]:.4g}"
+                words = f"{problem}, where the card is to hold; expected > 0"
+                raise InputError(None, "beta", words)
     if not law.nu12**2 * float(law.E2(0.0) / law.E1(0.0)) < 1:
         problem = f"nu12 nu21 is not below 1 at zero strain, for nu12 = {law.nu12:g}"
         raise InputError(None, "nu12", f"{problem} and E2/E1 of the card")

@@ -37,4 +37,4 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
     return Export({".csv": "\n".join([head, meaning, COLUMNS, *rows]) + "\n"}, linear.says)
 
 
-FORMAT = Format("constants", constants, ConstantsOptions)
+FORMAT = Format("constants", constants, ConstantsOptions, load_ratios=True)

@@ -62,4 +62,7 @@ def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
     return _sheet(card, "Orthotropic membrane of Dlubal RFEM", says, rows)
 
 
-FORMATS = (Format("gsa", gsa, ConstantsOptions), Format("rfem", rfem, ConstantsOptions))
+FORMATS = (
+    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
+    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
+)

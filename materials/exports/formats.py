@@ -68,12 +68,14 @@ class Format:
     """One way to write a card for another program.
 
     name : what the command calls it. write : from card and options to the files. options : the
-    frozen dataclass of these options, each field with metadata made by `option`.
+    frozen dataclass of these options, each field with metadata made by `option`. load_ratios :
+    whether it takes laws whose moduli depend on the ratio of the loads along warp and fill.
     """
 
     name: str
     write: Callable[[MaterialCard, Any], Export]
     options: type = NoOptions
+    load_ratios: bool = False
 
     def export(self, card: MaterialCard, **given: Any) -> Export:
         """The files of a card, with the options that are given, and of its band where it has one.
@@ -84,6 +86,12 @@ class Format:
             them one without stiffness where it is to hold.
         """
         self.check(given)
+        if card.law.of_load_ratio and not self.load_ratios:
+            problem = (
+                f"the format {self.name} has moduli of strain, and those of a {card.law.form.name} "
+                "law depend on the ratio of the loads: export its constants, gsa or rfem"
+            )
+            raise InputError(None, "form", problem)
         check_positive(card)
         export = self.write(card, self.options(**given))
         if card.certainty is None:

@@ -3,6 +3,9 @@
 A form says how the numbers beta of a law make the three tangent moduli. Whatever the form, a
 modulus is a PIECEWISE CUBIC of its own logarithmic strain, and its coefficients are linear in
 beta: the compiled law, the material libraries, the exports and the fit know no more than that.
+A form may also have `by_load_ratio`: its E1 and E2 are those cubics at equal loads along warp and
+fill, and gain more or less, linear in beta, by the normalised load ratio of their own yarn
+(`ratio_map`).
 
 A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which
 depends on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond
@@ -11,6 +14,7 @@ the strain range, and below zero strain, a modulus is held.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Protocol, runtime_checkable
@@ -28,6 +32,9 @@ ORDER = ("G12", "E2", "E1")
 SHEAR = "G12"
 #: Names of the strain components in files: of eps1, eps2, gamma12.
 STRAIN_NAMES = ("warp", "fill", "shear")
+#: The normalised load ratio n / sqrt(n_warp^2 + n_fill^2) of either yarn where both carry the
+#: same, and its ends, where one of them carries all.
+EVEN, RATIO_ENDS = math.sqrt(0.5), (0.0, 1.0)
 #: A strain that is never reached.
 UNLIMITED = 1e9
 #: Strains at which a modulus of one piece is asked whether it is positive. Between two of them a
@@ -100,6 +107,25 @@ class Form(Protocol):
     def __hash__(self) -> int: ...
 
 
+def ratio_map(form: Form) -> Array:
+    """(2, size): d (what E1 and E2 gain by their normalised load ratio, from 0 to 1) / d beta.
+
+    Zero of a form that has no `by_load_ratio`, which is this.
+    """
+    own = getattr(form, "by_load_ratio", None)
+    return np.zeros((2, form.size)) if own is None else np.asarray(own(), dtype=float)
+
+
+def ratios_of(form: Form, name: str) -> tuple[float, ...]:
+    """Normalised load ratios at which "E1", "E2" or "G12" is asked whether it is positive.
+
+    Equal loads first; the ends where the modulus depends on them: it is linear in between.
+    """
+    component = COMPONENTS[name]
+    depends = name != SHEAR and ratio_map(form)[component].any()
+    return (EVEN, *RATIO_ENDS) if depends else (EVEN,)
+
+
 @lru_cache(maxsize=64)
 def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
     """Upper ends (3, P) and map (3, P, 4, size) without what begins at or beyond the range."""
@@ -141,21 +167,36 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
     return np.clip(np.abs(x) if component == 2 else x, 0.0, end)
 
 
-def modulus_rows(form: Form, name: str, strain: ArrayLike, strain_range: Sequence[float]) -> Array:
-    """(n, size): d modulus / d beta at strains (n,) of "E1", "E2" or "G12", held ones included."""
+def modulus_rows(
+    form: Form,
+    name: str,
+    strain: ArrayLike,
+    strain_range: Sequence[float],
+    ratio: float = EVEN,
+) -> Array:
+    """(n, size): d modulus / d beta at strains (n,) of "E1", "E2" or "G12", held ones included.
+
+    ratio : the normalised load ratio of the modulus' own yarn.
+    """
     component = COMPONENTS[name]
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     held = held_strain(component, strain, uppers[component, -1])
     place = np.searchsorted(uppers[component, :-1], held)
     powers = np.vander(held, 4)
-    return np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
+    own = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
+    return own if name == SHEAR else own + (ratio - EVEN) * ratio_map(form)[component]
 
 
 def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Rows (n, size) for G12, E2, E1 on the form's own grids; rows @ beta are moduli."""
-    return {
-        name: modulus_rows(
-            form, name, form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]]), strain_range
+    """Rows (n, size) for G12, E2, E1 on the form's own grids; rows @ beta are moduli.
+
+    At equal loads first, from zero strain on; then at the other load ratios of `ratios_of`.
+    """
+    found = {}
+    for name in ORDER:
+        strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
+        several = ratios_of(form, name)
+        found[name] = np.vstack(
+            [modulus_rows(form, name, strain, strain_range, ratio) for ratio in several]
         )
-        for name in ORDER
-    }
+    return found

@@ -86,4 +86,4 @@ def polynomial_named(
 
 
 for _name in DEGREES:
-    register_form(Offer(_name, polynomial_named))
+    register_form(Offer(_name, polynomial_named, of_strain=_name != DEGREES[0]))

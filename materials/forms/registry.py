@@ -23,11 +23,17 @@ Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
 
 @dataclass(frozen=True)
 class Offer:
-    """A form by name: what makes it, and the settings it takes beside the name."""
+    """A form by name: what makes it, and the settings it takes beside the name.
+
+    of_strain : whether its moduli depend on strain; a fit of moduli that do not needs no range.
+    of_load_ratio : whether they depend on the ratio of the loads, which not every solver carries.
+    """
 
     name: str
     make: Maker
     settings: tuple[str, ...] = ()
+    of_strain: bool = True
+    of_load_ratio: bool = False
 
 
 _OFFERS: dict[str, Offer] = {}
@@ -55,6 +61,28 @@ def form_settings(name: str) -> tuple[str, ...]:
     """
     offer, _ = _offer(name)
     return offer.settings if offer else ()
+
+
+def of_strain(name: str) -> bool:
+    """Whether the moduli of a form depend on strain, as far as is known.
+
+    Raises
+    ------
+    PlugInFailure : as `form_settings`.
+    """
+    offer, _ = _offer(name)
+    return getattr(offer, "of_strain", True)
+
+
+def of_load_ratio(name: str) -> bool:
+    """Whether the moduli of a form depend on the ratio of the loads, as far as is known.
+
+    Raises
+    ------
+    PlugInFailure : as `form_settings`.
+    """
+    offer, _ = _offer(name)
+    return getattr(offer, "of_load_ratio", False)
 
 
 def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:

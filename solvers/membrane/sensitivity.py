@@ -14,6 +14,8 @@ from ...materials.point_law import (
     BEFORE1,
     BEFORE2,
     BEFORE3,
+    BY1,
+    BY2,
     D11,
     D11_E1,
     D11_E2,
@@ -25,7 +27,11 @@ from ...materials.point_law import (
     D22_NU,
     FAST,
     G12,
+    RATIO1,
+    RATIO2,
     SLOPES,
+    TURN1,
+    TURN2,
     membrane_stress,
 )
 from ...materials.point_moduli import by_pieces
@@ -43,7 +49,7 @@ def explicit(  # type: ignore[no-untyped-def]
     """Derivative of the residual at fixed displacement.
 
     rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_coupling
-    (1, np) those of what couples warp and fill, push the number of the parameter that is a
+    (3, np) those of what couples warp and fill, push the number of the parameter that is a
     pressure, or -1; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of the increment;
     writes ds_new (same shape; the part at fixed displacement), point (elements, 4, POINT) and
     rate (3 n, np).
@@ -91,8 +97,8 @@ def explicit(  # type: ignore[no-untyped-def]
             after = ds_new[e, g]
             for j in range(count):
                 o0, o1, o2 = old[0, j], old[1, j], old[2, j]
-                warp = own[0, j] + o0 * steep[BEFORE1]
-                fill = own[1, j] + o1 * steep[BEFORE2]
+                warp = own[0, j] + o0 * steep[BEFORE1] + by_coupling[1, j] * steep[RATIO1]
+                fill = own[1, j] + o1 * steep[BEFORE2] + by_coupling[2, j] * steep[RATIO2]
                 shear = own[2, j] + o2 * steep[BEFORE3]
                 d11 = steep[D11_E1] * warp + steep[D11_E2] * fill + by_nu[j] * steep[D11_NU]
                 d22 = steep[D22_E1] * warp + steep[D22_E2] * fill + by_nu[j] * steep[D22_NU]
@@ -100,6 +106,9 @@ def explicit(  # type: ignore[no-untyped-def]
                 a0 = before[0, j] + d11 * dh0 + d12 * dh1 - steep[D11] * o0 - steep[D12] * o1
                 a1 = before[1, j] + d12 * dh0 + d22 * dh1 - steep[D12] * o0 - steep[D22] * o1
                 a2 = before[2, j] + shear * dh2 - steep[G12] * o2
+                turn = steep[BY1] * (a0 + before[0, j]) + steep[BY2] * (a1 + before[1, j])
+                a0 += turn * steep[TURN1]
+                a1 += turn * steep[TURN2]
                 after[0, j], after[1, j], after[2, j] = a0, a1, a2
                 t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
                 t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2

@@ -75,6 +75,7 @@ class MembraneSolver:
 
     name = "membrane"
     external = False
+    load_ratios = True
 
     def __init__(
         self,

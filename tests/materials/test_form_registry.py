@@ -24,7 +24,7 @@ THING = Offer("acme", make, ("knee",))
 
 
 def test_ours_are_there_and_say_their_settings():
-    ours = ("constant", "linear", "quadratic", "cubic", "spline", "trilinear")
+    ours = ("constant", "linear", "quadratic", "cubic", "load-ratio", "spline", "trilinear")
     assert form_names()[: len(ours)] == ours
     assert form_settings("cubic") == () and form_settings("spline") == ("knots",)
     assert form_settings("nothere") == ()

@@ -13,8 +13,11 @@ from bubblefit.materials.forms.base import (
     moduli_on_grid,
     modulus_rows,
     pieces_of,
+    ratio_map,
+    ratios_of,
 )
 from bubblefit.materials.forms.polynomial import CUBIC, DEGREES, LINEAR
+from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.forms.registry import form_named, form_names, form_settings
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
@@ -22,8 +25,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from .pieces_of_laws import BETA, KNOTS, LAWS, RANGE
+from .pieces_of_laws import BETA, KNOTS, RANGE
+from .pieces_of_laws import LAWS as OF_STRAIN
 
+LAWS = {
+    **OF_STRAIN,
+    "load-ratio": HypoelasticLaw(
+        np.array([20.0, 240.0, 90.0, 600.0, -150.0]), 0.24, RANGE, form=LoadRatio()
+    ),
+}
 FORMS = pytest.mark.parametrize("name", LAWS)
 NO_RANGE = [UNLIMITED] * 3
 
@@ -40,8 +50,10 @@ def test_what_every_form_says_fits_together(name: str) -> None:
     # An entry belongs to one modulus, that of its name.
     for entry, modulus in zip(form.free, form.modulus_of, strict=True):
         component = COMPONENTS[modulus]
-        assert rows[component, ..., entry].any()
+        by_ratio = np.vstack([ratio_map(form), np.zeros(form.size)])[:, entry]
+        assert rows[component, ..., entry].any() != (by_ratio[component] != 0)
         assert not np.delete(rows, component, axis=0)[..., entry].any()
+        assert not np.delete(by_ratio, component).any()
     t = form.from_values(RANGE)
     assert t.shape == (len(form.free),) * 2 and np.linalg.cond(t) < 1e16
     assert form.describe().endswith(".") and "E1" in form.describe()
@@ -92,7 +104,11 @@ def test_the_grid_sees_every_piece(name: str) -> None:
     assert tuple(rows) == ORDER
     for modulus, part in rows.items():
         strain = form.grid(COMPONENTS[modulus], RANGE[COMPONENTS[modulus]])
-        assert part @ LAWS[name].beta == pytest.approx(LAWS[name].modulus(modulus, strain))
+        moduli = [LAWS[name].modulus(modulus, strain, r) for r in ratios_of(form, modulus)]
+        assert part @ LAWS[name].beta == pytest.approx(np.concatenate(moduli))
+    # Linear in the ratio: the ends are enough.
+    asked = [1, 3, 3] if name == "load-ratio" else [1, 1, 1]
+    assert [len(ratios_of(form, modulus)) for modulus in ORDER] == asked
 
 
 @pytest.mark.parametrize("name", DEGREES)

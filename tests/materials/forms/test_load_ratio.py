@@ -1,0 +1,260 @@
+"""Moduli that go with the load ratio: closed forms, derivatives, increments, pressed yarns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.materials.card import MaterialCard, read_card
+from bubblefit.materials.certainty import positive
+from bubblefit.materials.definite import definite_rows
+from bubblefit.materials.exports.base import check_positive
+from bubblefit.materials.forms.base import EVEN
+from bubblefit.materials.forms.ratio import LABELS, LoadRatio
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.pieces import piece_constants
+from bubblefit.materials.point_ratio import RIGHT, load_angle
+from bubblefit.solvers.base import carries_load_ratios, check_carries
+from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.once import Once
+from bubblefit.solvers.registry import solver_named
+from bubblefit.solvers.run_cache import RunCache
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+NU = 0.24
+#: MPa: G12, E2 at 1:1 and its gain, E1 at 1:1 and its gain.
+BETA = (30.0, 800.0, 400.0, 1000.0, -300.0)
+RATIOS = ((1, 0), (0, 1), (1, 1), (2, 1), (1, 2), (5, 1))
+
+
+def law_of(beta: Sequence[float] = BETA, nu: float = NU) -> HypoelasticLaw:
+    return HypoelasticLaw(np.array(beta, dtype=float), nu, form=LoadRatio())
+
+
+def moduli(beta: Sequence[float], share: Sequence[float]) -> tuple[float, float]:
+    """E1 and E2 at loads in these shares, from the published formula."""
+    _, fill, fill_gain, warp, warp_gain = beta
+    gamma = np.array(share) / np.hypot(*share)
+    return (
+        warp + warp_gain * (gamma[0] - 1 / np.sqrt(2)),
+        fill + fill_gain * (gamma[1] - 1 / np.sqrt(2)),
+    )
+
+
+def compliance(beta: Sequence[float], share: Sequence[float]) -> np.ndarray:
+    e1, e2 = moduli(beta, share)
+    return np.array([[1 / e1, -NU / e1], [-NU / e1, 1 / e2]])
+
+
+gains = st.floats(-350.0, 350.0)
+angles = st.floats(0.0, RIGHT)
+
+
+@settings(max_examples=60, deadline=None)
+@given(gains, gains, angles, st.integers(1, 5))
+def test_a_proportional_path_has_the_moduli_of_its_ratio(
+    fill_gain: float, warp_gain: float, angle: float, increments: int
+) -> None:
+    """Strain is the compliance of the ratio times the stress, in any number of increments."""
+    beta = (30.0, 500.0, fill_gain, 700.0, warp_gain)
+    share = np.array([np.cos(angle), np.sin(angle)])
+    strain = 20.0 * compliance(beta, share) @ share
+    law, old, stress = law_of(beta), np.zeros((1, 3)), np.zeros((1, 3))
+    for k in range(1, increments + 1):
+        new = np.array([[*(k / increments * strain), 0.0]])
+        stress, _ = law.increment(old, new, stress)
+        old = new
+    np.testing.assert_allclose(stress[0, :2], 20.0 * share, atol=1e-11)
+
+
+@pytest.mark.parametrize("share", RATIOS)
+def test_a_patch_at_small_loads_has_them_too(share: tuple[float, float]) -> None:
+    """Forces are over the width before the test: at loads that hardly strain it, the same."""
+    load = 1e-5 * np.array([share], dtype=float)
+    wanted = compliance(BETA, share) @ load[0] / 0.8
+    found = biaxial_response(law_of(), load, 0.8)
+    np.testing.assert_allclose(found.strain[0], wanted, rtol=1e-6, atol=1e-6 * wanted.max())
+
+
+def test_without_gains_it_is_the_constant_law() -> None:
+    flat = law_of((30.0, 800.0, 0.0, 1000.0, 0.0))
+    known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU)
+    rng = np.random.default_rng(1)
+    old, new = rng.normal(0.0, 0.03, (2, 50, 3))
+    stress = rng.normal(0.0, 20.0, (50, 3))
+    for a, b in zip(
+        flat.increment(old, new, stress), known.increment(old, new, stress), strict=True
+    ):
+        np.testing.assert_array_equal(a, b)
+
+
+# Which ratio it is
+
+
+def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed() -> None:
+    for a, b in ((3.0, 1.0), (1.0, 2.0)):
+        assert load_angle(a, b)[0] == pytest.approx(np.arctan2(b, a), rel=1e-15)
+    assert load_angle(0.0, 0.0) == (RIGHT / 2, 0.0, 0.0)
+    assert load_angle(5.0, -1.0) == load_angle(5.0, -9.0) == (0.0, 0.0, 0.0)
+    assert load_angle(-2.0, 1.0) == (RIGHT, 0.0, 0.0)
+    # Both pressed: the one that is pressed less is that which carries; no jump on the way there.
+    assert load_angle(-1.0, -3.0)[0] == pytest.approx(np.arctan2(1.0, 3.0))
+    turn = np.linspace(0.0, 2 * np.pi, 4001)[1:-1]
+    way = [load_angle(np.cos(t), np.sin(t))[0] for t in turn]
+    assert np.abs(np.diff(way)).max() < 2e-3
+
+
+@pytest.mark.parametrize("stress", [(3.0, 1.0), (-1.0, -3.0), (2.0, -1.0)])
+def test_derivatives_of_the_ratio(stress: tuple[float, float]) -> None:
+    step, a, b = 1e-6, *stress
+    by = [
+        (load_angle(a + step, b)[0] - load_angle(a - step, b)[0]) / (2 * step),
+        (load_angle(a, b + step)[0] - load_angle(a, b - step)[0]) / (2 * step),
+    ]
+    assert load_angle(a, b)[1:] == pytest.approx(by, abs=1e-9)
+
+
+def test_without_stress_it_begins_at_equal_loads() -> None:
+    none = np.zeros(3)
+    _, tangent = law_of().increment(none, none, none)
+    known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU).increment(none, none, none)[1]
+    np.testing.assert_allclose(tangent, known, rtol=1e-14)
+
+
+def test_a_yarn_that_is_pressed_beside_a_pulled_one_counts_as_one_without_load() -> None:
+    e1, e2 = moduli(BETA, (1, 0))
+    new = np.array([[0.02, -0.02, 0.0]])
+    stress, _ = law_of().increment(np.zeros((1, 3)), new, np.zeros((1, 3)))
+    wanted = HypoelasticLaw.linear(e1, e2, 30.0, NU).increment(
+        np.zeros((1, 3)), new, np.zeros((1, 3))
+    )
+    assert stress[0, 1] < 0
+    np.testing.assert_allclose(stress, wanted[0], rtol=1e-12)
+
+
+# Increments and derivatives
+
+
+def along(increments: int) -> np.ndarray:
+    """Warp first, then the fill while the warp is let go: nowhere in proportion."""
+    share = np.linspace(0.0, 1.0, increments + 1)[1:, None]
+    return np.concatenate([share * [20.0, 5.0], [20.0, 5.0] + share * [-10.0, 20.0]])
+
+
+def test_the_error_goes_with_the_square_of_the_increment() -> None:
+    ends = {n: biaxial_response(law_of(), along(n), 1.0).strain[-1] for n in (4, 8, 16, 32, 1024)}
+    off = [np.abs(ends[n] - ends[1024]).max() for n in (4, 8, 16, 32)]
+    orders = np.log2(np.array(off[:-1]) / off[1:])
+    assert (orders > 1.9).all() and (orders < 2.1).all()
+    assert off[1] < 5e-4 * ends[1024].max()
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_tangent(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    old = rng.normal(0.0, 0.02, 3)
+    new, stress = old + rng.normal(0.0, 0.02, 3), rng.normal(0.0, 10.0, 3)
+    law = law_of((30.0, 800.0, rng.uniform(-400, 400), 1000.0, rng.uniform(-400, 400)))
+    after, tangent = law.increment(old, new, stress)
+    mean = 0.5 * (stress + after[0])[:2]
+    if np.abs(mean).min() < 1e-3:  # the ratio has a kink there
+        return
+    step = 1e-7
+    slope = [
+        (law.increment(old, new + s, stress)[0] - law.increment(old, new - s, stress)[0])[0] / 2e-7
+        for s in step * np.eye(3)
+    ]
+    np.testing.assert_allclose(tangent[0], np.transpose(slope), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", [*(f"beta_{i}" for i in range(5)), "nu12", "thickness"])
+def test_derivatives_of_a_patch_through_its_history(name: str) -> None:
+    loads = np.concatenate([along(3), [[10.0, 1.0], [2.0, 8.0]]])
+    steps = {"nu12": 1e-6, "thickness": 1e-6}
+    step = steps.get(name, 1e-2)
+
+    def strain(by: float) -> np.ndarray:
+        beta, nu, thickness = np.array(BETA), NU, 0.8
+        if name == "nu12":
+            nu += by
+        elif name == "thickness":
+            thickness += by
+        else:
+            beta[int(name[-1])] += by
+        return biaxial_response(law_of(beta, nu), loads, thickness).strain
+
+    found = biaxial_response(law_of(), loads, 0.8, [name])
+    assert found.reached == len(loads)
+    slope = (strain(step) - strain(-step)) / (2 * step)
+    room = 1e-7 * np.abs(slope).max() + 1e-13
+    np.testing.assert_allclose(found.slope[..., 0], slope, atol=room)
+    assert (np.abs(slope).max() > 0) == (name != "beta_0")
+
+
+# Where it holds
+
+
+def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio() -> None:
+    falling = law_of((30.0, 800.0, 0.0, 1000.0, 1500.0))  # E1 < 0 where the warp carries little
+    assert falling.modulus("E1", 0.0) == 1000.0
+    assert falling.modulus("E1", 0.0, 0.0) == pytest.approx(1000.0 - 1500.0 * EVEN)
+    assert positive(law_of()) and not positive(falling)
+    check_positive(MaterialCard(law_of(), 0.8))
+    with pytest.raises(InputError, match=r"E1 is -60\.66 MPa"):
+        check_positive(MaterialCard(falling, 0.8))
+    along_fill = np.array([[0.0, 10.0]])
+    assert biaxial_response(falling, along_fill, 0.8).reached == 0
+    assert biaxial_response(falling, along_fill[:, ::-1], 0.8).reached == 1
+
+
+def test_where_it_is_definite_in_a_pull_along_either_yarn() -> None:
+    """E1 > nu12^2 E2 with both at the ratio of the pull, not at equal loads."""
+    nu = 0.9
+    beta = np.array([30.0, 800.0, 0.0, 1000.0, 800.0])
+    rows = definite_rows(LoadRatio(), nu, [0.1, 0.1, 0.1])
+    assert 1000.0 > 1.02 * nu**2 * 800.0  # at equal loads
+    none = np.array([1000.0 - 800.0 * EVEN])
+    assert none < 1.02 * nu**2 * 800.0  # in a pull along the fill
+    assert (rows @ beta).min() == pytest.approx(none[0] - 1.02 * nu**2 * 800.0)
+    assert (rows @ [30.0, 800.0, 0.0, 1000.0, 0.0]).min() > 0
+
+
+def test_a_card_of_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    known = replace(law_of(), strain_range=[0.02, 0.1, 0.1])
+    MaterialCard(known, 0.8, "ratio").write(tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text()
+    assert 'form = "load-ratio"' in text and "n2 / sqrt(n1^2 + n2^2)" in text
+    law = read_card(tmp_path / "m.toml").law
+    assert law.form == LoadRatio() and law.of_load_ratio
+    np.testing.assert_allclose(law.beta, BETA, rtol=1e-15)
+    np.testing.assert_allclose(law.coupling, [NU, -300.0, 400.0], rtol=1e-15)
+    assert LABELS == ("G12", "E2 at 1:1", "dE2", "E1 at 1:1", "dE1")
+
+
+def test_what_knows_strain_alone_refuses_it_in_one_line() -> None:
+    card = MaterialCard(law_of(), 0.8, "ratio")
+    takes = {f.name for f in FORMATS.values() if f.load_ratios}
+    assert takes == {"constants", "gsa", "rfem"}
+    for one in FORMATS.values():
+        if one.load_ratios:
+            assert one.export(card, lowest=0.5, highest=10.0).files
+        else:
+            with pytest.raises(InputError, match=r"form: the format .* depend on the ratio"):
+                one.export(card)
+    with pytest.raises(InputError, match="is for the solver membrane"):
+        piece_constants(card.law)
+    check_carries(solver_named("membrane"), card.law)
+    with pytest.raises(InputError, match="calculix takes moduli of strain"):
+        check_carries(solver_named("calculix"), card.law)
+    # One that is run once and kept carries what the solver behind the cache carries.
+    for carries in (True, False):
+        behind = SimpleNamespace(name="lab", load_ratios=carries)
+        assert carries_load_ratios(Once(behind, RunCache(Path("runs")), {})) == carries
