@@ -21,17 +21,10 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .examples import examples
 from .exits import exits, resumable
 from .options import data_folders, folder_beside, read_with_solver
 from .progress import NamedProgress
-
-EPILOG = """Examples:
-
-\b
-  bubblefit bootstrap fabric.toml --over frames
-  bubblefit bootstrap fabric.toml --over specimens --samples 400 --jobs 4
-  bubblefit bootstrap fabric.toml --over tests --resume
-"""
 
 
 def _options(command: Any) -> Any:
@@ -62,7 +55,14 @@ def _options(command: Any) -> Any:
     return with_options(exits(command), decorators)
 
 
-@click.command("bootstrap", epilog=EPILOG)
+@click.command(
+    "bootstrap",
+    epilog=examples(
+        "bubblefit bootstrap fabric.toml --over frames",
+        "bubblefit bootstrap fabric.toml --over specimens --samples 400 --jobs 4",
+        "bubblefit bootstrap fabric.toml --over tests --resume",
+    ),
+)
 @_options
 def command(over: str, samples: int, seed: int | None, card: str | None, **options: Any) -> None:
     """How far do the moduli scatter if the data are drawn again?

@@ -74,7 +74,7 @@ class LiveLine:
             if time.monotonic() - last < PLAIN_EVERY_S:
                 return
             self._stated[said.words] = time.monotonic()
-        if self.quiet or not said.words:
+        if not said.words or (self.quiet and said.of):  # a state is progress, the rest is not
             return
         if self.bar is None:
             print(said.words, file=sys.stderr, flush=True)

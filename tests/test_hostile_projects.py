@@ -13,7 +13,9 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.base import Output
 from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, read_card, write_card
-from bubblefit.reports.html import Report, Table, write_report
+from bubblefit.reports.charts import Chart, Charts, Series
+from bubblefit.reports.content import Download, Facts, Listing, Report, Section, Table, Words
+from bubblefit.reports.html import write_report
 from bubblefit.sections import PRESSURE_UNITS
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.exports import FORMATS
@@ -218,15 +220,22 @@ def test_a_cards_text_is_no_line_of_an_export(tmp_path):
 
 
 def test_a_page_escapes_whatever_it_shows(tmp_path):
-    table = Table(HOSTILE, [HOSTILE], [[HOSTILE], [np.float64(1)]], HOSTILE)
     quoted = '"><img src=x onerror=alert(1)>'
+    curve = Series(HOSTILE, [0.0, 1.0], [0.0, 1.0])
+    parts = [
+        Table(HOSTILE, [HOSTILE], [[HOSTILE], [np.float64(1)]], HOSTILE),
+        Words([HOSTILE, quoted], warning=True),
+        Facts([(HOSTILE, quoted)], quoted),
+        Download(quoted, HOSTILE, HOSTILE),
+        Listing(HOSTILE),
+        Charts(HOSTILE, [Chart(quoted, HOSTILE, quoted, [curve])], HOSTILE),
+    ]
     report = Report(
         quoted,
         HOSTILE,
         facts=[(HOSTILE, quoted)],
         warnings=[HOSTILE],
-        figures=[(quoted, HOSTILE)],
-        tables=[table],
+        sections=[Section(HOSTILE, parts)],
         files=[(quoted, HOSTILE)],
         versions={HOSTILE: quoted},
     )
