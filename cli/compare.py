@@ -10,7 +10,7 @@ import click
 
 from .ending import written_to
 from .examples import examples
-from .fitting import fit_options
+from .fitting import fit_options, settings_given
 from .options import command_line, data_folders, folder_beside, read_with_solver
 from .progress import FitsProgress
 
@@ -50,7 +50,7 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     path: Path = options["project"]
     folder: Path = options["out"] or folder_beside(path, "compared")
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")})
+    project = settings_given(project, options)
     starts = options["starts"] or STARTS
     quiet = options["quiet"] or options["as_json"]
     with FitsProgress(starts, quiet, "{} moduli") as progress:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from .arguments import (
     DATA,
     JOBS,
     OVERWRITE,
+    PATH,
     PROJECT,
     QUIET,
     SCHEDULER,
@@ -33,6 +34,7 @@ from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 
 if TYPE_CHECKING:
+    from ..fits.project import Project
     from ..fits.result import Fit
 
 
@@ -45,6 +47,12 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         DATA,
         click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
         click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
+        click.option(
+            "--starts-from",
+            type=click.Choice(["random", "sobol", "proposed"]),
+            help="Where starts begin: drawn, spread evenly, or by an earlier fit.",
+        ),
+        click.option("--earlier", type=PATH, metavar="DIR", help="That fit's output folder."),
         JOBS,
         SCHEDULER,
         click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
@@ -64,6 +72,15 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return with_checks(command, decorators)
 
 
+def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
+    """The project with what the command line says of starts, and of who runs them."""
+    names = ("seed", "method", "jobs", "starts_from")
+    given = {name: options[name] for name in names}
+    earlier: Path | None = options["earlier"]
+    given["earlier"] = None if earlier is None else str(earlier.absolute())
+    return project.with_fit(**given).with_scheduler(options["scheduler"])
+
+
 def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, fit the chosen tests (of a kind), write the folder, tell; exits as asked.
 
@@ -78,6 +95,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
 
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    project = settings_given(project, options)
     folder: Path = options["out"] or usual_folder(path)
     quiet = options["quiet"] or options["as_json"]
     starts = options["starts"] or project.fit.starts
@@ -86,10 +104,6 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
             project,
             _tests(options["tests"], kind, project.tests, path),
             starts=options["starts"],
-            seed=options["seed"],
-            method=options["method"],
-            jobs=options["jobs"],
-            scheduler=options["scheduler"],
             trust=options["trust"],
             out=folder,
             resume=options["resume"],

@@ -13,7 +13,7 @@ from ..errors import InputError
 from .ending import written_to
 from .examples import examples
 from .exits import resumable
-from .fitting import fit_options
+from .fitting import fit_options, settings_given
 from .options import (
     command_line,
     data_folders,
@@ -104,7 +104,7 @@ def _project(options: Mapping[str, Any]) -> Project:
     data = data_folders(options["data"])
     project = read_with_solver(options["project"], options["solver_given"], data)
     trusted = [*project.fit.trust, *options["trust"]]
-    return project.with_fit(**{k: options[k] for k in ("seed", "method", "jobs")}, trust=trusted)
+    return settings_given(project, options).with_fit(trust=trusted)
 
 
 def _one_of(path: Path, given: Mapping[str, object]) -> None:

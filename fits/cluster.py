@@ -30,6 +30,8 @@ LOOK_S, ANSWER_S, WAIT_S = 1.0, 4.0, 0.5
 FETCH_S = 30.0
 #: Workers that may die of a task before it is given up.
 DEATHS = 3
+#: Of Dask; some have a level of their own.
+LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
 EXTRA = "Dask is not installed; pip install 'bubblefit[cluster]'"
 
 
@@ -51,18 +53,31 @@ def connected(address: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError:
         raise InputError(None, "--scheduler", EXTRA) from None
-    for name in ("distributed.client", "distributed.core", "distributed.comm", "tornado"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # all of it is said in our words
+    with _silence():
+        try:
+            client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            problem = f"no Dask scheduler answers at {address} ({error or type(error).__name__})"
+            advice = "start one (dask scheduler), or give the address that it prints"
+            raise InputError(None, "--scheduler", f"{problem}; {advice}") from None
+        try:
+            yield client
+        finally:
+            client.close(timeout=ANSWER_S)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Dask logs every lost connection, with tracebacks; all of it is said in our words."""
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        problem = f"no Dask scheduler answers at {address} ({error or type(error).__name__})"
-        advice = "start one (dask scheduler), or give the address that it prints"
-        raise InputError(None, "--scheduler", f"{problem}; {advice}") from None
-    try:
-        yield client
+        yield
     finally:
-        client.close(timeout=ANSWER_S)
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
 
 
 def run_tasks(
@@ -107,7 +122,7 @@ class Series:
         self.there: dict[str, int] = {}
         self.refused: dict[str, str] = {}
         self.events: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._silent, self._waits = 0, False
+        self._silent, self._waits, self._used = 0, False, False
         self._looked = -LOOK_S
         client.subscribe_topic(self.name, lambda event: self.events.put(Announcement(*event[1])))
 
@@ -155,11 +170,11 @@ class Series:
         joining = {worker for _, worker, number in self.running.values() if number is None}
         for worker in set(there) - set(self.threads) - set(self.refused) - joining:
             self._submit(worker, None)
-        if there and set(there) == set(self.refused):
+        if there and set(there) == set(self.refused) and not self._used:
             raise InputError(None, "--scheduler", "; ".join(self.refused.values()))
-        if bool(there) == self._waits:
-            self._waits = not there
-            announce("waiting for a worker of the cluster" if self._waits else "", self.name)
+        if self._waits != (waits := set(there) <= set(self.refused)):
+            self._waits = waits
+            announce("waiting for a worker of the cluster" if waits else "", self.name)
 
     def _hand_out(self) -> None:
         busy = Counter(worker for _, worker, number in self.running.values() if number is not None)
@@ -209,7 +224,7 @@ class Series:
         """A worker is used if its bubblefit is ours."""
         wanted = cluster_worker.version()
         if said == wanted:
-            self.threads[worker] = self.there.get(worker, 1)
+            self.threads[worker], self._used = self.there.get(worker, 1), True
         elif worker in self.there:
             self.refused[worker] = f"worker {worker} is not used: it has {_other(said, wanted)}"
             announce(self.refused[worker])

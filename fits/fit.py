@@ -38,6 +38,8 @@ def fit(
     *,
     starts: int | None = None,
     seed: int | None = None,
+    starts_from: str | None = None,
+    earlier: Path | str | None = None,
     method: str | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -56,6 +58,8 @@ def fit(
     starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
         cores unless the project says otherwise.
     scheduler : address of a Dask scheduler, whose workers run the starts instead of this machine.
+    starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", by what the fit in the
+        folder `earlier` evaluated.
     trust : names of doubts about the data that stop nothing, beside those of the project.
     out : folder in which every analysis and start is written as it ends, so that an interrupted
         fit can be gone on with (`resume`); nothing is written without it.
@@ -78,6 +82,9 @@ def fit(
     begun = time.perf_counter()
     trusted = [*project.fit.trust, *trust]
     project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
+    project = project.with_fit(
+        starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute())
+    )
     project = project.with_scheduler(scheduler)
     project.executor.check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))

@@ -89,6 +89,8 @@ class FitSection(Section):
 
     starts: Annotated[int, Field(ge=1)] = 50
     seed: Annotated[int, Field(ge=0)] = 1
+    starts_from: Literal["random", "sobol", "proposed"] = "random"
+    earlier: Name | None = None
     method: Name = "lm"
     gradient: Literal["exact", "differences"] = "exact"
     constraints: Literal["margin", "boolean"] = "margin"

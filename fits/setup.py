@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..content import digest_of
 from ..errors import InputError
@@ -12,10 +12,13 @@ from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
 from ..identification.comparison import Comparison
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem
+from ..identification.starts import ProposedStarts, RandomStarts, SobolStarts, Starts
 from ..identification.unknowns import LawBounds, Unknowns
 from ..materials.law import HypoelasticLaw
+from ..sections import beside
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
+from .earlier import KEY, proposals
 from .law import bounds_of, law_of
 from .project import Project
 from .shared import shared_unknowns, with_shared
@@ -28,7 +31,7 @@ MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
 SOLVER_KEY = "fit.solver"
 #: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
 #: solver is told by what it says of itself.
-UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
+UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlier")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,7 @@ class FitSetup:
     Parameters
     ----------
     law : everything but the coefficients. tests : with their data. counts : by name of a test, how
-    many times the weight that the project gives it.
+    many times the weight that the project gives it. starts : where they begin.
     """
 
     project: Project
@@ -46,6 +49,7 @@ class FitSetup:
     bounds: LawBounds
     tests: tuple[PreparedTest, ...]
     counts: Mapping[str, float] = field(default_factory=dict)
+    starts: Starts = field(default_factory=RandomStarts)
 
     @property
     def weightings(self) -> tuple[Weighting, ...]:
@@ -68,7 +72,10 @@ class FitSetup:
             for test, weighting in zip(self.tests, self.weightings, strict=True)
             for comparison in test.comparisons(self.make_solver, weighting, masks)
         ]
-        return self.problem_of(comparisons)
+        problem = self.problem_of(comparisons)
+        if masks is not None and isinstance(self.starts, ProposedStarts):
+            problem.starts = RandomStarts()  # nothing of the points left out may be in them
+        return problem
 
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
         """The fit of comparisons of its tests, whatever the models: the law's unknowns and theirs,
@@ -76,7 +83,7 @@ class FitSetup:
         comparisons = with_shared(comparisons, shared_unknowns(self.project))
         law, ends = self.law, self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
-        problem = FitProblem(tuple(comparisons), self.law, unknowns)
+        problem = FitProblem(tuple(comparisons), self.law, unknowns, starts=self.starts)
         if not isinstance(problem.solver, DifferentiatingSolver):
             problem.surrogate = problem.with_solvers([solver_named(SURROGATE) for _ in comparisons])
         return problem
@@ -117,7 +124,26 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
         raise InputError(project.path, "law.form", error.problem) from None
     bounds = bounds_of(project, law.form)
     make = functools.partial(make_solver, project)
-    return FitSetup(project, law, bounds, tuple(test.prepare(law, make) for test in tests))
+    ready = tuple(test.prepare(law, make) for test in tests)
+    setup = FitSetup(project, law, bounds, ready)
+    return replace(setup, starts=_starts(setup))
+
+
+def _starts(setup: FitSetup) -> Starts:
+    """Where the project says that starts begin."""
+    project, fit = setup.project, setup.project.fit
+    if fit.earlier is not None and fit.starts_from != "proposed":
+        said = 'means something with starts_from = "proposed" only'
+        raise InputError(project.path, KEY, said)
+    if fit.starts_from != "proposed":
+        return SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
+    if fit.earlier is None:
+        said = "name the folder of an earlier fit of this project: what it evaluated proposes"
+        raise InputError(project.path, KEY, said)
+    problem, scales = setup.problem(), project.scales
+    columns = [f"{label}_{scales.modulus_unit}" for label in problem.unknowns.labels]
+    folder = beside(project.path.parent, fit.earlier)
+    return proposals(folder, fingerprints(setup, problem), columns, scales.modulus)
 
 
 def make_solver(project: Project, name: str | None = None) -> Solver:
@@ -134,7 +160,12 @@ def make_solver(project: Project, name: str | None = None) -> Solver:
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     """Digests of everything that a start's result depends on, by what they are of."""
     fit = setup.project.fit
+    proposed = setup.starts if isinstance(setup.starts, ProposedStarts) else None
+    own = {} if proposed is None else {
+        "earlier evaluations": digest_of(proposed.coefficients, proposed.objectives)
+    }  # fmt: skip
     return {
+        **own,
         "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
         "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
         "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),

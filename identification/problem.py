@@ -13,6 +13,7 @@ from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .blocks import Blocks
 from .comparison import Comparison
+from .starts import RandomStarts, Starts
 from .unknowns import Unknowns
 
 Array = NDArray[np.float64]
@@ -63,7 +64,8 @@ class FitProblem:
 
     `law` carries nu12, strain range and thickness option; its beta is replaced, and nu12 where it
     is an unknown. `surrogate`: the
-    same problem for a solver that differentiates, where this one's does not.
+    same problem for a solver that differentiates, where this one's does not. `starts`: where starts
+    begin.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class FitProblem:
     unknowns: Unknowns
     watch: Watch | None = None
     surrogate: FitProblem | None = None
+    starts: Starts = field(default_factory=RandomStarts)
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
     cached: int = 0  # of them, from the cache of runs

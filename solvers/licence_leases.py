@@ -49,7 +49,8 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
         yield
     finally:
         semaphore.release()
-        semaphore.refresh_callback.stop()
+        if hasattr(semaphore, "refresh_callback"):  # none where leases never time out
+            semaphore.refresh_callback.stop()
 
 
 @functools.cache

@@ -10,7 +10,7 @@ import pytest
 from bubblefit.experiments.base import Reach
 from bubblefit.fits.law import bounds_of, law_of
 from bubblefit.fits.project import Project, read_project
-from bubblefit.identification.feasibility import allowed, draw
+from bubblefit.identification.draws import allowed, draw
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.forms.registry import form_names
 from bubblefit.materials.law import HypoelasticLaw

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
 from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.feasibility import _between, allowed, draw, feasible_start
+from bubblefit.identification.draws import _between, allowed, draw
+from bubblefit.identification.feasibility import feasible_start
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.feasibility import allowed, draw
+from bubblefit.identification.draws import allowed, draw
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.registry import form_named

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.feasibility import allowed, draw, feasible_start
+from bubblefit.identification.draws import allowed, draw
+from bubblefit.identification.feasibility import feasible_start
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.definite import DEFINITE
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid

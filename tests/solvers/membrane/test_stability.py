@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.feasibility import allowed, draw
+from bubblefit.identification.draws import allowed, draw
 from bubblefit.identification.unknowns import Unknowns
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bubble import BubbleModel
