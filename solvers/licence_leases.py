@@ -7,16 +7,16 @@ cluster says otherwise: a dead worker's program has ended by then.
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import BubblefitError, InputError
 
 #: s, for the scheduler to answer; and between two words that it is waited for.
-CONNECT_S, LOOK_S = 10.0, 1.0
+CONNECT_S, LOOK_S = 5.0, 1.0
+_clients: dict[tuple[str, int], Any] = {}
 
 
 @contextmanager
@@ -32,11 +32,11 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
     InputError : another count is in use in this cluster, or Dask is not installed.
     BubblefitError : the scheduler does not answer.
     """
-    scheduler, loop = _place(address, os.getpid())
+    place = _place(address)
     from distributed import Semaphore
 
-    semaphore = Semaphore(count, f"bubblefit licences of {name}", scheduler, loop)
     try:
+        semaphore = Semaphore(count, f"bubblefit licences of {name}", *place())
         semaphore.register()
         while not semaphore.acquire(LOOK_S):
             waiting()
@@ -44,43 +44,40 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
         problem = f"the cluster counts another number of them already ({error})"
         raise InputError(None, f"solver.{name}.licences", problem) from None
     except OSError as error:
-        raise BubblefitError(f"{address}: the scheduler leases no licence: {error}") from None
+        said = BubblefitError(f"{address}: the Dask scheduler leases no licence: {error}")
+        said.exit_code = 4
+        raise said from None
     try:
         yield
     finally:
-        semaphore.release()
+        with suppress(OSError):  # it is gone, and the lease with it
+            semaphore.release()
         if hasattr(semaphore, "refresh_callback"):  # none where leases never time out
             semaphore.refresh_callback.stop()
 
 
-@functools.cache
-def _place(address: str, process: int) -> tuple[Any, Any]:
-    """Connections to the scheduler, and the loop that serves them: a worker's own, or a client's.
+def _place(address: str) -> Callable[[], tuple[Any, Any]]:
+    """Gives connections to the scheduler, and the loop that serves them: a worker's, or a client's.
 
-    process : ours; a copy of it (fork) has no use of the connections of the original.
+    The client raises OSError where nobody answers.
     """
     try:
         from distributed import Client, get_worker
     except ImportError:
         problem = "Dask is not installed; pip install 'bubblefit[cluster]'"
         raise InputError(None, "--scheduler", problem) from None
-    try:
-        worker = get_worker()
-        return worker.scheduler, worker.loop
-    except ValueError:
-        pass
-    try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise BubblefitError(f"{address}: the scheduler leases no licence: {error}") from None
-    return _Kept(client), client.loop
 
+    def place() -> tuple[Any, Any]:
+        try:
+            worker = get_worker()
+            return worker.scheduler, worker.loop
+        except ValueError:
+            pass
+        # A copy of a process (fork) has no use of the connections of the original.
+        key = address, os.getpid()
+        client = _clients.get(key)
+        if client is None or client.status != "running":
+            client = _clients[key] = Client(address, timeout=CONNECT_S, set_as_default=False)
+        return client.scheduler, client.loop
 
-class _Kept:
-    """The scheduler as a client knows it, with the client."""
-
-    def __init__(self, client: Any) -> None:
-        self.client = client
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.client.scheduler, name)
+    return place

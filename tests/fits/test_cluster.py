@@ -322,6 +322,23 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path
     assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
 
 
+def test_no_licence_is_leased_where_nobody_answers(tmp_path: Path) -> None:
+    """Nor is one kept from others on this machine; a scheduler that goes takes its leases along."""
+    distributed: Any = needs.library("distributed")
+    given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
+    options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(**options) as local:
+        address = local.scheduler_address
+        with licences.held("acme", given, address):
+            local.close()
+    for place in (address, NOBODY):
+        with pytest.raises(BubblefitError, match="leases no licence") as caught:
+            licences.held("acme", given, place).__enter__()
+        assert caught.value.exit_code == 4 and str(caught.value).startswith(place)
+    with licences.held("acme", given):
+        pass
+
+
 def test_a_fit_hands_its_scheduler_to_the_solver(strips_project: bf.Project) -> None:
     project = strips_project.with_scheduler("tcp://there:1")
     assert project.executor.scheduler == project.options_of("marc")["licence_scheduler"]
