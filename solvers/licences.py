@@ -23,6 +23,7 @@ from .base import (
     History,
     Solver,
     SolverCheck,
+    carries_load_ratios,
 )
 from .licence_settings import SCHEDULER, LicenceSettings, licence_settings
 from .process import check_wanted, kept_open
@@ -75,7 +76,7 @@ class LicensedSolver:
         self, solver: Solver, settings: LicenceSettings, scheduler: str | None = None
     ) -> None:
         self.solver, self.licences, self.scheduler = solver, settings, scheduler
-        self.keep = getattr(solver, "keep", False)
+        self.keep, self.load_ratios = getattr(solver, "keep", False), carries_load_ratios(solver)
         self.name, self.external = solver.name, solver.external
 
     @property

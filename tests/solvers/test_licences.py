@@ -287,7 +287,7 @@ def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
             return model, parameters
 
         programs = (Path("/opt/acme"),)
-        keep = True
+        keep = load_ratios = True
 
         def band(self, model: Any) -> Any:
             return (model,)
@@ -298,7 +298,8 @@ def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
     assert able.band(4) == [4]
     # What a cache of runs asks.
     assert isinstance(able, ProgramSolver) and able.programs == (Path("/opt/acme"),)
-    assert able.keep and not plain.keep and not isinstance(plain, ProgramSolver)
+    assert able.keep and able.load_ratios and not plain.load_ratios
+    assert not plain.keep and not isinstance(plain, ProgramSolver)
     assert type(able).__module__ == __name__
 
 
