@@ -25,6 +25,7 @@ COMMANDS = {
     "bootstrap": ("bootstrap", "How far do moduli scatter if the data are drawn again?"),
     "plan": ("plan", "Which test next? Predicted uncertainty of tests that could be made."),
     "compare": ("compare", "Which form of the moduli do the strip tests support?"),
+    "report": ("report", "The page of an output folder again, as PDF, or two side by side."),
     "simulate": ("simulate", "One forward analysis with a material card."),
     "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
     "dic": ("dic", "Is the camera right? A sphere through the points of its frames."),

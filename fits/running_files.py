@@ -46,7 +46,7 @@ class RunningFiles:
         ------
         InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
         """
-        done = self._finished() if resume else []
+        done = self.finished() if resume else []
         ended = {(str(record.number), record.mesh) for record in done}
         rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
         lines = [json.dumps(record.to_json()) + "\n" for record in done]
@@ -95,7 +95,13 @@ class RunningFiles:
                 stream.close()
         self._rows = self._starts = None
 
-    def _finished(self) -> list[StartRecord]:
+    def finished(self) -> list[StartRecord]:
+        """The starts that ended, as starts.jsonl has them.
+
+        Raises
+        ------
+        InputError : a line of it is damaged.
+        """
         path = self.store.path / STARTS
         done: dict[tuple[int, str], StartRecord] = {}
         # A crash can leave bytes that are no text where the last line should be.

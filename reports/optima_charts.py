@@ -24,5 +24,5 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     log = bool(len(ended)) and ended[0] > DECADE * ended[-1]
     spots = dots("", 1 + np.arange(len(ended)), ended)
     label = "start, from worst to best"
-    chart = Chart(said, label, "objective", [spots], said, log_y=log, from_zero=not log)
-    return Charts("optima", [chart], caption)
+    chart = Chart("", label, "objective", [spots], said, log_y=log, from_zero=not log)
+    return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")

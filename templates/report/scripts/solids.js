@@ -40,7 +40,7 @@ const enlivenSolid = async (figure, data) => {
       paths[place].setAttribute("fill", Number.isNaN(value) ? "#999"
         : colours[classOf(value, ends[own], colours.length)]);
     });
-    label.textContent = data.loads[load];
+    label.textContent = `${data.loads[load]}, ${shade.name}`;
     tellScale(svg, ends[own], shade.unit, colours);
   };
   const later = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };

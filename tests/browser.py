@@ -1,0 +1,139 @@
+"""A headless browser without a network, spoken to through its own protocol."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from bubblefit.reports.pdf import BROWSERS, browser_command
+
+from . import needs
+
+#: Seconds that anything may take.
+PATIENCE = 60.0
+
+
+class Browser:
+    """One page of a browser: what it loads, what it complains of, and how it looks."""
+
+    def __init__(self, into: int, out: int) -> None:
+        self._into, self._out, self._number, self._rest = into, out, 0, b""
+        self._session: str | None = None
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
+        for domain in ("Runtime", "Log", "Network", "Page"):
+            self.call(f"{domain}.enable")
+        self.call("Network.emulateNetworkConditions", offline=True, latency=0,
+                  downloadThroughput=0, uploadThroughput=0)  # fmt: skip
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """The answer to a command."""
+        self._number += 1
+        message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
+        if self._session is not None:
+            message["sessionId"] = self._session
+        os.write(self._into, json.dumps(message).encode() + b"\0")
+        for said in self._messages():
+            if said.get("id") == self._number:
+                assert "error" not in said, said
+                return said["result"]
+            self._note(said)
+        raise AssertionError("the browser has gone")
+
+    def open(self, page: Path) -> None:
+        """Open a file and wait until its script says that it is ready."""
+        self.call("Page.navigate", url=page.resolve().as_uri())
+        end = time.monotonic() + PATIENCE
+        while self.run("document.documentElement?.dataset.ready") != "yes":
+            assert time.monotonic() < end, self.complaints or "the page is never ready"
+            time.sleep(0.05)
+
+    def run(self, script: str) -> Any:
+        """The value of an expression in the page."""
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def press(self, selector: str, key: str) -> None:
+        """Give the first element of a selector the focus, and press a key there."""
+        assert self.run(f"document.querySelector({selector!r}).focus(), 1") == 1
+        assert self.run(f"document.activeElement.matches({selector!r})"), f"{selector}: no focus"
+        code = {"Home": 36, "ArrowLeft": 37, "ArrowRight": 39}.get(key, 0)
+        text = {} if code else {"text": key}
+        named = {"key": key, "code": key, "windowsVirtualKeyCode": code, **text}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **named)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **named)
+        # Two frames: what waits for the next one is drawn then.
+        self.call(
+            "Runtime.evaluate", awaitPromise=True,
+            expression="new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))",
+        )  # fmt: skip
+
+    def look(self, selector: str) -> bytes:
+        """A picture of the first element of a selector."""
+        box = self.run(
+            f"(({{x, y, width, height}}) => [x + scrollX, y + scrollY, width, height])"
+            f"(document.querySelector({selector!r}).getBoundingClientRect())"
+        )
+        clip = dict(zip(("x", "y", "width", "height"), box, strict=True), scale=1)
+        shot = self.call("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)
+        return base64.b64decode(shot["data"])
+
+    def _messages(self) -> Iterator[dict[str, Any]]:
+        while True:
+            while b"\0" in self._rest:
+                one, self._rest = self._rest.split(b"\0", 1)
+                yield json.loads(one)
+            more = os.read(self._out, 1 << 16)
+            if not more:
+                return
+            self._rest += more
+
+    def _note(self, said: dict[str, Any]) -> None:
+        method, parameters = said.get("method"), said.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.complaints.append(parameters["exceptionDetails"]["text"])
+        if method == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(parameters["entry"]["text"])
+        if method == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning"):
+            self.complaints.append(str(parameters["args"]))
+        if method == "Network.requestWillBeSent":
+            self.requests.append(parameters["request"]["url"])
+
+
+@contextmanager
+def browser(home: Path) -> Iterator[Browser]:
+    """A browser for a `with` block; left out, with the reason, where there is none."""
+    program = needs.program(*BROWSERS, package="chromium")
+    (theirs_in, ours_in), (ours_out, theirs_out) = os.pipe(), os.pipe()
+
+    def as_three_and_four() -> None:
+        read, write = os.dup(theirs_in), os.dup(theirs_out)
+        os.dup2(read, 3)
+        os.dup2(write, 4)
+
+    every = browser_command(program, home)
+    command = [word for word in every if not word.startswith("--virtual-time")]
+    process = subprocess.Popen(
+        [*command, "--remote-debugging-pipe"], pass_fds=(3, 4), preexec_fn=as_three_and_four,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    os.close(theirs_in)
+    os.close(theirs_out)
+    try:
+        yield Browser(ours_in, ours_out)
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+        os.close(ours_in)
+        os.close(ours_out)
