@@ -56,6 +56,8 @@ class NoteKind(StrEnum):
     ALONE = "undetermined alone"
     INVERSE_CRIME = "inverse crime"
     ABOVE_NOISE = "above the noise"
+    BELOW_NOISE = "below the noise"
+    SECOND_ORDER = "second order"
     NOT_THE_CARD = "not where the card is"
     NOT_CLOSED = "profile not closed"
     FEW_UNITS = "few to draw from"

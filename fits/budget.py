@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError, SolverFailure
-from ..identification.assessment import certainty
+from ..identification.assessment import Certainty, certainty
 from ..identification.discretisation import Limit
-from ..identification.problem import FitProblem
+from ..identification.linear import Linear
+from ..identification.noise import Noise
+from ..identification.problem import Evaluation, FitProblem
+from ..identification.second_order import (
+    NOT_DEFINITE,
+    TOO_LITTLE,
+    WORTH,
+    Order,
+    definite,
+    large,
+    second_of,
+)
+from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from .best import BestFit
 from .mesh_error import TAKEN_OUT, limit_of_meshes, note_of_limit, notes_of_mesh
 from .setup import FitSetup
+
+Array = NDArray[np.float64]
 
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
@@ -32,12 +49,38 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         notes.append(Note(NoteKind.MESH, NOT_TAKEN_OUT))
     elif limit is not None and out:
         law = problem.unknowns.law(law, slopes.unknowns + limit.step)
-    sure = certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
+    sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
     if sure.mesh is not None:
         notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)
+    if sure.order is not None:
+        notes += sure.order.notes
     told = (*sure.undetermined, *notes)
     sure = replace(sure, undetermined=told, taken_out=out and limit is not None)
     return replace(best, law=law, certainty=sure)
+
+
+def _certainty(
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array, limit: Limit | None
+) -> Certainty:
+    """By the first derivatives; by the second where much is left, and they say something else."""
+    first = certainty(problem, best, law, reached, limit)
+    left = best.residual if limit is None else limit.residual
+    if not large(problem, left):
+        return first
+    noise = Noise.of(problem, left)
+    found = second_of(problem, best, noise)
+    if not definite(Linear.of(problem, best, noise), found):
+        order = Order(False, NOT_DEFINITE, {}, found.directions, found.analyses)
+        return replace(first, order=order)
+    second = certainty(problem, best, law, reached, limit, found)
+    change = {}
+    for name, sigma in second.sigma.items():
+        by = sigma / first.sigma[name] - 1.0
+        change[name] = float(by[np.abs(by).argmax()])
+    used = max(map(abs, change.values())) > WORTH
+    why = "" if used else TOO_LITTLE
+    order = Order(used, why, change, found.directions, found.analyses)
+    return replace(second if used else first, order=order)
 
 
 def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit | None, list[Note]]:

@@ -92,5 +92,7 @@ def _determined(fit: Fit) -> Sequence[Table]:
         "by how much a modulus would be another on ever finer meshes, from one run of a finer "
         "model at the best fit"
     )
+    if sure.order is not None:
+        note += f". Uncertainty of {sure.order.words}"
     header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest", "together, largest"]
     return [Table(TITLE, header, rows, note)]

@@ -14,7 +14,7 @@ import numpy as np
 from .. import __version__
 from ..experiments.notes import beyond_range, by_strain, strains_of, unstable_words
 from ..identification.assessment import pinned_by
-from ..identification.noise import notes_of_misfits
+from ..identification.chi_square import notes_of_noise
 from ..identification.verdicts import notes_of_verdicts
 from ..notes import Note, NoteKind, as_note, rows
 from .mesh_error import TAKEN_OUT, TOLD
@@ -88,6 +88,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
         name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
         for name, m in fit.misfits.items()
     }
+    result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
             "noise": sure.noise,
@@ -97,6 +98,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "largest_relative_mesh": _largest(sure.mesh),
             "largest_relative_total": _largest(sure.total),
             "mesh_error": TAKEN_OUT if sure.taken_out else TOLD,
+            "second_order": None if sure.order is None else sure.order.numbers,
             "smooth_beyond_noise": {
                 name: {**asdict(d), "told": d.told} for name, d in sure.discrepancy.items()
             },
@@ -196,7 +198,18 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         own = [*unstable_words(unstable), *beyond_range(strains_of(history), ends)]
         own += map(as_note, history.remarks)
         notes += [note.about(comparison.name) for note in own] if several else own
-    left = notes_of_misfits(fit.misfits)
+    # Computed data hold no noise: that less is left than is reckoned with is as it should be.
+    computed = {
+        c.name
+        for prepared in fit.setup.tests
+        if prepared.known is not None
+        for c in fit.tests[prepared.test.name].comparisons
+    }
+    left = [
+        note
+        for note in notes_of_noise(fit.noise_tests)
+        if note.kind != NoteKind.BELOW_NOISE or note.of not in computed
+    ]
     notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():
         told = [as_note(note) for note in findings.warnings]

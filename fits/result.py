@@ -14,6 +14,7 @@ from .. import __version__
 from ..errors import InputError
 from ..experiments.base import Findings, FittedTest, Output, PreparedTest
 from ..experiments.doubts import Judgement
+from ..identification.chi_square import NoiseTest, noise_tests
 from ..identification.noise import Misfit, misfits
 from ..identification.posterior import Posterior
 from ..identification.problem import FitProblem
@@ -143,6 +144,11 @@ class Fit:
     def misfits(self) -> dict[str, Misfit]:
         """What is left of every comparison beside the noise of its data, by name."""
         return misfits(self.problem, self.best.point.residual)
+
+    @cached_property
+    def noise_tests(self) -> dict[str, NoiseTest]:
+        """The same beside what chance leaves of noise, of comparisons whose noise is given."""
+        return noise_tests(self.problem, self.best.point.residual)
 
     @cached_property
     def notes(self) -> list[Note]:

@@ -14,11 +14,12 @@ from ..notes import Note, NoteKind
 from .bands import bands_of
 from .discrepancy import Discrepancy, discrepancies, notes_of_discrepancies
 from .discretisation import Limit
-from .linear import sizes_of
+from .linear import Second, sizes_of
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .propagation import LEFT, POINTS, PRIOR, along, moduli_of, posteriors_of
+from .second_order import Order
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,9 @@ class Certainty:
     of each residual the noise that as many independent ones would have. band : (2, n) MPa by
     modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
     whether the law reported is that of ever finer meshes. discrepancy : by comparison of a sheet,
-    what of its residual is too smooth for noise.
+    what of its residual is too smooth for noise. second : what it was computed
+    with beside the first derivatives, None where it is of first order. order : what was found of
+    that; None where nobody looked, because little more than noise is left.
     """
 
     noise: dict[str, float]
@@ -66,6 +69,8 @@ class Certainty:
     band: dict[str, Array] = field(default_factory=dict)
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
+    second: Second | None = None
+    order: Order | None = None
 
     @property
     def reported(self) -> Posterior | None:
@@ -106,16 +111,18 @@ def certainty(
     law: HypoelasticLaw,
     reached: Array,
     limit: Limit | None = None,
+    second: Second | None = None,
 ) -> Certainty:
     """Linear propagation of the noise of every comparison to the moduli.
 
     Parameters
     ----------
     law : that is reported. limit : of ever finer models, where it is known: what it leaves counts
-        as noise (see `Noise.of`), else what the best fit leaves.
+        as noise (see `Noise.of`), else what the best fit leaves. second : what is of second
+        order (see `Linear.of`).
     """
     noise = Noise.of(problem, best.residual if limit is None else limit.residual)
-    posterior, fine = posteriors_of(problem, best, noise, limit)
+    posterior, fine = posteriors_of(problem, best, noise, limit, second)
     strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
     first = problem.comparisons[0]
     which = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
@@ -150,6 +157,7 @@ def certainty(
         noise.rows,
         bands_of(fine or posterior, law, strains),
         discrepancy=wrong,
+        second=second,
     )
 
 

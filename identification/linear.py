@@ -1,4 +1,4 @@
-"""A fit near its optimum: what its data say of its unknowns, to first order."""
+"""A fit near its optimum: what its data say of its unknowns, by its derivatives."""
 
 from __future__ import annotations
 
@@ -20,6 +20,29 @@ SMALLEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+class Second:
+    """What the sum of the blocks' norms has of second order beside the squares of its slopes.
+
+    Parameters
+    ----------
+    added : (unknowns, unknowns) in the sizes of a `Linear`, to half of the curvature of the
+        weighted sum of squares. left : (m,) the residual of each block over its norm, zero where
+        the block's weight is its noise's: along it a norm is not curved, and noise along it does
+        not turn its slope. directions, analyses : with how many it was found.
+    """
+
+    added: Array
+    left: Array
+    directions: int
+    analyses: int
+
+    def slopes(self, problem: FitProblem, jacobian: Array) -> Array:
+        """(m, unknowns) slope of each residual's block along what is left of it."""
+        blocks = problem.blocks
+        return np.asarray(np.add.reduceat(self.left[:, None] * jacobian, blocks.starts)[blocks.of])
+
+
+@dataclass(frozen=True, eq=False)
 class Linear:
     """A fit near its optimum: least squares, in which every block weighs the inverse of its norm.
 
@@ -27,7 +50,8 @@ class Linear:
     ----------
     sizes : (unknowns,) in which they are counted. weights : (m,) roots of the weights of the
         squares. sharp, flat : (unknowns, some) directions of which the data say something, and
-        nothing. curvature : (sharp,) of half the weighted sum of squares along the former.
+        nothing. curvature : (sharp,) of half the weighted sum of squares along the former, by the
+        first derivatives; whole : (sharp, sharp) with what is added to it.
         estimator : (unknowns, m) from weighted residuals to what they move the unknowns by, less
         the sign. moved : (unknowns, m) the same of the noise of each residual.
     """
@@ -37,12 +61,15 @@ class Linear:
     sharp: Array
     flat: Array
     curvature: Array
+    whole: Array
     estimator: Array
     moved: Array
 
     @classmethod
-    def of(cls, problem: FitProblem, best: Evaluation, noise: Noise) -> Linear:
-        """At the optimum, evaluated with its Jacobian."""
+    def of(
+        cls, problem: FitProblem, best: Evaluation, noise: Noise, second: Second | None = None
+    ) -> Linear:
+        """At the optimum, evaluated with its Jacobian; second : with what is of second order."""
         assert best.jacobian is not None
         weights = np.sqrt(weights_of(problem, best.residual, noise))
         sizes = sizes_of(problem.unknowns, best.unknowns)
@@ -50,9 +77,15 @@ class Linear:
         curvature, directions = np.linalg.eigh(j.T @ j)
         good = curvature > FLAT * curvature[-1]
         sharp, flat = directions[:, good], directions[:, ~good]
-        estimator = (sharp / curvature[good]) @ sharp.T @ j.T
-        moved = estimator * (weights * noise.rows)
-        return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
+        whole, answering = np.diag(curvature[good]), j
+        if second is not None:
+            whole = whole + sharp.T @ second.added @ sharp
+            answering = j - second.left[:, None] * second.slopes(problem, j)
+        estimator, answer = (
+            sharp @ np.linalg.solve(whole, sharp.T @ one.T) for one in (j, answering)
+        )
+        moved = answer * (weights * noise.rows)
+        return cls(sizes, weights, sharp, flat, curvature[good], whole, estimator, moved)
 
     def spread_over_curvature(self, row: Array) -> float:
         """Of one number, row @ unknowns: its variance over that of weighted squares of noise one.
@@ -63,7 +96,7 @@ class Linear:
         """
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
-        curved = float(along**2 @ (1.0 / self.curvature))
+        curved = float(along @ np.linalg.solve(self.whole, along))
         return float(np.sum((scaled @ self.moved) ** 2)) / curved if curved > 0 else np.nan
 
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..notes import Note, NoteKind
 from .comparison import NoiseIs
 from .correlation import alike_in
 from .problem import FitProblem
 
 Array = NDArray[np.float64]
-
-#: A residual of so many times the noise is no noise: that of many points is near once.
-BEYOND_NOISE = 1.5
 
 
 @dataclass(frozen=True)
@@ -44,21 +39,6 @@ def misfits(problem: FitProblem, residual: Array) -> dict[str, Misfit]:
             rms, own.least_noise, getattr(own, "noise_is", "assumed"), own.unit
         )
     return found
-
-
-def notes_of_misfits(found: Mapping[str, Misfit]) -> list[Note]:
-    """Where more is left than the noise that the project gives."""
-    return [
-        Note(
-            NoteKind.ABOVE_NOISE,
-            f"the fit leaves {m.rms:.3g} {m.unit} RMS, {m.ratio:.3g} times the noise given "
-            f"({m.noise:.3g} {m.unit}): model or data are off by more than noise, and the "
-            "uncertainty reckons with what is left as if it were",
-            name,
-        )
-        for name, m in found.items()
-        if m.noise_is == "given" and m.ratio > BEYOND_NOISE
-    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..materials.forms.base import COMPONENTS, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .discretisation import Limit
-from .linear import Linear
+from .linear import Linear, Second
 from .noise import Noise
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
@@ -29,9 +29,15 @@ LEFT = 0.1
 
 
 def posteriors_of(
-    problem: FitProblem, best: Evaluation, noise: Noise, limit: Limit | None = None
+    problem: FitProblem,
+    best: Evaluation,
+    noise: Noise,
+    limit: Limit | None = None,
+    second: Second | None = None,
 ) -> tuple[Posterior, Posterior | None]:
     """The unknowns as the noise leaves them, to first order, and those of ever finer models.
+
+    second : as for `Linear.of`: to second order.
 
     The second have what may be left of the model's error in their covariance, too; None where
     the limit is not known.
@@ -42,7 +48,7 @@ def posteriors_of(
     A direction of which the data say nothing is as uncertain as a modulus of which nothing is
     known.
     """
-    linear = Linear.of(problem, best, noise)
+    linear = Linear.of(problem, best, noise, second)
     weights, sizes, moved = linear.weights, linear.sizes, linear.moved
     scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
     covariance = np.asarray(scaled * sizes[:, None] * sizes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -76,11 +76,10 @@ class Refound:
 
     @property
     def linear(self) -> Linear:
-        """The fit there, to first order."""
+        """The fit there, as its certainty has it."""
         assert self.sure.rows is not None
-        noise = Noise.of(self.problem, self.point.residual)
-        return Linear.of(self.problem, self.point, Noise(
-            noise.level, noise.alike, self.sure.rows, noise.least))  # fmt: skip
+        noise = replace(Noise.of(self.problem, self.point.residual), rows=self.sure.rows)
+        return Linear.of(self.problem, self.point, noise, self.sure.second)
 
 
 def refound(project: Project, card: Card, tests: str | Sequence[str] | None) -> Refound:

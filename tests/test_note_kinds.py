@@ -126,6 +126,7 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.ABOVE_NOISE: (
         (fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N\)"),
     ),
+    K.BELOW_NOISE: ((fits.notes_of_noise, "bubble: the fit leaves .* is given too large"),),
     K.DISCREPANCY: (
         (fits.notes_of_form, r"0\.036 mm of what the fit leaves is smooth over the whole sheet"),
     ),
@@ -137,6 +138,9 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
             fits.notes_of_profile,
             r"strain 0\.02: not closed above: the bound of the fit at 12",
         ),
+    ),
+    K.SECOND_ORDER: (
+        (fits.notes_of_order, r"second order: 1 sigma against that of the .*: G12 \+36 %"),
     ),
     K.FEW_UNITS: ((fits.notes_of_bootstrap, "one: warp: 2 specimens only: so few drawn"),),
     K.SURFACES: ((fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),),

@@ -13,7 +13,6 @@ from bubblefit.cli.fit_words import lines_of
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.identification.assessment import certainty
-from bubblefit.identification.noise import Misfit, notes_of_misfits
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.reports.html import number
 
@@ -76,10 +75,3 @@ def test_the_residual_stands_beside_the_noise(fitted) -> None:
     assert f"misfit of bubble: {left['rms']:.3g} mm RMS, {times}" in lines_of(fit, out)
     page = (out / "report.html").read_text()
     assert "Residual beside the noise" in page and f"<td>{number(left['rms'])}</td>" in page
-
-
-def test_more_than_the_noise_given_is_said() -> None:
-    (note,) = notes_of_misfits({"a": Misfit(0.31, 0.02, "given", "mm")})
-    assert note.of == "a" and "0.31 mm RMS, 15.5 times the noise given (0.02 mm)" in note
-    assert notes_of_misfits({"a": Misfit(0.021, 0.02, "given", "mm")}) == []
-    assert notes_of_misfits({"a": Misfit(0.31, 0.02, "assumed", "mm")}) == []

@@ -81,6 +81,7 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
             "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},
             "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
             "mesh_error": "told",
+                "second_order": None,
             "smooth_beyond_noise": {},
         },
         "weights": {"one": 1.0, "two": 3.0},

@@ -17,7 +17,7 @@ from bubblefit.identification.assessment import (
 from bubblefit.identification.bounds import LawBounds
 from bubblefit.identification.discretisation import Limit
 from bubblefit.identification.methods.descent import descend
-from bubblefit.identification.noise import Misfit, Noise, notes_of_misfits
+from bubblefit.identification.noise import Noise
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
 from bubblefit.identification.problem import Evaluation, FitProblem
 from bubblefit.identification.unknowns import Unknowns
@@ -136,22 +136,6 @@ def test_words_name_what_lies_on_its_bound() -> None:
     words = certainty(fit, evaluated(fit), FLAT_LAW, REACHED).undetermined
     assert "E1 touches its upper bound: the data ask for more stiffness" in words
     assert "E2 touches its positivity margin: the data ask for less stiffness" in words
-
-
-def test_more_than_the_given_noise_is_said() -> None:
-    """From one and a half times on; not of noise that is only assumed."""
-    found = {
-        "warp": Misfit(4.54, 3.0, "given", "N"),
-        "fill": Misfit(4.5, 3.0, "given", "N"),
-        "bias": Misfit(90.0, 3.0, "assumed", "N"),
-    }
-    (note,) = notes_of_misfits(found)
-    assert (note.kind, note.of) == (NoteKind.ABOVE_NOISE, "warp")
-    assert str(note) == (
-        "the fit leaves 4.54 N RMS, 1.51 times the noise given (3 N): model or data are off by "
-        "more than noise, and the uncertainty reckons with what is left as if it were"
-    )
-    assert found["fill"].ratio == 1.5 and Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf
 
 
 def test_noise_and_mesh_together() -> None:

@@ -22,10 +22,14 @@ from bubblefit.experiments.bubble.sheet_report import sheet_warnings
 from bubblefit.fits import mesh_error
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.identification.assessment import Certainty, certainty
+from bubblefit.identification.chi_square import NoiseTest
+from bubblefit.identification.chi_square import notes_of_noise as notes_of_noise_tests
 from bubblefit.identification.discrepancy import Discrepancy, notes_of_discrepancies
 from bubblefit.identification.likelihood import BOUND, Side
+from bubblefit.identification.noise import Misfit
 from bubblefit.identification.nuisance import Nuisance, NuisanceOf
 from bubblefit.identification.resampling import Group, Unit
+from bubblefit.identification.second_order import Order
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
 from bubblefit.solvers import registry
@@ -116,6 +120,17 @@ def notes_of_bootstrap(*_: Any) -> Iterable[Note]:
     units = [Unit(name, np.zeros(1, dtype=bool)) for name in "ab"]
     found: Any = SimpleNamespace(notes=())
     return Bootstrap(found, "specimens", [Group("one: warp", units)], (), 0).notes
+
+
+def notes_of_order(*_: Any) -> Iterable[Note]:
+    """Much is left, and the second derivatives say something else."""
+    return Order(True, "", {"G12": 0.36}, 3, 3).notes
+
+
+def notes_of_noise(*_: Any) -> Iterable[Note]:
+    """Half of the noise that is given."""
+    misfit = Misfit(0.01, 0.02, "given", "mm")
+    return notes_of_noise_tests({"bubble": NoiseTest(misfit, 900, 900.0, 890.0)})
 
 
 def notes_of_limit(*_: Any) -> Iterable[Note]:
