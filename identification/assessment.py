@@ -20,6 +20,7 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .propagation import LEFT, POINTS, PRIOR, along, moduli_of, posteriors_of
 from .second_order import Order
+from .specimens import differences_of_all
 
 Array = NDArray[np.float64]
 
@@ -51,10 +52,10 @@ class Certainty:
     those of ever finer meshes, with what may be left of their error; None as `mesh`. rows : (m,)
     of each residual the noise that as many independent ones would have. band : (2, n) MPa by
     modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
-    whether the law reported is that of ever finer meshes. discrepancy : by comparison of a sheet,
-    what of its residual is too smooth for noise. second : what it was computed
-    with beside the first derivatives, None where it is of first order. order : what was found of
-    that; None where nobody looked, because little more than noise is left.
+    whether the law reported is that of ever finer meshes. discrepancy : by comparison, what of a
+    sheet's residual is too smooth for noise, or of strips' alike in all specimens. second : what it
+    was computed with beside the first derivatives, None where it is of first order. order : what
+    was found of that; None where nobody looked, because little more than noise is left.
     """
 
     noise: dict[str, float]
@@ -139,6 +140,7 @@ def certainty(
     ]
     left = best.residual if limit is None else limit.residual
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
+    wrong |= differences_of_all(problem, left, best.jacobian)
     told = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
     mesh = None
     if limit is not None:

@@ -32,7 +32,8 @@ class Objective(Protocol):
     least_noise in `unit`s, to reckon with at least (its `noise_is`, a `NoiseIs`, is "assumed"
     where the objective has none); data: all that was measured. One whose neighbouring values may
     err as one also has `places`, (n, 2) mm on a sheet or (n, 1) along a curve, of each block's
-    values.
+    values; one that knows how many do, whatever is left of them, has `alike`; one
+    whose values are of several specimens has `specimens`, (m,) the number of each one's, or None.
     """
 
     @property

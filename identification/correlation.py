@@ -19,13 +19,13 @@ from .comparison import Objective
 
 Array = NDArray[np.float64]
 
-#: Rings around a point that others are compared with.
+#: Rings around a point that others are compared with, unless told.
 RINGS = 60
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
 #: Standard deviations of a correlation of independent values, which are no correlation.
 CHANCE = 2.0
-#: Of the largest extent: beyond, there are no neighbours any more.
+#: Of the largest extent: beyond, there are no neighbours any more, unless told.
 REACH = 0.5
 
 
@@ -41,15 +41,18 @@ def alike_in(objective: Objective, residual: Array) -> float:
     return alike(np.split(residual, ends), places)
 
 
-def alike(residuals: Sequence[Array], places: Sequence[Array]) -> float:
+def alike(
+    residuals: Sequence[Array], places: Sequence[Array], reach: float = REACH, rings: int = RINGS
+) -> float:
     """Number of values that err as one, 1 where they are independent.
 
     Parameters
     ----------
     residuals : blocks (n,), each of one quantity in one frame. places : (n, 2) mm or (n, 1) of
-        each.
+        each. reach : of the largest extent, beyond which there are no neighbours any more.
+        rings : of distances, up to there.
     """
-    products, pairs, asked = np.zeros(RINGS), np.zeros(RINGS), 0
+    products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
     random = np.random.default_rng(0)
     step = max(1, -(-len(residuals) // BLOCKS))
     for own, at in zip(residuals[::step], places[::step], strict=True):
@@ -57,16 +60,16 @@ def alike(residuals: Sequence[Array], places: Sequence[Array]) -> float:
             continue
         few = random.permutation(len(own))[: max(20, DISTANCES // len(own))]
         extent = float(np.ptp(at, axis=0).max())
-        ring = np.minimum(cdist(at[few], at) / (REACH * extent) * RINGS, RINGS).astype(int)
-        ring[np.arange(len(few)), few] = RINGS  # a point is no neighbour of its own
+        ring = np.minimum(cdist(at[few], at) / (reach * extent) * rings, rings).astype(int)
+        ring[np.arange(len(few)), few] = rings  # a point is no neighbour of its own
         value = own[few, None] * own
-        inside = ring < RINGS
+        inside = ring < rings
         # Every block counts alike, whatever its size.
         unit = float(np.mean(own**2))
         if not unit > 0:
             continue
-        products += np.bincount(ring[inside], value[inside] / unit, minlength=RINGS)
-        pairs += np.bincount(ring[inside], minlength=RINGS)
+        products += np.bincount(ring[inside], value[inside] / unit, minlength=rings)
+        pairs += np.bincount(ring[inside], minlength=rings)
         asked += len(few)
     if not asked:
         return 1.0

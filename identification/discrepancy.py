@@ -45,6 +45,8 @@ class Discrepancy:
     alone exceeds in one of a hundred fits. rms : of what is smooth beyond the noise's share of it,
     in `unit`s. least : of that, what the noise to reckon with leaves open of a mean of all values:
     less is no matter beside the bands (what rounding leaves of computed data is smooth, too).
+    specimens : of strips, how many were compared instead: `ratio` is then that of Hotelling's test,
+    `rms` what all of them have in common (`specimens.alike_in_all`).
     """
 
     ratio: float
@@ -52,6 +54,7 @@ class Discrepancy:
     rms: float
     unit: str
     least: float = 0.0
+    specimens: int = 0
 
     @property
     def told(self) -> bool:
@@ -153,15 +156,23 @@ def _shapes(degree: int) -> int:
 def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
     """Where more is left than noise can be."""
     return [
-        Note(
-            NoteKind.DISCREPANCY,
-            f"{one.rms:.2g} {one.unit} of what the fit leaves is smooth over the whole sheet "
-            f"({one.ratio:.3g} times the power that noise has in such shapes; chance gives "
-            f"{one.largest:.3g} in one of a hundred): the form of the law or the model is wrong "
-            "(thickness option, axes, pressures, a sheet taken for flat), and the moduli are off "
-            "by more than their bands say",
-            name,
-        )
-        for name, one in found.items()
-        if one.told
+        Note(NoteKind.DISCREPANCY, _words(one), name) for name, one in found.items() if one.told
     ]
+
+
+def _words(one: Discrepancy) -> str:
+    if one.specimens:
+        return (
+            f"{one.rms:.2g} {one.unit} of what the fit leaves is alike in all {one.specimens} "
+            f"specimens (Hotelling's F is {one.ratio:.3g}; chance gives {one.largest:.3g} in one "
+            "of a hundred): the form of the law or the model is wrong (moduli that depend on more "
+            "than their own strain, gauge lengths, a preload), and the moduli are off by more "
+            "than their bands say"
+        )
+    return (
+        f"{one.rms:.2g} {one.unit} of what the fit leaves is smooth over the whole sheet "
+        f"({one.ratio:.3g} times the power that noise has in such shapes; chance gives "
+        f"{one.largest:.3g} in one of a hundred): the form of the law or the model is wrong "
+        "(thickness option, axes, pressures, a sheet taken for flat), and the moduli are off "
+        "by more than their bands say"
+    )

@@ -62,7 +62,8 @@ class Noise:
 
         A misfit of zero (computed data) does not mean that a measurement would determine
         everything. Neighbours that err as one (`correlation.alike`) count as one; a misfit that is
-        less than the noise does not tell them, and is taken for white.
+        less than the noise does not tell them, and is taken for white unless the objective knows
+        better (`alike`, of the specimens behind a load curve).
         """
         scale = problem.scale
         level, together = {}, {}
@@ -72,6 +73,8 @@ class Noise:
             level[name], together[name] = max(misfit.noise, misfit.rms), 1.0
             if misfit.rms > misfit.noise:
                 together[name] = alike_in(problem.comparisons[k].objective, residual[own])
+            known = getattr(problem.comparisons[k].objective, "alike", 1.0)
+            together[name] = max(together[name], known)
             rows[own] = level[name] * np.sqrt(together[name]) / scale[own]
             least[own] = misfit.noise / scale[own]
         known = [n.weight for n in problem.unknowns.nuisance.all if n.prior is not None]

@@ -124,7 +124,7 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.ALONE: ((fits.notes_of_fit, "two alone does not determine E2 "),),
     K.INVERSE_CRIME: ((fits.notes_of_bubble, "computed by the very model that is fitted to them"),),
     K.ABOVE_NOISE: (
-        (fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N\)"),
+        (fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
     ),
     K.BELOW_NOISE: ((fits.notes_of_noise, "bubble: the fit leaves .* is given too large"),),
     K.DISCREPANCY: (

@@ -12,6 +12,7 @@ import numpy as np
 from ...data.curves import DIRECTIONS, LoadCurve
 from ...models.uniaxial import GRIP_DISTANCE, WIDTH
 from ..candidates import Candidate, Planning, Precision
+from .independent import PLACES
 from .prepared import PreparedStrips, loads_to_match
 from .strip import Strip
 from .test import StripsTest
@@ -21,9 +22,8 @@ ANGLES = (30.0, 45.0, 60.0)
 #: Where the project has no strips: mm of the gauge, increments and values of a curve, specimens.
 GAUGE, INCREMENTS, SPECIMENS = 20.0, 20, 3
 #: Of the largest load: scatter of specimens where none is known. That of the published strips is
-#: 2, 6 and 4 % (examples/uniaxial-valmex7318/curves.csv). A specimen is stiffer or softer along
-#: much of its curve: so many values of it are taken to be independent.
-SCATTER, INDEPENDENT = 0.04, 5
+#: 2, 6 and 4 % (examples/uniaxial-valmex7318/curves.csv).
+SCATTER = 0.04
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _noise(
     if planning.noise is not None:
         return planning.noise
     if template is None:
-        return Precision(SCATTER * largest, 1.0, INDEPENDENT).at(values)
+        return SCATTER * largest * math.sqrt(values / PLACES)
     own = {d: _precision(d, template, planning).at(values) for d in template.test.matched}
     if pull.direction in own:
         return own[pull.direction]
@@ -135,7 +135,8 @@ def _noise(
 def _precision(direction: str, template: PreparedStrips, planning: Planning) -> Precision:
     """Of the project's own strips of a direction, one specimen."""
     told = planning.precision[template.part(direction)]
+    specimens = len(template.test.strips[direction].curves) or template.test.specimens or 1
     if template.test.match_by != "points":
-        return told
-    specimens = len(template.test.strips[direction].curves)
+        # One curve of all of them: one of them says so much less.
+        return replace(told, alike=told.alike * specimens)
     return replace(told, values=max(1, told.values // specimens))

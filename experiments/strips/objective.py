@@ -27,6 +27,8 @@ class LoadObjective:
     scale : N: 1 for errors in N (Eq. 3.7), the largest load for relative errors.
     weight : of the block in e.
     least_noise : N, to reckon with at least; noise_is : where it is from.
+    alike : how many of the loads err as one, at least, because their specimen is stiffer or softer.
+    specimens : (n,) number of the specimen of each load, None where that is not known.
 
     Raises
     ------
@@ -44,6 +46,8 @@ class LoadObjective:
         weight: float = 1.0,
         least_noise: float = 0.0,
         noise_is: NoiseIs = "assumed",
+        alike: float = 1.0,
+        specimens: ArrayLike | None = None,
     ) -> None:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
@@ -57,6 +61,8 @@ class LoadObjective:
         self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
         self.sizes = (len(self.load),)
         self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
+        self.specimens = None if specimens is None else np.asarray(specimens)
+        self.alike = min(max(alike, 1.0), float(len(self.load)))
         self._unit = scale * np.sqrt(len(self.load)) / weight
 
     @property

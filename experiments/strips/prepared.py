@@ -16,6 +16,7 @@ from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Rea
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
 from .doubts import doubts_of_strips
+from .independent import loads_alike
 from .objective import Array, LoadObjective
 from .strip import Strip
 from .test import StripsTest, reach_of
@@ -139,16 +140,21 @@ class PreparedStrips:
     ) -> LoadObjective:
         test, strip = self.test, self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
+        alike = loads_alike(strip, len(load), test.noise, test.specimens)
+        whose = strip.specimen_of if test.match_by == "points" else None
         mask = masks.get(self.part(direction))
         if mask is not None:
             elongation, load = elongation[mask], load[mask]
+            whose = None if whose is None else whose[mask]
         largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
         scale = largest if relative else 1.0
         weight = share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
-        return LoadObjective(model.elongations, elongation, load, scale, weight, *noise)
+        return LoadObjective(
+            model.elongations, elongation, load, scale, weight, *noise, alike, whose
+        )
 
     def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
         """The strips that a fit matched, each with its model, objective and history."""

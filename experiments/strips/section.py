@@ -59,6 +59,7 @@ class CurvesSection(Section):
     comment: str = "#"
     order: Annotated[int, Field(ge=1, le=10)] = 4
     through_origin: bool = True
+    specimens: Annotated[int, Field(ge=1, le=10000)] | None = None
 
 
 class WeightsSection(Section):

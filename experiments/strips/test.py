@@ -36,7 +36,7 @@ class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
 
     `strips` and `weights` by direction (warp, fill, bias). `noise` (N) of one measured load, None
-    where it is not given.
+    where it is not given; `specimens` of each direction, None where the files tell or nobody does.
     """
 
     name: str
@@ -51,6 +51,7 @@ class StripsTest:
     weights: Mapping[str, float]
     objective: Unit
     noise: float | None = None
+    specimens: int | None = None
     kind: str = "strips"
 
     @property
@@ -145,6 +146,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         weights=weights,
         objective=section.objective,
         noise=section.noise,
+        specimens=section.data.specimens,
     )
 
 

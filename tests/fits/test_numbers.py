@@ -75,15 +75,16 @@ def test_everything_of_two_tests(together: bf.Fit) -> None:
         "versions": versions(),
         "uncertainty": {
             "noise": sure.noise,
-            "values_that_err_as_one": {"one: warp": 1.0, "one: fill": 1.0, "two: warp": 1.0},
+            "values_that_err_as_one": sure.alike,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},
             "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
             "mesh_error": "told",
-                "second_order": None,
+            "second_order": None,
             "smooth_beyond_noise": {},
         },
+        "noise_given": {},
         "weights": {"one": 1.0, "two": 3.0},
     }
 
