@@ -38,8 +38,8 @@ SETTLED, MOST_ANALYSES = 0.02, 5
 FIRST = 0.25
 #: How a side ends that does not pass the threshold.
 BOUND = "bound"
-FAILED = "no analysis ends well beyond"
-FAR = "still below after the last step"
+FAILED = "no analysis"
+FAR = "too many steps"
 
 
 def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
@@ -96,7 +96,7 @@ def profile_side(
     Parameters
     ----------
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
-    sign : 1 upwards, -1 downwards. sigma : one standard deviation to first order. tell : is called
+    sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : is called
         after each place.
     """
     before, end = problem.analyses, extreme(problem.unknowns, row, sign)

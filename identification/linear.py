@@ -51,7 +51,7 @@ class Linear:
     sizes : (unknowns,) in which they are counted. weights : (m,) roots of the weights of the
         squares. sharp, flat : (unknowns, some) directions of which the data say something, and
         nothing. curvature : (sharp,) of half the weighted sum of squares along the former, by the
-        first derivatives; whole : (sharp, sharp) with what is added to it.
+        first derivatives.
         estimator : (unknowns, m) from weighted residuals to what they move the unknowns by, less
         the sign. moved : (unknowns, m) the same of the noise of each residual.
     """
@@ -61,7 +61,6 @@ class Linear:
     sharp: Array
     flat: Array
     curvature: Array
-    whole: Array
     estimator: Array
     moved: Array
 
@@ -85,7 +84,7 @@ class Linear:
             sharp @ np.linalg.solve(whole, sharp.T @ one.T) for one in (j, answering)
         )
         moved = answer * (weights * noise.rows)
-        return cls(sizes, weights, sharp, flat, curvature[good], whole, estimator, moved)
+        return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
 
     def spread_over_curvature(self, row: Array) -> float:
         """Of one number, row @ unknowns: its variance over that of weighted squares of noise one.
@@ -96,7 +95,7 @@ class Linear:
         """
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
-        curved = float(along @ np.linalg.solve(self.whole, along))
+        curved = float(along**2 @ (1.0 / self.curvature))
         return float(np.sum((scaled @ self.moved) ** 2)) / curved if curved > 0 else np.nan
 
 

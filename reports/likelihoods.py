@@ -1,4 +1,4 @@
-"""Profile likelihoods of moduli beside what they are to first order."""
+"""Profile likelihoods of moduli beside what one standard deviation says."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COLUMNS, ROOM = 3, 1.6
 class ProfilePanel:
     """One modulus at one strain: MPa, -2 log L; ends None where the curve does not pass the line.
 
-    sigma : MPa, one standard deviation to first order; band : MPa, within the bounds.
+    sigma : MPa, one standard deviation; band : MPa, within the bounds.
     """
 
     title: str
@@ -50,7 +50,7 @@ def plot_likelihoods(path: Path | str, panels: Sequence[ProfilePanel], threshold
     for axes, panel in zip(every, panels, strict=False):
         first, last = min(panel.values), max(panel.values)
         around = np.linspace(first, last, 200)
-        (handles["to first order, without bounds"],) = axes.plot(
+        (handles["by the 1 sigma of the fit"],) = axes.plot(
             around, ((around - panel.best) / panel.sigma) ** 2, "--", color=VERMILION, linewidth=1.2
         )
         (handles["profile"],) = axes.plot(

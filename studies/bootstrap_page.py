@@ -11,7 +11,7 @@ from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Picture, Report, Section, Table, write_report
+from ..reports import Picture, Report, Section, Table, percent, write_report
 from ..reports.bootstraps import plot_bootstrap
 from ..writing import replacing, write_text
 from .bootstrap_record import SAMPLES
@@ -39,7 +39,7 @@ def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
 
 
 def _page(done: Bootstrap) -> Report:
-    told = ", ".join(f"{name} {100 * own:.2g} %" for name, (own, _) in done.sigma.items())
+    told = ", ".join(f"{name} {percent(own)}" for name, (own, _) in done.sigma.items())
     caption = (
         f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
         "band by the noise alone"
@@ -76,9 +76,7 @@ def _page(done: Bootstrap) -> Report:
 
 
 def _sigmas(done: Bootstrap) -> Table:
-    rows: list[list[object]] = [
-        [name, *(f"{100 * value:.2g} %" for value in done.sigma[name])] for name in COMPONENTS
-    ]
+    rows: list[list[object]] = [[name, *map(percent, done.sigma[name])] for name in COMPONENTS]
     header = ["modulus", "1 sigma of the samples", "of the fit, by noise"]
     return Table("How far the moduli scatter", header, rows, METHOD, text=(1, 2))
 

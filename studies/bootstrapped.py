@@ -19,6 +19,7 @@ from ..identification.resampling import Group
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
+from ..reports import percent
 from .bootstrap_record import Sample
 from .refound import Refound
 
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 
 #: Units of a group, below which their percentiles say little; samples, likewise.
 FEW, FEW_SAMPLES = 5, 40
+#: Of a number: what differs by less does not differ.
+ROUNDING = 1e-9
 #: Strains of each modulus in the table.
 PLACES = 21
 METHOD = (
@@ -120,7 +123,9 @@ class Bootstrap:
         turn[: own.size, : own.size] = own.to_coefficients
         each = self.unknowns @ turn.T
         sigma = each.std(axis=0, ddof=1)
-        moved = np.where(sigma > 0, sigma, 1.0)
+        # What lies on a bound in every sample differs by rounding.
+        sigma = np.where(sigma > ROUNDING * np.abs(each).max(axis=0), sigma, 0.0)
+        moved = np.where(sigma > 0, sigma, np.inf)
         away = (each - each.mean(axis=0)) / moved
         correlation = away.T @ away / (len(each) - 1)
         names = list(known.labels)
@@ -207,7 +212,7 @@ class Bootstrap:
             f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
             "1 sigma, root mean square along the strain: "
             + ", ".join(
-                f"{name} {100 * own:.2g} % (fit {100 * of:.2g} %)"
+                f"{name} {percent(own)} (fit {percent(of)})"
                 for name, (own, of) in self.sigma.items()
             ),
         ]

@@ -40,8 +40,8 @@ def write_profiles(found: Profiles, folder: Path) -> Path:
 def _page(found: Profiles) -> Report:
     first = found.each[0]
     caption = (
-        "-2 log L of each modulus held at a value, everything else fitted anew (dots), and to "
-        "first order without the bounds of the fit (dashed); the horizontal line is the threshold "
+        "-2 log L of each modulus held at a value, everything else fitted anew (dots), and by the "
+        "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
         f"of {100 * LEVEL:.0f} %"
     )
     return Report(
@@ -64,7 +64,7 @@ def _page(found: Profiles) -> Report:
 
 def _ends(found: Profiles) -> Table:
     header = [
-        "modulus", "MPa", f"{100 * LEVEL:.0f} % from, MPa", "to, MPa", "to first order from, MPa",
+        "modulus", "MPa", f"{100 * LEVEL:.0f} % from, MPa", "to, MPa", "band of the fit from, MPa",
         "to, MPa", "upper over lower distance", "analyses",
     ]  # fmt: skip
     rows = [_row(one) for one in found.each]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..identification.bands import LEVEL
-from ..identification.likelihood import BOUND, THRESHOLD, Side
+from ..identification.likelihood import BOUND, FAILED, THRESHOLD, Side
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 
@@ -24,9 +24,9 @@ BETTER = -0.5
 METHOD = (
     "The modulus is held at values ever farther from its best and everything else is fitted anew, "
     "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
-    "by, scaled so that to first order it passes the threshold where the band of the fit ends "
-    "(noise alone, neighbouring values that err as one counted as one; the error of the mesh is "
-    "in neither)."
+    "by, scaled so that where nothing is curved it passes the threshold 1.96 of the fit's 1 sigma "
+    "away (noise alone, neighbouring values that err as one counted as one; the error of the mesh "
+    "is in neither)."
 )
 
 
@@ -34,7 +34,7 @@ METHOD = (
 class Profile:
     """Of one modulus at one strain, MPa.
 
-    best : of the fit. sigma : one standard deviation to first order. band : its band by the noise,
+    best : of the fit. sigma : one standard deviation of the fit. band : its band by the noise,
     within the bounds. below, above : the profile to either side. allowed : the least and the
     largest value that the bounds of the fit allow.
     """
@@ -88,7 +88,7 @@ class Profile:
         )
         said = (
             f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
-            f"(to first order {self.band[0]:.4g} to {self.band[1]:.4g})"
+            f"(the fit's band {self.band[0]:.4g} to {self.band[1]:.4g})"
         )
         skew = self.asymmetry
         if skew is not None and not 1 / ASYMMETRIC <= skew <= ASYMMETRIC:
@@ -105,14 +105,12 @@ class Profile:
         told = []
         for word, side in (("below", self.below), ("above", self.above)):
             if side.why:
-                told.append(
-                    Note(
-                        NoteKind.NOT_CLOSED,
-                        f"not closed {word}: {_why(side)} at {side.values[-1]:.4g} MPa, where -2 "
-                        f"log L is {side.ratios[-1]:.2g} of {THRESHOLD:.3g}",
-                        self.name,
-                    )
+                ratio = round(side.ratios[-1], 3) + 0.0
+                words = (
+                    f"not closed {word}: {_why(side)}; -2 log L is {ratio:.2g} of "
+                    f"{THRESHOLD:.3g} there"
                 )
+                told.append(Note(NoteKind.NOT_CLOSED, words, self.name))
         if min(*self.below.ratios, *self.above.ratios) < BETTER:
             words = "another optimum fits the data better than the card's: fit with more starts"
             told.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
@@ -128,9 +126,9 @@ class Profile:
             "MPa": self.best,
             "lower_MPa": self.ends[0],
             "upper_MPa": self.ends[1],
-            "first_order_sigma_MPa": self.sigma,
-            "first_order_lower_MPa": self.band[0],
-            "first_order_upper_MPa": self.band[1],
+            "fit_sigma_MPa": self.sigma,
+            "fit_lower_MPa": self.band[0],
+            "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
             "not_closed": {
                 word: side.why
@@ -144,7 +142,12 @@ class Profile:
 
 
 def _why(side: Side) -> str:
-    return "the bound of the fit" if side.why == BOUND else side.why
+    at = f"{side.values[-1]:.4g} MPa"
+    if side.why == BOUND:
+        return f"it meets the bound of the fit, {at}"
+    if side.why == FAILED:
+        return f"beyond {at} no analysis ends well"
+    return f"the last step ends at {at}"
 
 
 def _end(end: float | None, side: Side, limit: float) -> str:
@@ -174,7 +177,7 @@ class Profiles:
 
     def table(self) -> pd.DataFrame:
         """A row for every value that was held: modulus, strain, MPa, minus_2_log_L,
-        first_order (what it would be if nothing were curved)."""
+        by_sigma (what it would be by the fit's 1 sigma, if nothing were curved)."""
         import pandas as pd
 
         found = []
@@ -187,7 +190,7 @@ class Profiles:
                         "strain": one.strain,
                         "MPa": values,
                         "minus_2_log_L": ratios,
-                        "first_order": ((values - one.best) / one.sigma) ** 2,
+                        "by_sigma": ((values - one.best) / one.sigma) ** 2,
                     }
                 )
             )

@@ -136,7 +136,7 @@ CASES: Mapping[NoteKind, tuple[tuple[Maker, str], ...]] = {
     K.NOT_CLOSED: (
         (
             fits.notes_of_profile,
-            r"strain 0\.02: not closed above: the bound of the fit at 12",
+            r"strain 0\.02: not closed above: it meets the bound of the fit, 12",
         ),
     ),
     K.SECOND_ORDER: (

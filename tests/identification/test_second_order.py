@@ -66,7 +66,7 @@ def test_curvature_is_that_of_the_objective(wrong) -> None:
     fit, best, noise = wrong
     second = second_of(fit, best, replace(noise, least=0 * noise.least))
     linear = Linear.of(fit, best, replace(noise, least=0 * noise.least))
-    back = linear.sharp @ linear.whole @ linear.sharp.T + second.added
+    back = (linear.sharp * linear.curvature) @ linear.sharp.T + second.added
     for k in range(3):
         step = np.zeros(3)
         step[k] = 1e-4 * linear.sizes[k]  # the sheet nearly folds: a larger step sees another

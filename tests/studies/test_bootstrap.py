@@ -13,6 +13,7 @@ from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
+from bubblefit.reports import percent
 from bubblefit.studies import bootstrap as module
 from bubblefit.studies.bootstrap import MOST, bootstrap
 from bubblefit.studies.bootstrapped import Bootstrap
@@ -175,7 +176,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert (said["samples"], said["over"], said["seed"]) == (5, "specimens", 4)
     assert said["groups"]["one: fill"] == ["one: fill, specimen a", "one: fill, specimen b"]
     assert f"; {said['analyses']} analyses" in done.output
-    sigma = f"E1 {100 * said['sigma_relative']['E1']:.2g} % (fit "
+    sigma = f"E1 {percent(said['sigma_relative']['E1'])} (fit "
     page = (folder / "report.html").read_text()
     assert sigma in done.output and sigma[:-6] in page
     table = pd.read_csv(folder / "bootstrap.csv")

@@ -79,7 +79,9 @@ def test_what_no_test_knows_is_not_closed(tmp_path: Path) -> None:
     kinds = [note.kind for note in found.notes]
     assert kinds == [NoteKind.NOT_THE_CARD, NoteKind.NOT_CLOSED, NoteKind.NOT_CLOSED]
     assert "moved E1 by -8.3 %" in found.notes[0]
-    assert found.notes[1].startswith("not closed below: the bound of the fit at 5 MPa")
+    assert found.notes[1].startswith(
+        "not closed below: it meets the bound of the fit, 5 MPa; -2 log L is 0 of"
+    )
 
 
 def test_words_of_what_is_uneven() -> None:
@@ -129,7 +131,7 @@ def test_the_command(tmp_path: Path) -> None:
     own = table[(table["modulus"] == "E1") & (table["strain"] == 0.04)]
     np.testing.assert_allclose(own["MPa"], first["curve_MPa"], rtol=1e-8)
     np.testing.assert_allclose(own["minus_2_log_L"], first["curve_minus_2_log_L"], rtol=1e-8)
-    np.testing.assert_allclose(own["first_order"], own["minus_2_log_L"], atol=0.01)
+    np.testing.assert_allclose(own["by_sigma"], own["minus_2_log_L"], atol=0.01)
     words = f"E1 at strain 0.04: 330 MPa, 95 % from {first['lower_MPa']:.4g} to "
     assert words in done.output and words in (folder / "report.html").read_text()
     assert said["analyses"] > sum(one["analyses"] for one in said["profiles"])
