@@ -81,8 +81,10 @@ def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
     among the comparisons as their independent values are.
     """
     given: dict[str, tuple[Misfit, int, float]] = {}
-    total = 0.0
-    for k, (name, misfit) in enumerate(misfits(problem, residual).items()):
+    total, every = 0.0, misfits(problem, residual)
+    if not any(misfit.noise_is == "given" for misfit in every.values()):
+        return {}
+    for k, (name, misfit) in enumerate(every.items()):
         own = residual[problem.rows(k)]
         independent = len(own) / alike_in(problem.comparisons[k].objective, own)
         total += independent

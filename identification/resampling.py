@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .problem import FitProblem
 
 Array = NDArray[np.float64]
@@ -66,12 +67,16 @@ def rows_of(problem: FitProblem, points: Mapping[str, NDArray[np.bool_]]) -> NDA
 
     Raises
     ------
-    AttributeError : the objective of a comparison does not say it (`of_points`).
+    InputError : the objective of a comparison does not say it (`of_points`).
     """
     found = np.zeros(len(problem.blocks.of), dtype=bool)
     for k, comparison in enumerate(problem.comparisons):
         mask = points.get(comparison.name)
-        if mask is not None:
-            of_points = comparison.objective.of_points  # type: ignore[attr-defined]
-            found[problem.rows(k)] = of_points(mask)
+        if mask is None:
+            continue
+        of_points = getattr(comparison.objective, "of_points", None)
+        if of_points is None:
+            said = f"{comparison.name} does not tell which of its values are of which part"
+            raise InputError(None, "--over", said)
+        found[problem.rows(k)] = of_points(mask)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -162,6 +163,16 @@ def test_what_cannot_be_meant(tmp_path: Path, given: dict, said: str) -> None:
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
     with pytest.raises(InputError, match=said):
         bootstrap(project, **{"over": "specimens", "card": CARD, "tests": "one", **given})
+
+
+def test_values_of_no_known_part(tmp_path: Path) -> None:
+    """A kind of another distribution may not tell; a complaint says which test."""
+    project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
+    problem = module.refound(project, CARD, "one").problem
+    (warp, _) = problem.comparisons
+    warp.objective = SimpleNamespace(sizes=warp.objective.sizes)  # type: ignore[assignment]
+    with pytest.raises(InputError, match="--over: one: warp does not tell which"):
+        module.rows_of(problem, {"one: warp": np.ones(22, dtype=bool)})
 
 
 def test_the_command(tmp_path: Path) -> None:
