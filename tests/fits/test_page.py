@@ -248,9 +248,10 @@ def test_the_answer_in_words(
 
 
 def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Report, Told]) -> None:
-    """One standard deviation of a constant modulus E is noise / sqrt(sum x^2), x the load over E.
+    """One standard deviation of a constant modulus E is noise / sqrt(mean x^2), x the load over E.
 
-    The noise is the misfit or the specimens' scatter about their polynomial, if that is larger.
+    The noise is the misfit or the specimens' scatter about their polynomial, if that is larger. The
+    loads of two specimens that differ by a factor count as one.
     """
     fit, (found, told) = together, written
     determined = titled(found, "What the data determine")
@@ -262,7 +263,11 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
             noise[prepared.part(strip.direction)] = max(strip.rms, strip.strip.scatter)
-    noises = ", ".join(f"{value:.2g} N ({name})" for name, value in noise.items())
+    loads = {name: len(points(*name.split(": "))[0]) for name in noise}
+    noises = ", ".join(
+        f"{value:.2g} N ({name}, {loads[name]} neighbouring values err as one)"
+        for name, value in noise.items()
+    )
     shown = {row[0]: row[1:] for row in left.rows}
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
@@ -286,7 +291,7 @@ def test_what_is_determined_in_closed_form(together: bf.Fit, written: tuple[Repo
         test, direction = part.split(": ")
         strain, _ = points(test, direction)
         modulus = fit.law.beta[11 if direction == "warp" else 7]
-        alone[part] = value / np.sqrt(np.sum((20 * modulus * strain) ** 2))
+        alone[part] = value / np.sqrt(np.mean((20 * modulus * strain) ** 2))
     from_one, from_two = alone["one: warp"], alone["two: warp"]
     pinned = fit.result["pinned"]
     for source, name, sigma in (
