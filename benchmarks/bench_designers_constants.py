@@ -13,6 +13,7 @@ from pathlib import Path
 import bubblefit as bf
 from bubblefit.errors import InputError
 from bubblefit.materials.designers.of_law import constants_of_law
+from bubblefit.materials.designers.rows import spread_of
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bend-valmex7318" / "project.toml"
 SHEAR = 0.05
@@ -30,10 +31,9 @@ def main() -> None:
             print(f"{name:10s}{error.problem}")
             continue
         c = found.constants
-        every = [c, *(other.constants for other in found.others)]
+        ends = spread_of((found.evaluation, *found.others))
         parts = [
-            f"{words} {getattr(c, key):.3g} ({min(getattr(o, key) for o in every):.3g} to "
-            f"{max(getattr(o, key) for o in every):.3g})"
+            f"{words} {getattr(c, key):.3g} ({ends[key][0]:.3g} to {ends[key][1]:.3g})"
             for key, words in NAMES.items()
         ]
         print(f"{name:10s}{', '.join(parts)}, G {c.shear:.3g} ({found.shear[0]:.3g} to "

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.data.biaxial.ratios import RATIOS, shares
 from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.materials.designers.ratios import RATIOS, shares
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh

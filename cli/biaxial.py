@@ -8,7 +8,7 @@ from typing import cast
 
 import click
 
-from .arguments import DATA, PROJECT, TESTS, out_option
+from .arguments import AS_JSON, DATA, OVERWRITE, PROJECT, TESTS, out_option
 from .ending import written_to
 from .examples import examples
 from .exits import exits
@@ -36,8 +36,8 @@ UNLOADED = {"8": False, "10": True}
 @click.option("--ratio", "ratios", multiple=True, metavar="W:F", help="Only these; several.  [all]")
 @out_option("out/NAME-biaxial")
 @DATA
-@click.option("--overwrite", is_flag=True, help="Replace what the output folder holds.")
-@click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout.")
+@OVERWRITE
+@AS_JSON
 @exits
 def command(
     project: Path,

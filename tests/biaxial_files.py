@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from bubblefit.data.biaxial.ratios import shares
 from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.materials.designers.ratios import shares
 from bubblefit.materials.law import HypoelasticLaw
 
 FIVE = ("1:1", "2:1", "1:2", "1:0", "0:1")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...materials.designers.ratios import RATIOS
 from .cycles import Cycle, find_cycles
-from .ratios import RATIOS
 from .table import BiaxialTable
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class BiaxialPath:
                 f"{highest:g} kN/m; its loading goes from {larger.min():.4g} to {larger.max():.4g}"
             )
             raise InputError(self.table.path, "", problem)
-        return BiaxialPath(self.table, self.cycle, self.cycles, self.load[keep], self.strain[keep])
+        return replace(self, load=self.load[keep], strain=self.strain[keep])
 
     def thinned(self, most: int) -> BiaxialPath:
         """At most so many rows, evenly spread over the larger load, both ends among them."""
@@ -74,7 +74,7 @@ class BiaxialPath:
         wanted = np.linspace(larger[0], larger[-1], most)
         rows = np.unique(np.clip(np.searchsorted(larger, wanted), 0, len(larger) - 1))
         rows[-1] = len(larger) - 1
-        return BiaxialPath(self.table, self.cycle, self.cycles, self.load[rows], self.strain[rows])
+        return replace(self, load=self.load[rows], strain=self.strain[rows])
 
 
 def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:

@@ -3,37 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
-from ...errors import InputError
+from ...materials.designers.ratios import RATIOS, shares
 
-#: The five of which designers' constants are made.
-RATIOS = ("1:1", "2:1", "1:2", "1:0", "0:1")
 #: Those that a pair of loads may be taken for.
 KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 #: Degrees between the direction of a pair of loads and that of a ratio: no more than it.
 NEAR = 4.0
-
-_RATIO = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$")
-
-
-def shares(ratio: str) -> tuple[float, float]:
-    """Loads along warp and fill where the larger is 1.
-
-    >>> shares("1:2"), shares("2/1")
-    ((0.5, 1.0), (1.0, 0.5))
-
-    Raises
-    ------
-    InputError : no such ratio.
-    """
-    found = _RATIO.match(ratio)
-    pair = [float(text.replace(",", ".")) for text in found.groups()] if found else [0.0]
-    if not 0 < max(pair) < math.inf:
-        problem = f"expected a load ratio such as 2:1 (warp to fill), got {ratio[:40]!r}"
-        raise InputError(None, "ratio", problem)
-    return pair[0] / max(pair), pair[1] / max(pair)
 
 
 def plain_ratio(ratio: str) -> str:

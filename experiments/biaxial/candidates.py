@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,11 +11,12 @@ from numpy.typing import NDArray
 
 from ...data.biaxial.cycles import Cycle
 from ...data.biaxial.paths import BiaxialPath
-from ...data.biaxial.ratios import RATIOS, shares
 from ...data.biaxial.table import BiaxialTable
 from ...data.frames import FrameSource
 from ...errors import SolverFailure
+from ...materials.biaxial_reach import largest_load
 from ...materials.biaxial_response import biaxial_response
+from ...materials.designers.ratios import RATIOS, shares
 from ...materials.law import HypoelasticLaw
 from ..candidates import Candidate, Planning, Precision
 from .objective import EXTENSOMETER, PERCENT
@@ -34,8 +34,6 @@ FURTHER = ("1:5", "5:1")
 LOADS, INDEPENDENT = 20, 5
 #: Of the load at which a strain is at its end: where a path begins.
 PRESTRESS = 0.05
-#: kN/m: no fabric carries more. Halvings by which the end is found.
-MOST, HALVINGS = 1000.0, 40
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
@@ -72,8 +70,9 @@ def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> Pre
         weight=1.0,
         data=BiaxialData((table,), (), (path,)),
         section=section,
+        noise=_noise(own, planning) / PERCENT,
     )
-    return PreparedBiaxial(replace(test, noise=_noise(own, planning) / PERCENT))
+    return PreparedBiaxial(test)
 
 
 def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
@@ -93,13 +92,7 @@ def _end(law: HypoelasticLaw, ends: Array, ratio: str, thickness: float) -> floa
     ------
     SolverFailure : no load at all is carried.
     """
-    low, high = 0.0, MOST
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        loads = np.outer(np.linspace(0.0, middle, LOADS + 1)[1:], shares(ratio))
-        found = biaxial_response(law, loads, thickness)
-        inside = found.reached == LOADS and bool((found.strain <= ends[:2]).all())
-        low, high = (middle, high) if inside else (low, middle)
+    low = largest_load(law, thickness, [shares(ratio)], ends[:2])
     if not low > 0:
         raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")
     return low

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...data.biaxial.paths import BiaxialPath
-from ...data.biaxial.ratios import nearest_ratio, shares
+from ...data.biaxial.ratios import nearest_ratio
+from ...materials.designers.ratios import shares
 from ..doubts import Doubt, Expected
 from .test import BiaxialTest
 

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...materials.designers.linear import POINTS, Evaluation, Options
+from ...materials.designers.linear import POINTS, Options
+from ...materials.designers.rows import row_of
 from ...notes import rows
 from ...reports import BiaxialPanel, plot_biaxial
 from ...writing import replacing
@@ -42,28 +43,7 @@ def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
     named = [("chosen", found.chosen), *(("", one) for one in found.others)]
     named += [(f"{which} cycle", one) for which, one in (("first", found.first),
               ("last", found.last)) if one is not None]  # fmt: skip
-    return pd.DataFrame([{"what": what, **_row(one)} for what, one in named])
-
-
-def _row(one: Evaluation) -> dict[str, Any]:
-    c, o = one.constants, one.options
-    direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
-    return {
-        "minimise": o.minimise,
-        "reciprocal": o.reciprocal,
-        "unloaded_yarns": o.unloaded,
-        "ratios": " ".join(o.ratios) or "all",
-        "paths": one.paths,
-        "E_warp_kN_per_m": c.warp,
-        "E_fill_kN_per_m": c.fill,
-        "nu_warp": c.nu_warp,
-        "nu_fill": c.nu_fill,
-        "A_warp_kN_per_m": direct[0, 0],
-        "A_fill_kN_per_m": direct[1, 1],
-        "A_warp_fill_kN_per_m": direct[0, 1],
-        "A_fill_warp_kN_per_m": direct[1, 0],
-        "squares_percent2": one.squares,
-    }
+    return pd.DataFrame([{"what": what, **row_of(one)} for what, one in named])
 
 
 def line_table(found: BiaxialEvaluation) -> pd.DataFrame:

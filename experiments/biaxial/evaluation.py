@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from ...data.biaxial.paths import BiaxialPath, evaluated_paths
+from ...data.biaxial.paths import BiaxialPath, Which, evaluated_paths
 from ...errors import InputError
 from ...materials.designers.linear import (
     USUAL,
@@ -13,15 +13,19 @@ from ...materials.designers.linear import (
     LinearPath,
     Options,
     evaluate,
+    evaluate_or_none,
     evaluate_others,
     line_of,
 )
+from ...materials.designers.rows import spread_of
 from ...notes import Note, NoteKind
 from .kept import KeptStrain, kept_strains
 from .test import BiaxialTest
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
 WIDE = 1.1
+#: Of what a spread is told.
+NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "nu fill"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +71,8 @@ class BiaxialEvaluation:
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
         """Least and largest of each constant over all options."""
-        every = [one.constants for one in (self.chosen, *self.others)]
-        named = {"E warp": "warp", "E fill": "fill", "nu warp": "nu_warp", "nu fill": "nu_fill"}
-        return {
-            words: (min(getattr(c, key) for c in every), max(getattr(c, key) for c in every))
-            for words, key in named.items()
-        }
+        ends = spread_of((self.chosen, *self.others))
+        return {NAMES[name]: pair for name, pair in ends.items()}
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
@@ -110,24 +110,14 @@ def _lines(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
     return tuple(line_of(path.ratio, path.load, path.since) for path in paths)
 
 
-def _settled(lines: Sequence[LinearPath], options: Options) -> Evaluation | None:
-    try:
-        return evaluate(lines, options)
-    except InputError:
-        return None
-
-
-def _of_cycle(test: BiaxialTest, which: int | str, options: Options) -> Evaluation | None:
+def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
     """With another cycle of the same ratios, without the conditioning that is asked for."""
     section, data = test.section, test.data
     ratios = [path.ratio for path in data.paths]
-    paths = evaluated_paths(
-        data.tables, data.cycles, "last" if which == "last" else 1, section.conditioning, ratios
-    )
+    paths = evaluated_paths(data.tables, data.cycles, which, section.conditioning, ratios)
     if section.range is not None:
         try:
             paths = [path.between(*section.range) for path in paths]
         except InputError:
             return None
-    found = _settled(_lines(paths), options)
-    return None if found is None else replace(found, options=options)
+    return evaluate_or_none(_lines(paths), options)

@@ -10,7 +10,6 @@ yarns of 1:0 and 0:1 are the usual choice.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -23,7 +22,6 @@ from .constants import DesignersConstants
 
 Array = NDArray[np.float64]
 Minimise = Literal["strain", "load"]
-YARNS = ("warp", "fill")
 
 #: Points of a line whose squares are added.
 POINTS = 10
@@ -143,14 +141,19 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
     return Evaluation(options, constants, count, squares, rms)
 
 
+def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluation | None:
+    """The constants; None where the paths do not settle them."""
+    try:
+        return evaluate(paths, options)
+    except InputError:
+        return None
+
+
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
     """What every other choice gives; those that settle no constants are left out."""
-    found = []
-    for other in every_option(paths):
-        with suppress(InputError):
-            if other != options:
-                found.append(evaluate(paths, other))
-    return found
+    others = [other for other in every_option(paths) if other != options]
+    found = [evaluate_or_none(paths, other) for other in others]
+    return [one for one in found if one is not None]
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:

@@ -13,13 +13,10 @@ from ..biaxial_response import biaxial_response
 from ..law import HypoelasticLaw
 from .constants import DesignersConstants
 from .linear import USUAL, Evaluation, Options, evaluate, evaluate_others, line_of
+from .ratios import RATIOS, shares
 
 Array = NDArray[np.float64]
 
-#: Loads of warp and fill, the larger 1, by the name of their ratio.
-FIVE: Mapping[str, tuple[float, float]] = {
-    "1:1": (1.0, 1.0), "2:1": (1.0, 0.5), "1:2": (0.5, 1.0), "1:0": (1.0, 0.0), "0:1": (0.0, 1.0),
-}  # fmt: skip
 #: Increments of the law along a path.
 STEPS = 60
 #: Strains of a shear at which G is averaged.
@@ -60,7 +57,7 @@ def constants_of_law(
     highest: float,
     shear_strain: float,
     options: Options = USUAL,
-    ratios: Sequence[str] = tuple(FIVE),
+    ratios: Sequence[str] = RATIOS,
 ) -> LawConstants:
     """Evaluate a law as a test of five ratios is evaluated.
 
@@ -100,7 +97,8 @@ def _curve(
         [np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
          np.linspace(lowest, highest, STEPS + 1)]
     )  # fmt: skip
-    found = biaxial_response(law, np.outer(larger, FIVE[ratio]), thickness)
+    loads = np.outer(larger, shares(ratio))
+    found = biaxial_response(law, loads, thickness)
     if found.reached < len(larger):
         problem = (
             f"the law carries no more than {larger[max(found.reached - 1, 0)]:.3g} kN/m at ratio "
@@ -108,4 +106,4 @@ def _curve(
         )
         raise InputError(None, "loads", problem)
     keep = larger >= lowest
-    return np.outer(larger, FIVE[ratio])[keep], found.elongation[keep]
+    return loads[keep], found.elongation[keep]

@@ -5,24 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 from ...errors import InputError
-from ..biaxial_response import biaxial_response
+from ..biaxial_reach import largest_load
 from ..card import MaterialCard
 from ..designers.linear import Evaluation, Options
-from ..designers.of_law import FIVE, LawConstants, constants_of_law
+from ..designers.of_law import LawConstants, constants_of_law
+from ..designers.ratios import RATIOS, shares
+from ..designers.rows import spread_of
 from ..forms.base import UNLIMITED
 from .base import Says
 from .formats import option
 
-#: Halvings by which the load is found at which a strain leaves the card's range.
-HALVINGS = 50
-#: kN/m: no fabric carries more.
-MOST = 1000.0
 #: Engineering shear strain up to which G is averaged where the card has no range; and the least
 #: range that is one: no test of the card's fit sheared the fabric where it ends before.
 SHEAR, SHEARED = 0.1, 1e-3
+#: Of what a spread is told.
+NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
 @dataclass(frozen=True)
@@ -72,20 +70,17 @@ class Linear:
     @property
     def says(self) -> Says:
         """What constants carry and lose."""
-        c, found = self.found.constants, self.found
+        found = self.found
         least, largest = found.shear
-        others = [one.constants for one in found.others] + [c]
         unknown: tuple[str, ...] = ()
         if self.card.law.strain_range[2] < SHEARED:
             unknown = (
                 "G: nothing that the card was fitted to sheared the fabric; type in another",
             )
         spread = ", ".join(
-            f"{words} {min(getattr(o, key) for o in others):.4g} to "
-            f"{max(getattr(o, key) for o in others):.4g}"
-            for words, key in (("E warp", "warp"), ("E fill", "fill"), ("nu_warp", "nu_warp"),
-                               ("nu_fill", "nu_fill"))
-        )  # fmt: skip
+            f"{NAMES[name]} {low:.4g} to {high:.4g}"
+            for name, (low, high) in spread_of(evaluations(self)).items()
+        )
         lost = ", ".join(f"{name} {rms:.3g} of {found.largest[name]:.3g} %"
                          for name, rms in found.lost.items())  # fmt: skip
         return Says(
@@ -149,17 +144,4 @@ def _end_of_range(card: MaterialCard) -> float:
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
         raise InputError(None, "--highest", problem)
-    low, high = 0.0, MOST
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if all(_within(card, ratio, middle) for ratio in FIVE):
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-def _within(card: MaterialCard, ratio: str, load: float) -> bool:
-    loads = np.outer(np.linspace(0.0, load, 21)[1:], FIVE[ratio])
-    found = biaxial_response(card.law, loads, card.thickness)
-    return found.reached == len(loads) and bool((found.strain <= card.law.strain_range[:2]).all())
+    return largest_load(card.law, card.thickness, [shares(ratio) for ratio in RATIOS], ends)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,14 @@ def deck_files(
         "job.inp": render("calculix", deck, {**common, **context}, folder),
         MESH_FILE: render("calculix", MESH, mesh, _holding(folder, MESH)),
     }
+
+
+def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:
+    """What the templates hold: each set of nodes and its directions, numbered from 1."""
+    return [
+        {"set": name.upper(), "dofs": [d + 1 for d in directions]}
+        for name, directions in supports.items()
+    ]
 
 
 def _holding(folder: Path | None, name: str) -> Path | None:

@@ -11,7 +11,7 @@ from ...materials.law import HypoelasticLaw
 from ...models.patch import PULLED, ROLLERS, SIDE, PatchModel, elongations
 from ..base import History
 from .analysis import Run, Setup
-from .deck import deck_files
+from .deck import deck_files, supports_of
 from .library import constants
 from .results import whole_times
 from .shells import ShellMesh
@@ -61,10 +61,7 @@ def patch_decks(
         # A law's increment is a whole time, whatever CalculiX makes of it.
         "constants": constants(law, whole_times=True),
         "thickness": model.thickness,
-        "supports": [
-            {"set": name.upper(), "dofs": [d + 1 for d in directions]}
-            for name, directions in ROLLERS.items()
-        ],
+        "supports": supports_of(ROLLERS),
         "edges": [
             {
                 "name": name.upper(),

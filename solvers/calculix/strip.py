@@ -13,7 +13,7 @@ from ...models.uniaxial import UniaxialModel
 from ..base import History
 from ..pulls import grip_pulls
 from .analysis import Run, Setup
-from .deck import deck_files
+from .deck import deck_files, supports_of
 from .library import constants
 from .shells import ShellMesh
 from .strip_results import strip_history, strip_run
@@ -73,10 +73,7 @@ def strip_decks(
         # A law's increment is a whole time, whatever CalculiX makes of it.
         "constants": constants(law, angle=angle, whole_times=True),
         "thickness": model.thickness,
-        "supports": [
-            {"set": name.upper(), "dofs": [d + 1 for d in directions]}
-            for name, directions in model.supports.items()
-        ],
+        "supports": supports_of(model.supports),
         "pulled": model.pulled.upper(),
         "pulls": pulls.tolist(),
         "least": LEAST,

@@ -9,13 +9,13 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.biaxial.ratios import shares
 from bubblefit.experiments.base import Weighting
 from bubblefit.fits.check import check
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.fits.simulation import simulate_cards
 from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.card import read_card
+from bubblefit.materials.designers.ratios import shares
 from bubblefit.models.patch import elongations
 from bubblefit.notes import NoteKind
 

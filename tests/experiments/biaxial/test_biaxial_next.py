@@ -8,13 +8,13 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.biaxial.ratios import shares
 from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.biaxial.candidates import candidates
 from bubblefit.experiments.candidates import Planning, Precision
 from bubblefit.fits.result import Fit
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.materials.designers.ratios import shares
 from bubblefit.materials.law import HypoelasticLaw
 
 from ...biaxial_files import THICKNESS, biaxial_project, rows_of, write_rows

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.data.biaxial.ratios import shares
 from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.card import read_card
+from bubblefit.materials.designers.ratios import shares
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.studies.law_candidates import candidates

@@ -15,7 +15,8 @@ from bubblefit.materials.designers.linear import (
     every_option,
     line_of,
 )
-from bubblefit.materials.designers.of_law import FIVE, constants_of_law
+from bubblefit.materials.designers.of_law import constants_of_law
+from bubblefit.materials.designers.ratios import RATIOS, shares
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,10 +29,10 @@ FREE = DesignersConstants(1188.0, 864.0, 0.73, 0.69)
 RECIPROCAL = DesignersConstants.of_stiffness([[1000.0, 400.0], [400.0, 800.0]])
 
 
-def paths(constants: DesignersConstants, ratios=tuple(FIVE), offset=0.0) -> list[LinearPath]:
+def paths(constants: DesignersConstants, ratios=RATIOS, offset=0.0) -> list[LinearPath]:
     found = []
     for ratio in ratios:
-        load = np.outer(np.linspace(2, 30, 15), FIVE[ratio])
+        load = np.outer(np.linspace(2, 30, 15), shares(ratio))
         found.append(line_of(ratio, load, constants.strain(load) + offset))
     return found
 
@@ -151,7 +152,7 @@ def test_a_linear_law_gives_its_own_constants_at_small_loads():
 
 def test_what_is_lost_of_a_bent_law_is_told_by_ratio():
     found = constants_of_law(BENT, THICKNESS, 2.0, 25.0, 0.1)
-    assert list(found.lost) == list(FIVE)
+    assert list(found.lost) == list(RATIOS)
     assert 0.005 < min(found.lost.values()) and max(found.lost.values()) < 0.1
     assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(list(found.lost.values())))))
     assert 1.0 < found.largest["1:0"] < 5.0
