@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Thread, Timer
 from typing import Any
 
 import bubblefit as bf
@@ -308,6 +309,34 @@ def test_a_scheduler_counts_licences(scheduler: str, tmp_path: Path) -> None:
     found = seen(runs)
     assert found.most == 1 and found.ended == {str(n): 1 for n in range(6)}
     assert len(list(tmp_path.glob("locks-*"))) == 2
+
+
+def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(
+    scheduler: str, tmp_path: Path
+) -> None:
+    runs, given = tmp_path / "runs", {"licences": 2, "licence_folder": str(tmp_path / "locks")}
+
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> Any:
+            dies = number == 0 and not (tmp_path / "died").exists()
+            if dies:
+                (tmp_path / "died").touch()
+                Timer(0.4, os.kill, (os.getpid(), signal.SIGKILL)).start()
+            solver = CountedSolver(runs, 5.0 if dies else 0.05)
+            return licences.licensed(solver, "counted", given).run(number, None)
+
+        return task
+
+    here: list[Any] = []
+    local = Thread(target=lambda: here.extend(Executor(2).run_tasks(prepare, range(10, 18))))
+    local.start()
+    there = tasks(scheduler, prepare, 8)
+    local.join(60)
+    assert sorted(there + [one for one in here if one is not None]) == [*range(8), *range(10, 18)]
+    found = seen(runs)
+    assert found.most == 2
+    assert found.begun == {**found.ended, "0": 2}  # the one that was killed never ended
+    assert set(found.ended.values()) == {1} and len(found.ended) == 16
 
 
 def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path) -> None:
