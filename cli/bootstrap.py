@@ -15,6 +15,7 @@ from .arguments import (
     OVERWRITE,
     PROJECT,
     QUIET,
+    SCHEDULER,
     TESTS,
     Decorator,
     out_option,
@@ -47,6 +48,7 @@ def _options(command: Any) -> Any:
         DATA,
         solver_choice,
         JOBS,
+        SCHEDULER,
         click.option("--resume", is_flag=True, help="Go on with what the output folder holds."),
         OVERWRITE,
         AS_JSON,
@@ -75,7 +77,7 @@ def command(over: str, samples: int, seed: int | None, card: str | None, **optio
 
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = project.with_fit(jobs=options["jobs"])
+    project = project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
     folder: Path = options["out"] or folder_beside(path, "bootstrap")
     quiet = options["quiet"] or options["as_json"]
     with resumable(folder), NamedProgress("samples", quiet) as progress:

@@ -17,6 +17,7 @@ from .arguments import (
     OVERWRITE,
     PROJECT,
     QUIET,
+    SCHEDULER,
     TESTS,
     Decorator,
     out_option,
@@ -48,6 +49,7 @@ def _options(command: Any) -> Any:
         DATA,
         solver_choice,
         JOBS,
+        SCHEDULER,
         OVERWRITE,
         AS_JSON,
         QUIET,
@@ -75,7 +77,7 @@ def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **opt
 
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = project.with_fit(jobs=options["jobs"])
+    project = project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
     asked = _asked(moduli, strain)
     folder = result_folder(path, "profile", options["out"], options["overwrite"])
     with NamedProgress("sides", options["quiet"] or options["as_json"]) as progress:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import platform
 import threading
 from collections import OrderedDict
+from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..solvers.announcements import Announcement, hearing
-from ..solvers.identity import code_mark
+from ..solvers.identity import CODE, file_mark
 from ..solvers.process import Unwanted, unless
 
+ROOT = Path(__file__).resolve().parents[1]
 #: Series of tasks that a worker keeps ready; who runs one has one or two at a time.
 MOST = 4
 _prepared: OrderedDict[str, bytes] = OrderedDict()
@@ -22,7 +25,19 @@ _ready = threading.local()
 @functools.cache
 def version() -> tuple[str, str, str]:
     """Of Python, of bubblefit, and of its code by content: results of others may be others."""
-    return platform.python_version(), __version__, code_mark("bubblefit")
+    return platform.python_version(), __version__, _code()
+
+
+def _code() -> str:
+    """SHA-256 of every module and template of the package, not of tests and documents beside it."""
+    files = [*ROOT.glob("*.py")]
+    for room in ROOT.iterdir():
+        if room.name == "templates" or (room / "__init__.py").exists():
+            files += [path for path in room.rglob("*") if path.suffix in CODE]
+    named = {path.relative_to(ROOT).as_posix(): path for path in files}
+    marks = [(name, file_mark(named[name])) for name in sorted(named)
+             if name.split("/")[0] not in ("tests", "setup.py")]  # fmt: skip
+    return hashlib.sha256(repr(marks).encode()).hexdigest()
 
 
 def join(series: str, prepare: bytes, wanted: tuple[str, str, str]) -> tuple[str, str, str]:

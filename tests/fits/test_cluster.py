@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from threading import Thread, Timer
+from threading import Thread
 from typing import Any
 
 import bubblefit as bf
@@ -246,6 +246,25 @@ def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) ->
         assert sum("is not used" in one.words for one in heard) == 2
 
 
+def test_the_code_counts_by_content(tmp_path: Path, monkeypatch) -> None:
+    """In whatever room it is; tests, documents and what has been compiled do not."""
+    files = {name: tmp_path / name for name in
+             ("errors.py", "fits/start.py", "templates/marc/deck.j2", "tests/test_a.py",
+              "docs/make_api.py", "fits/__pycache__/start.pyc")}  # fmt: skip
+    for path in (*files.values(), tmp_path / "fits/__init__.py", tmp_path / "tests/__init__.py"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    monkeypatch.setattr(cluster_worker, "ROOT", tmp_path)
+    counted = {}
+    for name, path in files.items():
+        before = cluster_worker._code()
+        path.write_text("changed")
+        counted[name] = cluster_worker._code() != before
+    assert counted == {name: k < 3 for k, name in enumerate(files)}
+    monkeypatch.undo()
+    assert cluster_worker.version()[2] == cluster_worker._code()
+
+
 def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> None:
     class Elsewhere:
         def __reduce__(self) -> Any:
@@ -316,12 +335,18 @@ def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(
 ) -> None:
     runs, given = tmp_path / "runs", {"licences": 2, "licence_folder": str(tmp_path / "locks")}
 
+    def end_with_program() -> None:
+        log = runs / "log"
+        while not (log.exists() and "begin 0 " in log.read_text()):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGKILL)
+
     def prepare() -> Any:
         def task(number: int, tell: Any) -> Any:
             dies = number == 0 and not (tmp_path / "died").exists()
             if dies:
                 (tmp_path / "died").touch()
-                Timer(0.4, os.kill, (os.getpid(), signal.SIGKILL)).start()
+                Thread(target=end_with_program).start()
             solver = CountedSolver(runs, 5.0 if dies else 0.05)
             return licences.licensed(solver, "counted", given).run(number, None)
 
