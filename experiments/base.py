@@ -260,6 +260,7 @@ class Exhibit:
     """What a test puts on a page: facts, figures, tables, files that it wrote.
 
     parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
+    record : tables of how it was measured, for the record at the end of the page.
     """
 
     facts: Sequence[tuple[str, object]] = ()
@@ -267,9 +268,10 @@ class Exhibit:
     tables: Sequence[Table] = ()
     files: Sequence[Shown] = ()
     parts: Sequence[Part] = ()
+    record: Sequence[Table] = ()
 
     def all_parts(self, title: str = "") -> list[Part]:
-        """Everything but the files, in the order of the page; title : before it, "" for none."""
+        """What stands in the body of the page, in order; title : before it, "" for none."""
         from ..reports import Facts, pictures
 
         facts = [Facts(self.facts, title)] if self.facts or title else []

@@ -106,7 +106,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             Section("Measured beside modelled", _shown(exhibits)),
             determined_section(fit, _pinned(fit, folder)),
             ways_section(fit, [_optima(fit, folder)]),
-            Section("The record", record),
+            Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
             Section("How to cite", citation()),
         ],
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],

@@ -11,6 +11,7 @@ from ...reports import plot_heights, plot_profiles
 from ...reports.content import Part
 from ..base import Exhibit, Findings, FittedTest, Output, Shown
 from .charts import profile_charts, residual_chart
+from .correlation_record import correlation_table
 from .findings import objective_of, recorded_of
 from .inflated import at_nodes, write_series
 from .maps import field_maps
@@ -56,7 +57,8 @@ def exhibit(
         bubble_solid(prepared, fitted, left),
         residual_chart(prepared, fitted),
     ]
-    return Exhibit(_facts(prepared, findings), figures, tables, files, parts)
+    record = correlation_table(prepared)
+    return Exhibit(_facts(prepared, findings), figures, tables, files, parts, record)
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:

@@ -14,10 +14,12 @@ from ...reports import (
     BendLine,
     BendPanel,
     BendReadings,
+    Charts,
     plot_bending,
     plot_bending_cases,
     plot_gas,
 )
+from ...reports.bending_charts import bending_charts
 from ..base import Output, Shown
 from .beam import draw_beam, write_beam
 from .test import CylinderTest
@@ -29,15 +31,19 @@ FIGURES, BEAMS = "figures", "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Loads, gas and beam of every test, and all loads together; each with its caption."""
+    """Loads, gas and beam of every test, and all loads together, as pictures.
+
+    Returns
+    -------
+    Those that the page shows, each with its caption: the loads are charts there.
+    """
     tests = tests_of(outcome)
     cards = list(dict.fromkeys(run.card for run in outcome.runs))
     ranks = {card: rank for rank, card in enumerate(cards)}
     names = file_names([test.name for test in tests])
     panels, figures = {}, []
     for test in tests:
-        ended = [i for i in outcome.bent if outcome.runs[i].test is test]
-        ended = [i for i in ended if outcome.runs[i].predicted]
+        ended = _ended(test, outcome)
         panels[test.name] = _panel(test, outcome, ended, ranks)
         if not ended:
             continue
@@ -48,7 +54,6 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
         draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
         figures += [
-            (out.name(f"{stem}-load.png"), f"{test.name}: load over deflection{_walls(outcome)}"),
             (out.name(f"{stem}-beam.png"), f"{test.name}: the bent beam, card {first.card}"),
             (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
         ]
@@ -57,9 +62,21 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         columns = max(map(len, rows))
         laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
         plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
-        caption = f"Load over deflection, all tests{_walls(outcome)}"
-        figures.insert(0, (out.name(f"{FIGURES}/all-loads.png"), caption))
     return figures
+
+
+def load_charts(outcome: CylinderOutcome) -> list[Charts]:
+    """Load over deflection of every test; nothing where no run came to an end."""
+    cards = list(dict.fromkeys(run.card for run in outcome.runs))
+    ranks = {card: rank for rank, card in enumerate(cards)}
+    tests = tests_of(outcome)
+    panels = [_panel(test, outcome, _ended(test, outcome), ranks) for test in tests]
+    if not any(panel.lines for panel in panels):
+        return []
+    caption = f"Load over deflection{_walls(outcome)}"
+    if outcome.spreads:
+        caption += f". Shaded: {panels[0].spread}"
+    return [bending_charts(panels, caption)]
 
 
 def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
@@ -97,7 +114,7 @@ def _walls(outcome: CylinderOutcome) -> str:
     if len(outcome.band) < 2:
         return ""
     predicted, *others = (end.name for end in outcome.band)
-    return f"; line: {predicted}, band: to {', '.join(others)}"
+    return f"; line: {predicted}, dashed: {', '.join(others)}"
 
 
 def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
@@ -113,6 +130,12 @@ def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
         return list(rows.values())
     flat = list(tests)
     return [flat[i : i + 3] for i in range(0, len(flat), 3)]
+
+
+def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
+    """The runs of a test that did not fail, of what the solver predicts."""
+    own = [i for i in outcome.bent if outcome.runs[i].test is test]
+    return [i for i in own if outcome.runs[i].predicted]
 
 
 def _panel(

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from ...notes import marks
-from ...reports import Table, percent
+from ...reports import Table, Words, percent
+from ...reports.content import Part
 from ...writing import replacing
 from ..base import Exhibit, Output, Shown
-from .figures import draw_figures, tests_of, write_beams
+from .figures import draw_figures, load_charts, tests_of, write_beams
+from .how_sure import how_sure
 from .tables import load_words, measured_table, place_names
 from .test import CylinderTest
 
@@ -30,7 +32,8 @@ def exhibit(outcome: CylinderOutcome, out: Output) -> Exhibit:
     figures = draw_figures(outcome, out)
     files = [*_write_tables(outcome, tests, out), *write_beams(outcome, out)]
     tables = [_runs(outcome, tests), *_errors(outcome)]
-    return Exhibit(_common(tests), figures, tables, files)
+    parts: list[Part] = [Words(how_sure(outcome, tests)), *load_charts(outcome)]
+    return Exhibit(_common(tests), figures, tables, files, parts)
 
 
 def _write_tables(

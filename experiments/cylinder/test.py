@@ -27,6 +27,9 @@ PART = "cylinder"
 #: mm of an element, unless the file says otherwise.
 SIZE = 25.0
 #: Keys of the section, where a model calls them otherwise.
+#: Keys that may be left out, and what is then as usual.
+USUAL = {"span": "span", "seam_width": "seam width", "length": "length", "collar": "collar",
+         "support_diameter": "diameter of the supports"}  # fmt: skip
 KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
 
 
@@ -35,7 +38,8 @@ class CylinderTest:
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
     deflections : frames of the bending. measured : repetitions, empty where there are none.
-    listed : whether the section lists files of them.
+    listed : whether the section lists files of them. assumed : what the section leaves to the
+    usual values, in words.
     """
 
     name: str
@@ -54,6 +58,7 @@ class CylinderTest:
     reading: CurveReading
     measured: tuple[BendingCurve, ...] = ()
     listed: bool = False
+    assumed: tuple[str, ...] = ()
     kind: str = "cylinder"
     #: Nothing of it is fitted.
     weight: float = 1.0
@@ -169,7 +174,9 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     except InputError as error:
         raise place.error(KEYS.get(error.field, error.field), error.problem) from None
     listed = bool(section.measured.files)
-    return replace(test, measured=read_measured(section.measured, place), listed=listed)
+    assumed = tuple(words for key, words in USUAL.items() if getattr(section, key) is None)
+    measured = read_measured(section.measured, place)
+    return replace(test, measured=measured, listed=listed, assumed=assumed)
 
 
 def _collar(section: CylinderSection, diameter: float, scale: float) -> Collar:

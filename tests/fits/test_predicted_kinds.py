@@ -140,7 +140,7 @@ def test_two_kinds_in_one_series(mixed: Project, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "cylinder" / "figures" / "all-loads.png").is_file()
     page = (tmp_path / "out" / "report.html").read_text()
     assert "<td>strut/struts.txt</td>" in page
-    assert 'title="cylinder/figures/all-loads.png"' in page
+    assert '"labels":["deflection of the collar, mm","load, N"]' in page
     events: list[Any] = []
     predict(mixed, jobs=1, out=tmp_path / "out", resume=True, progress=events.append)
     assert all(event.again for event in events if event is not None and event.run is not None)

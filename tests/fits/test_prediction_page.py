@@ -13,7 +13,7 @@ from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import predict
 from bubblefit.fits.project import read_project
 from bubblefit.notes import Note, NoteKind, rows
-from bubblefit.reports import Report, Table, percent
+from bubblefit.reports import Report, Table, Words, percent
 from bubblefit.solvers import registry
 
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
@@ -71,6 +71,15 @@ def test_failures_errors_and_notes(tmp_path: Path, seen: list[Report]) -> None:
         "high with soft: failed: made to fail",
     ]
     assert found.figures == [("loads.png", "loads")]
+    sure = next(part for part in found.parts if isinstance(part, Words))
+    assert sure.lines == [
+        "No spread of loads with soft, stiff: the card does not say how sure it is.",
+        "Assumed, as the project does not say: the usual span (2000 mm).",
+        "Assumed, as the project does not say: the usual seam width (40 mm).",
+        "Assumed, as the project does not say: the usual length (3000 mm).",
+        "Assumed, as the project does not say: the usual collar.",
+        "Assumed, as the project does not say: the usual diameter of the supports (100 mm).",
+    ]
     assert [table.title for table in found.tables] == ["Runs", "Against measured loads", "Notes"]
     assert found.tables[-1] == Table(
         "Notes",
@@ -120,6 +129,7 @@ def test_result_json(tmp_path: Path) -> None:
         "walls": [],
         "worst_relative_error": done.worst,
         "wall_s": 30.0,
+        "cached_runs": 0,
         "versions": versions(),
     }
     assert runs[0] == {

@@ -61,6 +61,11 @@ def test_moduli_are_those_of_the_right_frame(seen):
     np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
     page = (folder / "out" / "report.html").read_text()
     assert "registration.png" in page and "found by symmetry" in page
+    # What the camera was nobody said; what was made of its frames is known.
+    record = page[page.index("Image correlation: ") : page.index("Files of the folder")]
+    assert '<td>lens and aperture</td><td class="text">not given</td>' in record
+    assert '<td>coordinates</td><td class="text">registered on the rim</td>' in record
+    assert f'<td>images evaluated</td><td class="text">{len(SHOWN)}</td>' in record
     assert "Frames taken" in page and "clock.png" in page and "5.00 s, given" in page
     taken = result["data"]["pressures"]["taken"]
     assert [one["pressure_kPa"] for one in taken] == pytest.approx(SHOWN)

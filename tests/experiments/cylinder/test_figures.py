@@ -49,11 +49,8 @@ def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
     )  # fmt: skip
     shown = figures.draw_figures(found, Output(tmp_path, "c/"))
     assert shown == [
-        ("c/figures/all-loads.png", "Load over deflection, all tests"),
-        ("c/figures/a-b-load.png", "a b: load over deflection"),
         ("c/figures/a-b-beam.png", "a b: the bent beam, card soft"),
         ("c/figures/a-b-gas.png", "a b: the gas while bending"),
-        ("c/figures/a-b-2-load.png", "a/b: load over deflection"),
         ("c/figures/a-b-2-beam.png", "a/b: the bent beam, card stiff"),
         ("c/figures/a-b-2-gas.png", "a/b: the gas while bending"),
     ]
@@ -85,7 +82,7 @@ def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
 
 def test_one_test_has_no_figure_of_all(tmp_path: Path, drawn) -> None:
     both = outcome(run(case("a"), "soft"), run(case("b"), "soft"), bent=(0,))
-    assert len(figures.draw_figures(both, Output(tmp_path))) == 3
+    assert len(figures.draw_figures(both, Output(tmp_path))) == 2
     assert not drawn["plot_bending_cases"]
 
 

@@ -33,7 +33,8 @@ CURVE = BendingCurve("1", WAY, LOAD)
 def case(name: str, diameter: float = 150.0, **other: Any) -> SimpleNamespace:
     fields = {
         "name": name, "diameter": diameter, "length": 3000.0, "size": 40.0, "seam_width": 35.0,
-        "supports": SimpleNamespace(span=2000.0), "measured": (), "deflections": (80.0, 160.0),
+        "supports": SimpleNamespace(span=2000.0), "measured": (), "assumed": (),
+        "deflections": (80.0, 160.0),
         "reading": SimpleNamespace(places={"20 mm": 20.0, "a long way": 200.0}, slope_over=20.0),
     }  # fmt: skip
     return SimpleNamespace(**(fields | other))
