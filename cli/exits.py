@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from ..errors import BubblefitError
+from .events import EVENTS
 
 INTERRUPTED = 130
 WORSE = 1  # exit code of --fail-above
@@ -22,14 +23,27 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
+        code, said = 1, None
         try:
-            return command(*args, **kwargs)
+            done = command(*args, **kwargs)
+            code = 0
+            return done
         except BubblefitError as error:
+            code, said = error.exit_code, str(error)
             click.echo(f"bubblefit: {error}", err=True)
             sys.exit(error.exit_code)
         except KeyboardInterrupt:
+            code, said = INTERRUPTED, "interrupted"
             click.echo("bubblefit: interrupted", err=True)
             sys.exit(INTERRUPTED)
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+            raise
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            EVENTS.end(code, said)
 
     return wrapped
 

@@ -21,6 +21,7 @@ from rich.progress import (
 from ..caching import kernels_are_compiled
 from ..fits.analyses import Step
 from ..solvers.announcements import Announcement, hearing
+from .events import EVENTS
 
 PLAIN_EVERY_S = 60.0
 COMPILING = (
@@ -99,6 +100,7 @@ class SeriesProgress(LiveLine):
     def saw(self, step: Step) -> None:
         """Show how far the analysis is that runs; elsewhere than on a terminal once a minute."""
         words = f"analysis {step.analysis} of {step.analyses}, {step.part}{self.states}"
+        EVENTS.progress("increments", step.done, step.increments or None, words)
         if self.bar is None and not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
             self.said = time.monotonic()
             of = f" of {step.increments}" if step.increments else ""
@@ -123,7 +125,8 @@ class CountProgress(LiveLine):
             self.task = self.bar.add_task(what, total=total, completed=done, note="")
 
     def show(self) -> None:
-        """On a terminal at once, elsewhere a plain line a minute."""
+        """On a terminal at once, elsewhere a plain line a minute; events as they come."""
+        EVENTS.progress(self.what, self.done, self.total, self.note() + self.states)
         if self.bar is not None:
             self.bar.update(self.task, completed=self.done, total=self.total,
                             note=self.note() + self.states)  # fmt: skip

@@ -8,7 +8,9 @@ from typing import Any
 import click
 
 from .. import __version__
+from .events import with_events
 from .examples import examples
+from .home import place_matplotlib
 from .logs import listen, with_verbose
 from .options import COMMAND_LINE
 from .usage import Suggesting, in_one_line
@@ -69,7 +71,7 @@ class LazyGroup(Suggesting):
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
-        return with_verbose(module.command)
+        return with_events(with_verbose(module.command))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -97,3 +99,4 @@ def main(verbose: bool) -> None:
     4 the solver failed, 130 interrupted.
     """
     listen(verbose)
+    place_matplotlib()
