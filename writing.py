@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -44,6 +45,25 @@ def write_text(path: Path | str, text: str) -> None:
         stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
+
+
+def remove_cut(folder: Path | str) -> None:
+    """Remove what processes that are gone have begun to write by `replacing` in a folder."""
+    for path in Path(folder).glob(".*"):
+        found = re.fullmatch(r"\..*\.(\d+)(\.[^.]*)?", path.name)
+        if found is not None and path.is_file() and not _lives(int(found[1])):
+            with suppress(OSError):
+                path.unlink()
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        pass  # of somebody else
+    return True
 
 
 def checksum(path: Path | str) -> str:

@@ -32,6 +32,9 @@ SCHEDULER: Decorator = click.option(
     "--scheduler", envvar="BUBBLEFIT_SCHEDULER", metavar="ADDRESS",
     help="Dask scheduler whose workers do the runs [this machine].",
 )  # fmt: skip
+RESUME: Decorator = click.option(
+    "--resume", is_flag=True, help="Keep the analyses that the output folder holds."
+)
 OVERWRITE: Decorator = click.option(
     "--overwrite", is_flag=True, help="Replace what the output folder holds."
 )
@@ -59,7 +62,7 @@ def with_checks(command: Command, decorators: Sequence[Decorator]) -> Command:
 
     @functools.wraps(command)
     def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-        above = kwargs["fail_above"]
+        above = kwargs.get("fail_above")
         if resume and overwrite:
             raise InputError(None, "--resume, --overwrite", "give one of them, not both")
         if above is not None and not above >= 0:

@@ -50,7 +50,9 @@ def folder_beside(project: Path, suffix: str) -> Path:
     return own.with_name(f"{own.name}-{suffix}")
 
 
-def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool) -> Path:
+def result_folder(
+    project: Path, suffix: str, out: Path | None, overwrite: bool, resume: bool = False
+) -> Path:
     """The output folder of one analysis or study: `out`, or out/NAME-`suffix`.
 
     Raises
@@ -58,7 +60,7 @@ def result_folder(project: Path, suffix: str, out: Path | None, overwrite: bool)
     OutputError : it holds a result already and may not be written over.
     """
     folder = out or folder_beside(project, suffix)
-    if (folder / "result.json").exists() and not overwrite:
+    if (folder / "result.json").exists() and not (overwrite or resume):
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
     return folder
 

@@ -14,15 +14,16 @@ from .arguments import (
     DATA,
     OVERWRITE,
     PROJECT,
+    RESUME,
     TESTS,
     Decorator,
     out_option,
     solver_choice,
-    with_options,
+    with_checks,
 )
 from .ending import written_to
 from .examples import examples
-from .exits import exits
+from .exits import resumable
 from .live_line import SeriesProgress
 from .options import data_folders, read_with_solver, result_folder
 from .simulate_bend import simulate_bend
@@ -44,15 +45,17 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
         ),
+        RESUME,
         OVERWRITE,
         AS_JSON,
     ]  # fmt: skip
-    return with_options(exits(command), decorators)
+    return with_checks(command, decorators)
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, run its tests (of a kind, or those named) with the cards, tell."""
     from ..fits.cards import chosen_cards
+    from ..fits.kept_analyses import KeptAnalyses
     from ..fits.simulation import simulate_cards
 
     path: Path = options["project"]
@@ -60,10 +63,12 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
     project = read_with_solver(path, options["solver_given"], data, need_data=False)
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
-    folder = result_folder(path, "simulated", options["out"], options["overwrite"])
-    with SeriesProgress(options["as_json"]) as progress:
+    resume = options["resume"]
+    folder = result_folder(path, "simulated", options["out"], options["overwrite"], resume)
+    kept = KeptAnalyses(folder, resume)
+    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
         done = simulate_cards(
-            project, tests, cards, folder, options["within_range"], progress.saw, command
+            project, tests, cards, folder, options["within_range"], progress.saw, command, kept
         )
     if options["as_json"]:
         click.echo(json.dumps(done.numbers, indent=1))

@@ -15,14 +15,15 @@ from .arguments import (
     DATA,
     OVERWRITE,
     PROJECT,
+    RESUME,
     Decorator,
     out_option,
     solver_choice,
-    with_options,
+    with_checks,
 )
 from .ending import written_to
 from .examples import examples
-from .exits import exits
+from .exits import resumable
 from .live_line import SeriesProgress
 from .options import data_folders, read_with_solver, result_folder
 from .usage import Suggesting
@@ -45,23 +46,29 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
         out_option("out/NAME-STUDY"),
         DATA,
         solver_choice,
+        RESUME,
         OVERWRITE,
         AS_JSON,
     ]  # fmt: skip
-    return with_options(exits(command), decorators)
+    return with_checks(command, decorators)
 
 
 def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **given: Any) -> None:
     """Read the project, run the study, write its folder, tell."""
+    from ..fits.kept_analyses import KeptAnalyses
+
     path: Path = options["project"]
     project = read_with_solver(
         path, options["solver_given"], data_folders(options["data"]), need_data=False
     )
-    folder = result_folder(path, name, options["out"], options["overwrite"])
-    with SeriesProgress(options["as_json"]) as progress:
+    resume, overwrite = options["resume"], options["overwrite"]
+    folder = result_folder(path, name, options["out"], overwrite, resume)
+    kept = KeptAnalyses(folder, resume)
+    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
         done = study(
-            project, options["card"], tests=options["tests"], progress=progress.saw, **given
-        )
+            project, options["card"], tests=options["tests"], progress=progress.saw, kept=kept,
+            **given,
+        )  # fmt: skip
     done.write(folder)
     if options["as_json"]:
         click.echo(json.dumps(done.result, indent=1))

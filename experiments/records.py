@@ -23,7 +23,7 @@ def record_of(
     if isinstance(outcome, History):
         try:
             return RunRecord(
-                seconds if outcome.took is None else outcome.took,
+                seconds if outcome.seconds is None else outcome.seconds,
                 early=kind.early(model, outcome),
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
                 arrays=kind.arrays(model, outcome),

@@ -8,7 +8,9 @@ from typing import Any
 
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History, Solver, check_carries
-from ..solvers.registry import usable_solver
+from ..solvers.once import Once
+from ..solvers.registry import counted, usable_solver
+from ..solvers.run_cache import RunCache
 from .logged import timed
 from .project import Project
 
@@ -36,17 +38,22 @@ class Analyses:
     Parameters
     ----------
     project : whose solver runs them. progress : is told how far they are; `total` is what it is
-        told of how many there will be.
+        told of how many there will be. kept : where each is kept as it ends, and taken from where
+        it is there; None: nowhere but in the cache of runs.
 
     Raises
     ------
     InputError, SolverFailure : the solver cannot be used.
     """
 
-    def __init__(self, project: Project, progress: Progress | None = None) -> None:
+    def __init__(
+        self, project: Project, progress: Progress | None = None, kept: RunCache | None = None
+    ) -> None:
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
+        own = counted(name, options)
+        self._runs = self.solver if kept is None else Once(self.solver, kept, own)
         self.total = self.count = 0
         self._progress = progress
 
@@ -65,7 +72,7 @@ class Analyses:
     def _run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
         tell, count = self._progress, self.count
         if tell is None:
-            return self.solver.run(model, law)
+            return self._runs.run(model, law)
 
         def say(done: float) -> None:
             tell(Step(part, count, self.total, done, increments))
@@ -73,6 +80,6 @@ class Analyses:
         say(0.0)
         self.solver.progress = lambda increment: say(increment.time)
         try:
-            return self.solver.run(model, law)
+            return self._runs.run(model, law)
         finally:
             self.solver.progress = None

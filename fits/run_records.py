@@ -53,7 +53,7 @@ class RunRecords:
             "early": record.early,
             "iterations": record.iterations,
             "unstable": record.unstable,
-            "remarks": [(note.kind, note) for note in record.remarks],
+            "remarks": [(note.kind, note, note.of) for note in record.remarks],
             "arrays": list(record.arrays),
             "from_cache": record.from_cache,
         }
@@ -78,7 +78,7 @@ class RunRecords:
                 arrays=arrays,
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
-                remarks=tuple(Note(NoteKind(kind), said) for kind, said in words["remarks"]),
+                remarks=tuple(Note(NoteKind(kind), *said) for kind, *said in words["remarks"]),
                 from_cache=bool(words.get("from_cache", False)),
             )
         return None

@@ -16,7 +16,7 @@ from ..notes import Note, NoteKind, rows, write_notes
 from ..notes import lines as note_lines
 from ..solvers.base import History, check_carries
 from ..solvers.registry import usable_solver
-from ..solvers.run_cache import run_cache
+from ..solvers.run_cache import RunCache, run_cache
 from ..writing import write_text
 from .analyses import Analyses, Progress
 from .project import Project
@@ -50,6 +50,7 @@ def simulate_cards(
     within_range: bool = False,
     progress: Progress | None = None,
     command: str = "simulate test",
+    kept: RunCache | None = None,
 ) -> Simulation:
     """Run tests with cards, write what their kinds write, notes.csv and result.json.
 
@@ -57,6 +58,7 @@ def simulate_cards(
     ----------
     cards : by name; the thickness of each counts, not the fabric's. folder : where files go.
     within_range : show curves only to where a card's valid range ends. command : for the result.
+    kept : where each analysis is kept as it ends, for going on with an interrupted series.
 
     Returns
     -------
@@ -66,7 +68,7 @@ def simulate_cards(
     ------
     SolverFailure : nothing at all ended well. InputError, OutputError.
     """
-    analyses = Analyses(project, progress)
+    analyses = Analyses(project, progress, kept)
     models = {
         (test.name, name): test.models(card.thickness)
         for test in tests

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, OutputError
-from ..writing import telling, write_text
+from ..writing import remove_cut, telling, write_text
 from .differences import Facts, differences
 
 RUN, RESULT = "run.json", "result.json"
@@ -79,6 +79,7 @@ class Store:
             raise InputError(self.path, "", problem)
         if resume:
             self._check(parts, facts or {})
+        remove_cut(self.path)
         with telling(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
             for name in (*OUTDATED, *(() if resume else records)):
@@ -87,6 +88,17 @@ class Store:
             content = {PARTS: dict(parts), FACTS: dict(facts or {})}
             self.write(RUN, json.dumps(content, indent=1) + "\n")
         return resume
+
+    def forget(self) -> None:
+        """Make a folder whose results are to be replaced one that holds nothing to go on with.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        with telling(self.path):
+            for name in (RESULT, RUN):
+                (self.path / name).unlink(missing_ok=True)
 
     def write(self, name: str, text: str) -> None:
         """Write a file whole or not at all.

@@ -56,8 +56,8 @@ class History:
     counts as its work; remarks: what a reader of the result should know (plain words are notes of
     the kind "of the solver"); early: the solver's own word for an end before the model's last
     frame (it found no equilibrium further on), "" where there is none: fewer frames without it
-    are no result; took: seconds that the run took when it was made, where it was made earlier and
-    is taken from the cache of runs, None where it ran now.
+    are no result; seconds that the run itself took, where a cache keeps it, None where nobody does;
+    from_cache: whether it was made earlier and nothing ran now.
     """
 
     load: Array
@@ -75,12 +75,8 @@ class History:
     wrinkled: Array | None = None
     remarks: tuple[Note, ...] = ()
     early: str = ""
-    took: float | None = None
-
-    @property
-    def from_cache(self) -> bool:
-        """Whether nothing ran, because the same run was kept earlier."""
-        return self.took is not None
+    seconds: float | None = None
+    from_cache: bool = False
 
     @property
     def stable(self) -> bool | None:

@@ -19,7 +19,7 @@ TITLE = b"bubblefit run 1\n"
 #: Fields that are no arrays, and are words instead.
 WORDS = ("iterations", "unstable", "remarks", "early")
 #: Not of the run itself.
-NOT_WRITTEN = ("took",)
+NOT_WRITTEN = ("seconds", "from_cache")
 
 
 class Damaged(ValueError):
@@ -62,7 +62,7 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
 
 
 def from_bytes(content: bytes, key: str) -> History:
-    """The history that `to_bytes` wrote under this key, every number as it was; `took` is known.
+    """The history that `to_bytes` wrote under this key, every number as it was, with its seconds.
 
     Raises
     ------
@@ -94,7 +94,8 @@ def from_bytes(content: bytes, key: str) -> History:
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
             early=str(words["early"]),
-            took=float(words["seconds"]),
+            seconds=float(words["seconds"]),
+            from_cache=True,
         )
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         if isinstance(error, Damaged):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,17 +47,16 @@ def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> S
 
 
 class Once:
-    """A solver of the protocol `Solver` that looks into a cache before it runs.
+    """A solver of the protocol `Solver`, whoever runs it, that looks into a cache before it runs.
 
     A run that fails is not kept: what made it fail (a licence, memory, a full disk) may be gone the
     next time, and its folder is there to look into.
     """
 
-    external = True
-
     def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
         self.solver, self.cache, self.options = solver, cache, options
         self.name: str = solver.name
+        self.external: bool = solver.external
 
     @property
     def progress(self) -> Callable[[Any], None] | None:
@@ -99,8 +99,10 @@ class Once:
         said = {name: value for name, value in given.items() if value is not None}
         begun = time.perf_counter()
         ended: History = self.solver.run(model, law, **said)
-        if key is not None:
-            self.cache.write(key, ended, time.perf_counter() - begun)
+        if key is not None and isinstance(ended, History):
+            seconds = time.perf_counter() - begun
+            self.cache.write(key, ended, seconds)
+            ended = replace(ended, seconds=seconds)
         return ended
 
     def key(self, model: Any, law: HypoelasticLaw) -> str | None:

@@ -120,8 +120,14 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
     solver = licensed(made, name, {**getattr(made, "site_licences", {}), **licences})
     if cache is None:
         return solver
+    return with_cache(solver, cache, counted(name, own))
+
+
+def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Of what the solver `name` is made with, what may change a result; of a plug-in all."""
+    _, own = split(options)  # a licence changes no result
     section = solver_sections().get(name)
-    return with_cache(solver, cache, own if section is None else section.counted(own))
+    return dict(own) if section is None else section.counted(own)
 
 
 def usable_solver(

@@ -28,20 +28,18 @@ def validated_folds(
     """
     parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
     mark = mark_of(parts)
-    known = None if folder is None else written_folds(folder / VALIDATION, mark)
-    if known is not None:
-        return known
-    ended: dict[int, FoldError] = {}
-    for event in validate(setup, folds, starts):
+    known = {} if folder is None else written_folds(folder / VALIDATION, mark)
+    for event in validate(setup, folds, starts, tuple(known)):
         if event is not None:
-            ended[event.fold] = event
+            known[event.fold] = event
+            if folder is not None:
+                plain = [known[fold].to_json() for fold in sorted(known)]
+                write_marked(folder, VALIDATION, mark, {"folds": plain})
         tell(event)
-    errors = tuple(ended[fold] for fold in sorted(ended))
-    if folder is not None:
-        write_marked(folder, VALIDATION, mark, {"folds": [fold.to_json() for fold in errors]})
-    return errors
+    return tuple(known[fold] for fold in sorted(known))
 
 
-def written_folds(path: Path, mark: str) -> tuple[FoldError, ...] | None:
-    """What an interrupted run has validated already; None when it is not of this fit."""
-    return read_marked(path, mark, lambda told: tuple(FoldError(**fold) for fold in told["folds"]))
+def written_folds(path: Path, mark: str) -> dict[int, FoldError]:
+    """What an interrupted run has validated already, by fold; nothing of another fit."""
+    found = read_marked(path, mark, lambda told: [FoldError(**fold) for fold in told["folds"]])
+    return {error.fold: error for error in found or ()}

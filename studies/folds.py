@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -48,7 +48,9 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
     return folds_of(whose, min([count, *several]), setup.project.fit.seed)
 
 
-def validate(setup: FitSetup, count: int, starts: int) -> Iterator[FoldError | None]:
+def validate(
+    setup: FitSetup, count: int, starts: int, done: Collection[int] = ()
+) -> Iterator[FoldError | None]:
     """Fit without the points of each fold and judge at these points; None now and then.
 
     What follows from the data (strain range and breaks of the law, what a relative error is over)
@@ -57,11 +59,15 @@ def validate(setup: FitSetup, count: int, starts: int) -> Iterator[FoldError | N
 
     Parameters
     ----------
-    count : of folds, at most. starts : random starts a fold, the best of which counts.
+    count : of folds, at most. starts : random starts a fold, the best of which counts. done : folds
+        that are known already.
     """
     parts = folds(setup, count)
+    missing = [fold for fold in range(len(parts)) if fold not in done]
     prepare = functools.partial(_task, setup, parts, starts)
-    return setup.project.executor.run_tasks(prepare, range(len(parts)), "folds")
+    if not missing:
+        return iter(())
+    return setup.project.executor.run_tasks(prepare, missing, "folds")
 
 
 def _task(

@@ -17,11 +17,11 @@ from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import prepare_fit
-from ..fits.store import Store
 from ..notes import Note, NoteKind
 from .fold_record import validated_folds
 from .folds import FoldError, errors, part_of_objective, specimens_of
 from .law_candidates import candidates, plain
+from .marked import begin_study
 from .stored_fit import stored_fit
 
 #: Of the smallest cross-validated error: a simpler form within it is as good.
@@ -180,7 +180,7 @@ def compare_laws(
     folder = None if out is None else Path(out)
     if folder is not None:
         parts = {"version": __version__, "folds": str(folds), "fold starts": str(fold_starts)}
-        Store(folder).begin(parts, resume, overwrite)
+        begin_study(folder, parts, resume, overwrite, map(plain, projects))
     done = []
     for name, own in projects.items():
         tell(name)

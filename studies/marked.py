@@ -4,13 +4,35 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..fits.store import Store
 
 T = TypeVar("T")
+
+
+def begin_study(
+    folder: Path,
+    parts: Mapping[str, str],
+    resume: bool,
+    overwrite: bool,
+    fits: Iterable[str],
+    records: Sequence[str] = (),
+) -> None:
+    """Make the folder of a study ready, of whose fits each has a folder of its own in it.
+
+    Where all is replaced, nothing of earlier fits is left that an interrupted study would go on
+    with.
+
+    Raises
+    ------
+    OutputError, InputError : as `Store.begin`.
+    """
+    for name in fits if overwrite else ():
+        Store(folder / name).forget()
+    Store(folder).begin(parts, resume, overwrite, records)
 
 
 def mark_of(parts: Mapping[str, Any]) -> str:

@@ -17,6 +17,7 @@ from ..materials.card import MaterialCard
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..solvers.base import History
+from ..solvers.run_cache import RunCache
 from .ratios import Ratios, by_response
 from .series import (
     Part,
@@ -152,13 +153,14 @@ def vary_nu12(
     values: Sequence[float] = NU12,
     tests: str | Sequence[str] | None = None,
     progress: Progress | None = None,
+    kept: RunCache | None = None,
 ) -> Nu12Study:
     """Run tests with a card whose Poisson's ratio is changed, the moduli as they are.
 
     Parameters
     ----------
     card : itself, its file, or its name in the project. values : of nu12. tests : names or kinds,
-    all unless given. progress : is told how far the study is.
+    all unless given. progress : is told how far the study is. kept : as of `refine`.
 
     Raises
     ------
@@ -169,7 +171,7 @@ def vary_nu12(
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
     material, several = card_of(project, card), tuple(sorted(set(values)))
-    series = Series(project, material, progress)
+    series = Series(project, material, progress, kept)
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     series.total = len(parts) * (1 + len(several))
     return Nu12Study(

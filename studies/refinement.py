@@ -21,6 +21,7 @@ from ..materials.card import MaterialCard
 from ..meshes.mesh import Mesh
 from ..notes import Note, NoteKind, as_note
 from ..notes import lines as note_lines
+from ..solvers.run_cache import RunCache
 from .series import (
     Part,
     Series,
@@ -152,6 +153,7 @@ def refine(
     factor: int = 2,
     coarser: int | None = None,
     progress: Progress | None = None,
+    kept: RunCache | None = None,
 ) -> Refinement:
     """Run tests with a card on finer and finer meshes, or with more and more increments.
 
@@ -162,6 +164,7 @@ def refine(
     factor : edges, or increments, are divided by it from one level to the next.
     coarser : levels coarser than the project's own; 1 of elements and 0 of increments unless given.
     progress : is told how far the study is.
+    kept : where each analysis is kept as it ends, so that an interrupted study can be gone on with.
 
     Raises
     ------
@@ -172,7 +175,7 @@ def refine(
     if below >= levels:
         raise InputError(None, "--coarser", f"expected fewer than the {levels} levels, got {below}")
     material = card_of(project, card)
-    series = Series(project, material, progress)
+    series = Series(project, material, progress, kept)
     factors = [float(factor) ** (k - below) for k in range(levels)]
     chosen = studied_tests(project, tests)
     # All before the first run: a level that cannot be meshed is a mistake in the options.
@@ -209,8 +212,8 @@ def run_level(series: Series, level: Level) -> LevelRun:
         history = series.run(part, series.card.law)
     except SolverFailure as failure:
         return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
-    # Of a run that is in the cache: what it took when it was made.
-    seconds = time.perf_counter() - begun if history.took is None else history.took
+    # Without the keeping, and of a run that was kept earlier what it took then.
+    seconds = time.perf_counter() - begun if history.seconds is None else history.seconds
     studied = part.studied
     values = studied.quantities(part.model, history)
     along = None if studied.curve is None else studied.curve(part.model, history)

@@ -20,6 +20,7 @@ from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, write_notes
 from ..solvers.base import History, Solver
+from ..solvers.run_cache import RunCache
 from ..writing import replacing, write_text
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Series:
     Parameters
     ----------
     project : whose tests are run. card : with which material. progress : is told how far they are.
-        `total` : how many analyses there will be, for the progress.
+        `total` : how many analyses there will be, for the progress. kept : as of `Analyses`.
 
     Raises
     ------
@@ -54,9 +55,13 @@ class Series:
     """
 
     def __init__(
-        self, project: Project, card: MaterialCard, progress: Progress | None = None
+        self,
+        project: Project,
+        card: MaterialCard,
+        progress: Progress | None = None,
+        kept: RunCache | None = None,
     ) -> None:
-        self.card, self._analyses = card, Analyses(project, progress)
+        self.card, self._analyses = card, Analyses(project, progress, kept)
 
     @property
     def total(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -13,12 +13,12 @@ from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import prepare_fit
-from ..fits.store import Store
 from ..materials.card import MaterialCard, thickness_difference
 from .held_out import HeldOut, held_out
 from .law_candidates import candidates, plain
 from .left_out import judged_with, parts_of
 from .left_out_record import recorded
+from .marked import begin_study
 from .stored_fit import stored_fit
 from .validated import Judged, Validation
 
@@ -76,7 +76,7 @@ def validate(
     folder = None if out is None else Path(out)
     if folder is not None:
         of = {"version": __version__, "forms": ", ".join(projects), "left out": leave}
-        Store(folder).begin(of, resume, overwrite)
+        begin_study(folder, of, resume, overwrite, _places(projects, len(chosen)))
     judged = []
 
     def fitted(own: Project, name: str, names: Sequence[str], place: str) -> Fit:
@@ -129,6 +129,12 @@ def judge_cards(
         for test in setup.tests
     ]
     return Validation(project.title, tuple(judged))
+
+
+def _places(forms: Iterable[str], tests: int) -> list[str]:
+    """Folders of the fits."""
+    names = ["all", *(f"without-{k + 1}" for k in range(tests))]
+    return [f"{plain(form)}-{name}" for form in forms for name in names]
 
 
 def _judge(found: Fit, test: PreparedTest) -> HeldOut:

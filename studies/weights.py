@@ -14,14 +14,14 @@ from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit
 from ..fits.setup import FitSetup
-from ..fits.store import Store
 from ..identification.fit import fit_from
 from ..identification.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from .folds import errors
+from .marked import begin_study
 from .stored_fit import stored_fit
 from .weighted_fit import PLACES, WeightedFit
-from .weights_record import WeightsRecord
+from .weights_record import RUNS, WeightsRecord
 from .weights_result import WeightStudy
 
 STARTS = 5
@@ -73,7 +73,7 @@ def weight_study(
     folder = None if out is None else Path(out)
     if folder is not None:
         of = {"version": __version__, "counted": ", ".join(names)}
-        Store(folder).begin(of, resume, overwrite)
+        begin_study(folder, of, resume, overwrite, [FITTED], [RUNS])
     tell("the fit at the project's weights")
     found = stored_fit(
         project,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
+from bubblefit.experiments.base import RunRecord
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.experiments.cylinder.record import run_of
 from bubblefit.fits.predictions import mark_of
@@ -18,6 +19,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.models.bending import inflated_cylinder
 from bubblefit.models.cylinder import CylinderModel
 from bubblefit.models.reading import curve_reading
+from bubblefit.notes import Note, NoteKind
 from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
@@ -193,3 +195,13 @@ def test_digests_tell_things_apart_by_what_they_hold() -> None:
     assert digest_of({"a": 1, "b": 2}) == digest_of({"b": 2, "a": 1})
     with pytest.raises(TypeError, match="object"):
         digest_of(object())
+
+
+def test_of_what_a_remark_is_said_comes_back(tmp_path: Path) -> None:
+    records = RunRecords(tmp_path)
+    records.begin(False, False)
+    said = Note(NoteKind.SNAP, "it snapped", "at 3 kPa")
+    records.write("a" * 64, RunRecord(1.0, strain=np.ones(3), remarks=(said,), from_cache=True))
+    found = records.read("a" * 64)
+    assert found is not None and found.from_cache
+    assert [(note.kind, note, note.of) for note in found.remarks] == [(said.kind, said, said.of)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -67,3 +68,21 @@ def test_what_is_gone_on_with_is_kept(tmp_path: Path) -> None:
 def test_usual_folders(tmp_path: Path) -> None:
     assert usual_folder(tmp_path / "fabric" / "project.toml") == Path("out") / "fabric"
     assert usual_folder(tmp_path / "fabric" / "linear.toml") == Path("out") / "fabric-linear"
+
+
+def test_what_a_killed_process_had_begun_to_write_goes(tmp_path: Path) -> None:
+    gone, ours = ".result.999999999.json", f".moduli.{os.getpid()}.csv"
+    for name in (gone, ours, ".hidden", ".a.b", "notes.999999999.txt"):
+        (tmp_path / name).write_text("half")
+    Store(tmp_path).begin({}, False, False)
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == sorted([RUN, ours, ".hidden", ".a.b", "notes.999999999.txt"])
+
+
+def test_a_folder_that_is_to_be_replaced_holds_nothing(tmp_path: Path) -> None:
+    store = Store(tmp_path / "fit")
+    store.forget()  # not there
+    store.begin({}, False, False)
+    store.finish({})
+    store.forget()
+    assert not store.used

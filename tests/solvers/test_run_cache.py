@@ -64,7 +64,7 @@ def test_the_same_comes_back_to_the_last_digit(cache: RunCache) -> None:
     assert cache.read(KEY) is None
     cache.write(KEY, kept, 12.5)
     found = cache.read(KEY)
-    assert found is not None and found.from_cache and found.took == 12.5
+    assert found is not None and found.from_cache and found.seconds == 12.5
     assert not kept.from_cache
     same(found, kept)
     assert cache.read(KEY.replace(KEY[0], "f" if KEY[0] != "f" else "0")) is None

@@ -48,12 +48,15 @@ def test_without_a_fold_that_ended_there_is_no_conclusion() -> None:
 def test_folds_of_another_fit_are_not_taken(tmp_path: Path) -> None:
     path = tmp_path / "validation.json"
     path.write_text(json.dumps({"of": "this", "folds": []}))
-    assert written_folds(path, "this") == ()
-    assert written_folds(path, "another") is None
+    assert written_folds(path, "this") == {}
+    first = {"fold": 1, "value": 0.5, "rms": {}}
+    path.write_text(json.dumps({"of": "this", "folds": [first]}))
+    assert written_folds(path, "this") == {1: FoldError(**first)}
+    assert written_folds(path, "another") == {}
     path.write_text(json.dumps({"of": "this", "folds": [{"colour": 1}]}))
-    assert written_folds(path, "this") is None
+    assert written_folds(path, "this") == {}
     path.write_text("{")
-    assert written_folds(path, "this") is None and written_folds(tmp_path / "none", "this") is None
+    assert written_folds(path, "this") == {} and written_folds(tmp_path / "none", "this") == {}
 
 
 class Form(FormFit):

@@ -176,3 +176,26 @@ def test_going_on_validates_nothing_twice(compared: LawComparison, run: Run) -> 
     assert sum(isinstance(event, FoldError) for event in run.events) == 2
     written = json.loads(path.read_text())
     assert path.read_text() == json.dumps(written, indent=1) + "\n" and len(written["folds"]) == 2
+    # Cut off after its first fold, only the second is made.
+    path.write_text(json.dumps({**written, "folds": written["folds"][:1]}))
+    again = run.compare(resume=True)
+    assert [form.folds for form in again.forms] == before
+    (fold,) = [event for event in run.events if isinstance(event, FoldError)]
+    assert fold.to_json() == written["folds"][1]
+
+
+def test_what_is_replaced_is_not_gone_on_with(run: Run, compared: LawComparison) -> None:
+    """Cut off while it replaced all, it does not take an earlier fit for one of its own."""
+    other = run.path.read_text().replace("seed = 7", "seed = 8")
+    assert other != run.path.read_text()
+    run.path.write_text(other)
+
+    def stop(event: Any) -> None:
+        if event == "constant":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        compare_laws(bf.read_project(run.path), ["one"], FORMS, folds=5, starts=1, fold_starts=1,
+                     out=run.out, progress=stop, overwrite=True)  # fmt: skip
+    again = run.compare(resume=True)
+    assert [form.fit.project.fit.seed for form in again.forms] == [8, 8]

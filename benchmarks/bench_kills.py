@@ -1,0 +1,403 @@
+"""kill -9 at random moments of fits, bendings and validations; each gone on with to its end.
+
+    python benchmarks/bench_kills.py [kills a command, 4 unless given] [seed] [command ...]
+
+What is killed: the command's own process, one of its workers, or the CalculiX that runs. Then:
+is the result that of the run that nobody killed, number by number; is any process alive; is a
+scratch folder, a half-written file or shared memory left? /dev/shm is this script's own where a
+mount of it is allowed. Exit code 1 where anything differs or is left.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: In the environment of all that a trial starts, and of this process where /dev/shm is its own.
+MARK, OWN = "BUBBLEFIT_KILLS", "BUBBLEFIT_KILLS_OWN"
+SHARED = Path("/dev/shm")
+#: Of result.json and tables: how long it took, how many runs were made now, when and where.
+UNEQUAL = ("wall_s", "seconds", "external_runs", "cached_runs", "provenance")
+#: s; how long what should end may take, and a command as a whole.
+ENDING, LONGEST = 25.0, 300.0
+TIMES_A_RUN = 4
+PICTURE = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010806000000"
+    "1f15c4890000000d49444154789c6360606060000000050001a5f645400000000049454e44ae426082"
+)
+BUBBLE = """
+[fabric]
+thickness = 0.81
+[law]
+form = "constant"
+[law.bounds]
+lower = [0.03, 0.3, 0.3]
+upper = [0.2, 1.0, 1.0]
+[[bubble]]
+radius = 100.0
+pressures = [22, 59]
+elements = 32
+symmetry = "quarter"
+[bubble.data.known_solution]
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+[fit]
+starts = {starts}
+jobs = 2
+tolerance = 1e-6
+[solver.calculix]
+element = "S4"
+"""
+CYLINDERS = """
+[fabric]
+thickness = 0.81
+[fit]
+jobs = 2
+[defaults.cylinder]
+length = 1200.0
+span = 800.0
+seam_width = 0.0
+element_size = 60.0
+deflection = 8.0
+frames = 2
+[[cylinder]]
+name = "low"
+diameter = 150.0
+pressure = 90.0
+[[cylinder]]
+name = "high"
+diameter = 150.0
+pressure = 140.0
+[[card]]
+name = "soft"
+beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
+[[card]]
+name = "stiff"
+beta = [0, 0, 0, 0.1, 0, 0, 0, 0.6, 0, 0, 0, 1.0]
+"""
+STRIPS = """
+[fabric]
+thickness = 0.8
+[law]
+form = "constant"
+nu12 = 0.0
+strain_range = [0.12, 0.14, 0.1]
+[law.bounds]
+E1 = [0.02, 2.0]
+E2 = [0.03, 1.0]
+G12 = [0.005, 0.2]
+[[strips]]
+increments = 6
+match = "points"
+warp = { gauge_length = 20, final_length = 22.9 }
+fill = { gauge_length = 20, final_length = 22.9 }
+[strips.data]
+files = ["points.csv"]
+[fit]
+starts = 1
+jobs = 2
+"""
+COMMANDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "fit": (BUBBLE.replace("{starts}", "4"), ("fit",)),
+    "fit by CalculiX": (BUBBLE.replace("{starts}", "2"), ("fit", "--solver", "calculix")),
+    "bend": (CYLINDERS, ("bend", "--samples", "0")),
+    "validate": (STRIPS, ("validate", "--leave", "specimens", "--starts", "1")),
+}
+
+
+@dataclass
+class Told:
+    """What a command's trials came to. killed : by what was killed."""
+
+    killed: Counter[str] = field(default_factory=Counter)
+    trials: int = 0
+    equal: int = 0
+    other: list[str] = field(default_factory=list)
+    left: list[str] = field(default_factory=list)
+
+
+class Trial:
+    """One command in a folder of its own, killed and gone on with."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        text, (command, *options) = COMMANDS[name]
+        folder = folder / "project"  # results are called by it
+        folder.mkdir(parents=True)
+        self.folder, self.out = folder, folder / "out"
+        (folder / "tmp").mkdir()
+        (folder / "project.toml").write_text(text)
+        if "points.csv" in text:
+            _write_points(folder / "points.csv")
+        self.arguments = [command, "project.toml", *options, "--out", "out", "--quiet"]
+        self.said = folder / "stderr"
+
+    def start(self) -> int:
+        """A copy of this process becomes the command, with --resume where there is something."""
+        used = any((self.out / name).exists() for name in ("run.json", "result.json"))
+        arguments = [*self.arguments, *(["--resume"] if used else [])]
+        sys.stdout.flush()
+        child = os.fork()
+        if child:
+            return child
+        try:
+            os.setsid()
+            os.chdir(self.folder)
+            os.environ |= {
+                MARK: str(self.folder),
+                "BUBBLEFIT_RUNS": str(self.folder / "runs"),
+                "TMPDIR": str(self.folder / "tmp"),
+            }
+            tempfile.tempdir = None
+            stream = os.open(self.said, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+            os.dup2(stream, 1)
+            os.dup2(stream, 2)
+            from bubblefit.cli.main import main
+            from matplotlib.figure import Figure
+
+            Figure.savefig = _stub  # type: ignore[method-assign]
+            main(arguments, prog_name="bubblefit")
+        except SystemExit as end:
+            os._exit(end.code if isinstance(end.code, int) else 0)
+        finally:
+            os._exit(70)
+
+    def all_alive(self, own: int) -> list[tuple[int, str]]:
+        """Processes of the trial that live, by name: its session's, and what it has started."""
+        mark = f"{MARK}={self.folder}".encode()
+        found = []
+        for process in Path("/proc").glob("[0-9]*"):
+            try:
+                said = (process / "stat").read_text().rpartition(")")
+                name = said[0].partition("(")[2]
+                state, _, _, session = said[2].split()[:4]
+                marked = mark in (process / "environ").read_bytes().split(b"\0")
+            except OSError:
+                continue
+            if (
+                state != "Z"
+                and int(process.name) != os.getpid()
+                and (int(session) == own or marked)
+            ):
+                found.append((int(process.name), name))
+        return found
+
+    def left(self) -> list[str]:
+        """Scratch folders, half-written files and shared memory that are there."""
+        places = [*(self.folder / "tmp").iterdir(), *self.folder.rglob(".*.part")]
+        places += [path for path in self.out.rglob(".*") if path.is_file()]
+        places += SHARED.iterdir() if OWN in os.environ else SHARED.glob("bubblefit-*-*")
+        return [str(path) for path in places]
+
+
+def _stub(figure: Any, target: Any, **given: Any) -> None:
+    """In place of a figure, whose drawing would be most of the time: the smallest picture."""
+    if hasattr(target, "write"):
+        target.write(PICTURE)
+    else:
+        Path(target).write_bytes(PICTURE)
+
+
+def until(done: Any, seconds: float) -> bool:
+    """Whether it came to be within the time."""
+    end = time.monotonic() + seconds
+    while not done():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def ended(process: int) -> int | None:
+    """Its exit code (-9: killed), None while it lives."""
+    found, status = os.waitpid(process, os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if found else None
+
+
+def finish(process: int) -> int:
+    """Its exit code; killed where it takes too long, which is told as -1000."""
+    end = time.monotonic() + LONGEST
+    while (code := ended(process)) is None:
+        if time.monotonic() > end:
+            os.kill(process, signal.SIGKILL)
+            os.waitpid(process, 0)
+            return -1000
+        time.sleep(0.01)
+    return code
+
+
+def killed(trial: Trial, process: int, draw: random.Random) -> str:
+    """Kill one of the trial's processes; what it was, "" where it had ended."""
+    alive = trial.all_alive(process)
+    solvers = [number for number, name in alive if name.startswith("ccx")]
+    workers = [number for number, name in alive if number != process and name != "sh"]
+    workers = [number for number in workers if number not in solvers]
+    groups = {"the command": [process], "a worker": workers, "CalculiX": solvers}
+    what = draw.choice([name for name, several in groups.items() if several])
+    if not alive_still(process):
+        return ""
+    try:
+        os.kill(draw.choice(groups[what]), signal.SIGKILL)
+    except ProcessLookupError:
+        return ""
+    return what
+
+
+def alive_still(process: int) -> bool:
+    """Whether our child has not ended (it is not waited for)."""
+    try:
+        said = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return False
+    return said[0] != "Z"
+
+
+def content(out: Path) -> dict[str, Any]:
+    """All that a command found: result.json and tables, without what `UNEQUAL` names."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: plain(v) for k, v in value.items() if k not in UNEQUAL}
+        return [plain(one) for one in value] if isinstance(value, list) else value
+
+    found = {"result.json": plain(json.loads((out / "result.json").read_text()))}
+    for path in sorted(out.rglob("*.csv")):
+        with path.open(newline="") as stream:
+            rows = [plain(dict(row)) for row in csv.DictReader(stream)]
+        for row in rows:
+            # An analysis that is taken from the cache says so.
+            if "status" in row:
+                row["status"] = row["status"].replace(", from the cache", "")
+        found[str(path.relative_to(out))] = rows
+    return found
+
+
+def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, most: int,
+              draw: random.Random, told: Told) -> int:  # fmt: skip
+    """Up to `most` kills of one command, and its end; how many there were."""
+    trial, count, failed = Trial(folder, name), 0, False
+    while True:
+        process = trial.start()
+        if (
+            count < most
+            and until(lambda p=process: not alive_still(p), draw.uniform(0, seconds)) is False
+        ):
+            what = killed(trial, process, draw)
+            if what:
+                told.killed[what] += 1
+                count += 1
+                failed = failed or what == "CalculiX"
+        code = finish(process)
+        if not until(lambda p=process: not trial.all_alive(p), ENDING):
+            told.left.append(f"{folder.name}: alive: {trial.all_alive(process)}")
+        if code == 0 and (trial.out / "result.json").exists():
+            break
+        if code not in (-9, 4):
+            told.other.append(f"{folder.name}: exit code {code}: {trial.said.read_text()[-400:]}")
+            return count
+    told.trials += 1
+    found = content(trial.out)
+    differ = [key for key in {**whole, **found} if whole.get(key) != found.get(key)]
+    if not differ:
+        told.equal += 1
+    elif not failed:
+        told.other.append(f"{folder.name}: {', '.join(differ)} of another run")
+    else:
+        # A run that is killed is a point that cannot be analysed: the fit goes another way.
+        e, own = found["result.json"]["objective"], whole["result.json"]["objective"]
+        told.killed["CalculiX, and another way"] += 1
+        if not e < max(10 * own, 1e-3):
+            told.other.append(f"{folder.name}: objective {e:g} instead of {own:g}")
+    kept = [path for path in trial.left() if not (failed and "bubblefit-ccx" in path)]
+    told.left += [f"{folder.name}: {path}" for path in kept]
+    for path in SHARED.glob("bubblefit-ccx-*") if OWN in os.environ else ():
+        shutil.rmtree(path, ignore_errors=True)
+    return count
+
+
+def trials(place: Path, name: str, kills: int, seed: int) -> Told:
+    """So many kills of a command, in as many trials as that takes."""
+    draw, told, count = random.Random(f"{name} {seed}"), Told(), 0
+    first = Trial(place / f"{name} whole", name)
+    for _ in range(2):  # the second time everything is compiled
+        shutil.rmtree(first.out, ignore_errors=True)
+        shutil.rmtree(first.folder / "runs", ignore_errors=True)
+        begun = time.monotonic()
+        code = finish(first.start())
+        seconds = time.monotonic() - begun
+        assert code == 0, first.said.read_text()
+    whole = content(first.out)
+    while count < kills:
+        folder = place / f"{name} {told.trials + len(told.other)}"
+        most = min(TIMES_A_RUN, kills - count)
+        count += one_trial(folder, name, whole, seconds, most, draw, told)
+        shutil.rmtree(folder, ignore_errors=True)
+        if len(told.other) > 3:
+            break
+    return told
+
+
+def lines(name: str, told: Told) -> Iterator[str]:
+    """What there is to say of a command."""
+    killed_words = ", ".join(f"{what} {count}" for what, count in sorted(told.killed.items()))
+    yield (
+        f"{name:16} {told.trials:3} trials, killed: {killed_words}; the same to the last digit: "
+        f"{told.equal}; other ends {len(told.other)}, left behind {len(told.left)}"
+    )
+    yield from (f"    {line}" for line in [*told.other, *told.left])
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run; the exit code."""
+    if OWN not in os.environ and shutil.which("unshare"):
+        words = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
+        command = ["unshare", "-m", "sh", "-c", words, "sh", sys.executable, *sys.argv]
+        allowed = subprocess.run(
+            ["unshare", "-m", "sh", "-c", "mount -t tmpfs tmpfs /dev/shm"], capture_output=True
+        )
+        if allowed.returncode == 0:
+            return subprocess.run(command, env={**os.environ, OWN: "1"}).returncode
+    kills = int(arguments[0]) if arguments else 4
+    seed = int(arguments[1]) if len(arguments) > 1 else 1
+    bad = False
+    with tempfile.TemporaryDirectory(prefix="kills-") as place:
+        for name in arguments[2:] or COMMANDS:
+            told = trials(Path(place), name, kills, seed)
+            bad = bad or bool(told.other or told.left)
+            print("\n".join(lines(name, told)), flush=True)
+    return int(bad)
+
+
+def _write_points(path: Path) -> None:
+    elongation = np.linspace(0.2, 2.8, 8)
+    rows = ["direction,specimen,elongation (mm),load (N)"]
+    for direction, moduli in {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}.items():
+        for specimen, modulus in zip("ab", moduli, strict=True):
+            loads = 20 * modulus * np.log1p(elongation / 20)
+            rows += [
+                f"{direction},{specimen},{u!r},{load!r}"
+                for u, load in zip(elongation.tolist(), loads.tolist(), strict=True)
+            ]
+    path.write_text("\n".join(rows) + "\n")
+
+
+if __name__ == "__main__":
+    import bubblefit.fits.fit
+    import bubblefit.fits.predictions
+    import bubblefit.reports
+    import bubblefit.studies.validation  # noqa: F401
+
+    sys.exit(main(sys.argv[1:]))
