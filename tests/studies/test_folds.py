@@ -54,7 +54,8 @@ def test_a_fold_errs_by_what_the_specimens_differ_by(tmp_path: Path) -> None:
     project = read_project(tmp_path / "project.toml")
     setup = prepare_fit(project, project.chosen(None, fitted=True))
     folds = [fold for fold in validate(setup, 5, 1) if fold is not None]
-    assert [fold.fold for fold in folds] == [0, 1]  # as many as specimens
+    # As many as specimens, whichever of two processes is first.
+    assert sorted(fold.fold for fold in folds) == [0, 1]
     root_mean_square = float(np.sqrt(np.mean(strain**2)))
     for fold in folds:
         expected = {f"strips: {d}": 20 * abs(a - b) * root_mean_square
