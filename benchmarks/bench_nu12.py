@@ -1,11 +1,12 @@
-"""Can nu12 be identified? The example's data, a bubble alone and with strips, fitted with it free.
+"""Can nu12 be identified? The example's data, a bubble alone, with strips, with a biaxial test.
 
 Usage: bench_nu12.py [SETS] [QUADS]. SETS (10 unless given) sets of white noise of 0.02 and of 0.05
 mm on the displacements of the known solution (800 quads as a quarter), of 1 % of the largest load
-on strips along warp, fill and bias that the same law computes; and none. Fits begin at nu12 = 0.1
-with the moduli of the known law. Printed: nu12 found (0.24 is right), its scatter, the sigma that a
-fit says (median), its correlation with the moduli in the middle of their strains, and that of
-the moduli.
+on strips along warp, fill and bias that the same law computes, of 0.01 % on the strains of biaxial
+paths of 1:1, 2:1 and 1:2 up to the strains of the law; and none. Fits have nu12 free and begin at
+0.1 with the moduli of the known law. Printed: nu12 found (0.24 is right), its scatter, the sigma
+that a fit says (median), its correlation with the moduli in the middle of their strains, and that
+of the moduli.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 from bubblefit.experiments.base import PreparedTest
+from bubblefit.experiments.biaxial.candidates import candidates as biaxial_candidates
+from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.candidates import Planning
 from bubblefit.experiments.strips.candidates import candidates
@@ -30,10 +33,12 @@ from known_solution import known_project, known_setup
 RIGHT, FROM = 0.24, 0.1
 OF_LOAD = 0.01
 STRIPS = ("warp strip", "fill strip", "strip at 45 degrees")
+#: Ratios of the biaxial test, and the share of noise of its strains.
+RATIOS, OF_STRAIN = ("biaxial 1:1", "biaxial 2:1", "biaxial 1:2"), 1e-4
 
 
 def setups(quads: int) -> dict[str, FitSetup]:
-    """The bubble alone, and with strips of the same law; nu12 free."""
+    """The bubble alone, and with strips and a biaxial test of the same law; nu12 free."""
     project = known_project(quads)
     free = UnknownsSection(nu12=UnknownSection(bounds=[0.0, 0.6]))
     project = replace(project, fit=project.fit.model_copy(update={"unknowns": free}))
@@ -43,7 +48,14 @@ def setups(quads: int) -> dict[str, FitSetup]:
     planning = Planning(bubble.test.place, [], {}, bubble.known, setup.make_solver)  # type: ignore[attr-defined]
     offered = {c.name: c for c in candidates(planning)}
     strips = tuple(offered[name].make() for name in STRIPS)
-    return {"bubble": setup, "bubble and strips": replace(setup, tests=(bubble, *strips))}
+    biaxial = tuple(c.make() for c in biaxial_candidates(planning) if c.name in RATIOS)
+    several = {
+        "bubble": (bubble,),
+        "bubble and strips": (bubble, *strips),
+        "bubble and biaxial": (bubble, *biaxial),
+        "bubble, strips and biaxial": (bubble, *strips, *biaxial),
+    }
+    return {name: replace(setup, tests=tests) for name, tests in several.items()}
 
 
 def noisy(test: PreparedTest, noise: float, random: np.random.Generator) -> PreparedTest:
@@ -55,6 +67,11 @@ def noisy(test: PreparedTest, noise: float, random: np.random.Generator) -> Prep
             for n in [len(f.points)]
         )
         return replace(test, test=replace(test.test, noise=max(noise, 1e-3)), fields=fields)
+    if isinstance(test, PreparedBiaxial):
+        (path,) = test.test.data.paths
+        off = (noise > 0) * OF_STRAIN * random.standard_normal(path.strain.shape)
+        data = replace(test.test.data, paths=(replace(path, strain=path.strain + off),))
+        return replace(test, test=replace(test.test, data=data, noise=OF_STRAIN))
     assert isinstance(test, PreparedStrips)
     ((direction, strip),) = test.test.strips.items()
     (curve,) = strip.curves
