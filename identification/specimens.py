@@ -58,6 +58,8 @@ def alike_in_all(
 ) -> Discrepancy | None:
     """What specimens have in common beside the model, in the residuals' unit.
 
+    Its RMS is that of what no change of the unknowns could follow.
+
     Parameters
     ----------
     residuals : (n,) of each specimen, model less measured. places : (n,) along its curve.
@@ -92,8 +94,9 @@ def alike_in_all(
     each = np.array(amplitudes)
     mean, specimens = each.mean(axis=0), len(some)
     spread = np.atleast_2d(np.cov(each.T))
-    everywhere = _values(np.linspace(-1.0, 1.0, 50), shapes)
-    rms = float(np.sqrt(np.mean((everywhere @ mean) ** 2)))
+    common = _values(np.concatenate(along), shapes) @ mean
+    followed = np.linalg.qr(whole @ kept.T)[0] if len(kept) else np.zeros((len(common), 0))
+    rms = float(np.sqrt(np.mean((common - followed @ (followed.T @ common)) ** 2)))
     if not np.linalg.eigvalsh(spread).min() > 0:
         return None  # specimens that do not differ at all: nothing to test against
     square = specimens * float(mean @ np.linalg.solve(spread, mean))
