@@ -222,6 +222,23 @@ def test_programs_end_when_nobody_wants_their_results(scheduler: str, tmp_path: 
         wait_for(lambda path=path: not Path(f"/proc/{path.read_text().strip()}").exists())
 
 
+def test_a_task_ends_at_its_next_word_when_nobody_wants_it(scheduler: str, tmp_path: Path) -> None:
+    def prepare() -> Any:
+        def task(number: int, tell: Any) -> None:
+            for _ in range(600):
+                (tmp_path / "alive").touch()
+                time.sleep(0.05)
+                tell("a word")
+
+        return task
+
+    running = Executor(scheduler=scheduler).run_tasks(prepare, [0])
+    wait_for(lambda: next(running) is None and (tmp_path / "alive").exists())
+    running.close()
+    alive = tmp_path / "alive"
+    wait_for(lambda: time.time() - alive.stat().st_mtime > 1.0)
+
+
 # Who is used
 
 

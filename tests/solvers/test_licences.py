@@ -169,6 +169,25 @@ def test_a_file_that_was_tidied_away_is_no_lock(tmp_path: Path) -> None:
             assert licence_locks._any(tmp_path, "acme", 1) is None
 
 
+def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tidied away, and made again by somebody else, between opening and locking it."""
+    opened = licence_locks._opened
+
+    def replaced(path: Path) -> int:
+        file = opened(path)
+        path.unlink()
+        path.touch()
+        return file
+
+    monkeypatch.setattr(licence_locks, "_opened", replaced)
+    assert licence_locks._any(tmp_path, "acme", 1) is None
+    monkeypatch.undo()
+    with locked("acme", 1, tmp_path, pytest.fail):
+        pass
+
+
 def test_a_link_is_not_followed_and_a_folder_must_be_one(tmp_path: Path) -> None:
     (tmp_path / "victim").write_text("")
     (tmp_path / "acme-1.lock").symlink_to(tmp_path / "victim")
