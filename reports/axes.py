@@ -45,10 +45,11 @@ def axes_of(chart: Chart) -> tuple[Axis, Axis]:
     if chart.top is not None:
         up = (s.y for s in chart.series)
     level = [] if chart.level is None else [chart.level]
-    y = _axis([*_known(up, chart.log_y), *level], chart.log_y, ROOM)
-    low = min(0.0, y.low) if not chart.from_zero or y.low < 0 else 0.0
-    if not chart.log_y and (chart.from_zero or 0 < y.low < 0.25 * y.high):
-        y = Axis(min(0.0, low), y.high)
+    values = [*_known(up, chart.log_y), *level]
+    y = _axis(values, chart.log_y, ROOM)
+    least = min(values, default=0.0)
+    if not chart.log_y and least >= 0 and (chart.from_zero or y.low < 0.25 * y.high):
+        y = Axis(0.0, y.high)
     if chart.top is not None:
         y = Axis(y.low, max(chart.top, y.low + 1e-12), chart.log_y)
     dotted = any(s.look == "dots" for s in chart.series)

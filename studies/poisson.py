@@ -144,6 +144,8 @@ class Nu12Study:
             lambda path: plot_nu12(path, panels, self.base, self.response),
             self.result,
             self.notes,
+            f"{self.project.name}: what nu12 changes",
+            self.lines(),
         )
 
 

@@ -141,6 +141,8 @@ class Refinement:
             lambda path: plot_convergence(path, panels(self), self.what),
             self.result,
             self.notes,
+            f"{self.project.name}: finer and finer {self.what}",
+            self.lines(),
         )
 
 

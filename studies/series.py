@@ -22,6 +22,7 @@ from ..notes import Note, write_notes
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from ..writing import replacing, write_text
+from .study_page import write_study_page
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,8 +182,12 @@ def write_study(
     draw: Callable[[Path], Any],
     result: Mapping[str, Any],
     notes: Sequence[Note],
+    title: str = "",
+    said: Sequence[str] = (),
 ) -> None:
-    """Write the table NAME.csv, the figure NAME.png, notes.csv and, last, result.json.
+    """Write the table NAME.csv, the figure NAME.png, notes.csv, the page and, last, result.json.
+
+    title : of the page; said : the lines of the terminal.
 
     Raises
     ------
@@ -192,4 +197,5 @@ def write_study(
         table.to_csv(path, index=False, lineterminator="\n")
     draw(folder / f"{name}.png")
     write_notes(folder, notes)
+    write_study_page(folder, title or name, said, table, f"{name}.csv", notes, f"{name}.png")
     write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")

@@ -120,10 +120,14 @@ class Validation:
         return said
 
     def write(self, folder: Path) -> None:
-        """validation.csv, notes.csv and, last, result.json; raises OutputError."""
+        """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
+        from .study_page import write_study_page
+
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
         write_notes(folder, self.notes)
+        title = f"{self.title}: does a fit foretell what it was not given?"
+        write_study_page(folder, title, self.lines(), self.table(), TABLE, self.notes)
         Store(folder).finish(self.result)
 
 

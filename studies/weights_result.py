@@ -142,6 +142,7 @@ class WeightStudy:
         """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
         from ..fits.store import Store
         from ..reports import plot_weights
+        from .study_page import write_study_page
 
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
@@ -160,4 +161,6 @@ class WeightStudy:
             {name: self.sigma(name) for name in COMPONENTS},
         )
         write_notes(folder, self.notes)
+        title = f"{self.title}: the weight of {self.counted}"
+        write_study_page(folder, title, self.lines(), self.table(), TABLE, self.notes, FIGURE)
         Store(folder).finish(self.result)

@@ -12,6 +12,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
+from bubblefit.reports.page_file import read_page_data
 from bubblefit.studies.series import (
     Series,
     card_of,
@@ -102,7 +103,12 @@ def test_analyses_are_told_one_after_the_other(bars: BarSolver) -> None:
 def test_what_a_study_writes(tmp_path: Path) -> None:
     table, drawn = pd.DataFrame({"a": [1, 2], "b": ["x", "y"]}), []
     out, notes = tmp_path / "new", [Note(NoteKind.SNAP, "snaps", "one")]
-    write_study(out, "mesh", table, drawn.append, {"a": [1]}, notes)
+    write_study(out, "mesh", table, drawn.append, {"a": [1]}, notes, "Finer", ["it settles"])
+    page = read_page_data(out)
+    assert page.title == "Finer" and page.warnings == [note.line for note in notes]
+    assert page.tables[0].header == list(table.columns)
+    assert (page.sections[0].parts[0].text, page.figures[0][0]) == ("it settles", "mesh.png")
+    assert "it settles" in (out / "report.html").read_text()
     assert (out / "mesh.csv").read_bytes() == b"a,b\n1,x\n2,y\n" and drawn == [out / "mesh.png"]
     assert (out / "result.json").read_text() == '{\n "a": [\n  1\n ]\n}\n'
     assert (out / "notes.csv").read_text() == "of,kind,note\none,snap,snaps\n"
