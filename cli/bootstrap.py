@@ -22,6 +22,7 @@ from .arguments import (
     solver_choice,
     with_options,
 )
+from .ending import written_to
 from .examples import examples
 from .exits import exits, resumable
 from .options import data_folders, folder_beside, read_with_solver
@@ -86,5 +87,5 @@ def command(over: str, samples: int, seed: int | None, card: str | None, **optio
             resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
         )  # fmt: skip
     done.write(folder)
-    lines = [*done.lines(), f"written to {folder} (open report.html)"]
+    lines = [*done.lines(), written_to(folder)]
     click.echo(json.dumps(done.result, indent=1) if options["as_json"] else "\n".join(lines))
