@@ -1,5 +1,5 @@
-# make demo, make test, make lint, make bench, make docs, make mutants, make faults: each does all
-# the set-up it needs.
+# make demo, make test, make lint, make bench, make docs, make site, make mutants, make faults: each
+# does all the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test lint bench docs mutants faults calculix clean
+.PHONY: demo test lint bench docs site mutants faults calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -28,6 +28,7 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	MYPYPATH=$(VENV)/typing $(BIN)/mypy -p bubblefit
 	$(BIN)/python .ci/licences.py
+	$(BIN)/python docs/make_site.py
 
 bench: $(READY)
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
@@ -39,6 +40,10 @@ faults: $(READY)
 # Pages of the Python interface, from the docstrings.
 docs: $(READY)
 	$(BIN)/python docs/make_api.py
+
+# The documents as a site, out/site/index.html; a link that leads nowhere is an error.
+site: $(READY)
+	$(BIN)/python docs/make_site.py
 
 # Small faults put into a copy of the code, and which of them no test notices: all of them, or
 # CHANGED=1 (or =COMMIT) of the files that changed, MINUTES=5 at most, NUMBER=100 drawn by SEED=2,
@@ -59,4 +64,4 @@ $(READY): pyproject.toml .ci/venv
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out/demo build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) out/demo out/site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

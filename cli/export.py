@@ -59,7 +59,7 @@ def command(
     """Write the material of CARD (a material.toml) for another program.
 
     Each file begins with what the target carries of the law, what it loses, and what is to be
-    confirmed there; the same is printed. See docs/how-to/exports.md.
+    confirmed there; the same is printed. See `bubblefit docs exports`.
     """
     given = {option: value for option, value in options.items() if value is not None}
     FORMATS[name].check(given)

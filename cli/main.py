@@ -34,6 +34,7 @@ COMMANDS = {
     "study": ("study", "What refinement, or nu12, changes in an analysis."),
     "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("init", "Write a commented project: an example, or for your own tests."),
+    "docs": ("docs", "The documents of this version, page by page."),
     "schema": ("schema", "The JSON Schema of the project file, for editors."),
     "verify": ("verify", "Published and closed-form numbers beside this program's."),
     "cache": ("cache", "Runs of other programs that are kept: how many, where; fewer."),

@@ -20,7 +20,7 @@ from .schema import CommonSections
 #: Most tables of one sort: more is a mistake in whatever wrote the file.
 MANY = 1000
 OLD = (
-    "is of version 0.1, which had a file for each kind of test; docs/reference/project-file.md, "
+    "is of version 0.1, which had a file for each kind of test; `bubblefit docs project-file`, "
     '"From version 0.1", says how to write it now (or start from `bubblefit init`)'
 )
 

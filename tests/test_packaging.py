@@ -38,6 +38,8 @@ def shipped() -> set[str]:
         folder = ROOT.joinpath(*package.split(".")[1:])
         files = [f for f in folder.glob("*.py") if f != ROOT / "setup.py"]
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
+    documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
     for folder in ("examples", "templates", "studies/verification/published"):
         for file in (ROOT / folder).rglob("*"):
             inside = file.relative_to(ROOT)

@@ -27,7 +27,7 @@ def umat(card: MaterialCard, options: NoOptions) -> Export:
             "no Abaqus was at hand: the interface is the documented one, compiled and compared "
             "point by point; pull one element",
             "STRAN is the sum of increments along axes that turn with the material: log strain "
-            "but for 1e-6 on paths of proportional stretch and shear (docs/how-to/exports.md)",
+            "but for 1e-6 on paths of proportional stretch and shear (bubblefit docs exports)",
         ),
     )
     context = {

@@ -35,7 +35,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
         loses=(*loses, *range_remarks(card, options.reach)),
         confirm=(
             "the data blocks of NLELAST and the variable type 73 of its tables: no public deck "
-            "shows them (docs/reference/marc-deck.md of bubblefit)",
+            "shows them (bubblefit docs marc-deck)",
             "that tables of G12 are looked up with the engineering shear, sign included",
         ),
     )

@@ -15,7 +15,7 @@ from .settings import VARIABLE, MarcSettings
 
 ADVICE = (
     f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; "
-    "see docs/how-to/marc.md"
+    "see `bubblefit docs marc`"
 )
 SECONDS = 60.0
 

@@ -117,14 +117,14 @@ def _forces(
         # cylinder has not touched the bodies yet.
         found[body][1:, 1] = [model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]]
     words = (
-        f"the collar's force is the sum of {name!r}, which is not confirmed (docs/how-to/marc.md)"
+        f"the collar's force is the sum of {name!r}, which is not confirmed (bubblefit docs marc)"
     )
     remarks = [Note(NoteKind.UNCONFIRMED, words)]
     collar, supports = found["collar"][-1, 1], found["supports"][-1, 1]
     if abs(collar + supports) > UNBALANCED * abs(collar):
         words = (
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
-            "see run 5 in docs/how-to/marc.md"
+            "see run 5 in `bubblefit docs marc`"
         )
         remarks.append(Note(NoteKind.UNBALANCED, words))
     return found, remarks

@@ -25,7 +25,7 @@ MOVED, REACTION = "Displacement", "Reaction Force"
 NEAR_TIME, NEAR_PLACE = 1e-2, 1e-5
 NO_REACTIONS = (
     f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
-    "(docs/how-to/marc.md)"
+    "(bubblefit docs marc)"
 )
 
 

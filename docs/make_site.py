@@ -1,0 +1,144 @@
+"""Build the documents, the notebook among them, as a site; a link that leads nowhere is an error.
+
+python docs/make_site.py                # into out/site (make site)
+python docs/make_site.py FOLDER
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+#: What the site is made of, below the root. Links between them are relative, as they lie.
+PAGES = ("*.md", "docs/**/*.md", "examples/*/*.md", "examples/**/*.ipynb")
+BESIDE = ("LICENSE", "docs/pictures/*", "examples/*/*.toml")
+#: Sections by the folder of their pages, in order; in each the pages as docs/README.md has them.
+SECTIONS = {
+    "How to": "docs/how-to",
+    "Reference": "docs/reference",
+    "Python": "docs/reference/api",
+    "Validation": "docs/validation",
+    "Examples": "examples",
+}
+#: Words of tables wrap, and the page is as wide as its window.
+STYLE, CSS = (
+    "style.css",
+    """.wy-table-responsive table td, .wy-table-responsive table th { white-space: normal }
+.wy-nav-content { max-width: 1100px }
+""",
+)
+#: Before the title of a page that a program writes.
+WRITTEN = re.compile(r"\A<!--.*?-->\s*", re.DOTALL)
+
+
+def settings(source: Path, out: Path) -> dict[str, Any]:
+    """For mkdocs: nothing is loaded from elsewhere, whatever is not found is told."""
+    return {
+        "site_name": "bubblefit",
+        "docs_dir": str(source),
+        "site_dir": str(out),
+        "theme": {
+            "name": "readthedocs",
+            "highlightjs": False,
+            "include_homepage_in_sidebar": False,
+        },
+        "use_directory_urls": False,  # so that it can be read without a server
+        "plugins": ["search"],
+        "extra_css": [STYLE],
+        "markdown_extensions": [{"toc": {"permalink": False}}, "tables", "fenced_code"],
+        "validation": {
+            "nav": {"omitted_files": "warn", "not_found": "warn"},
+            "links": {"not_found": "warn", "anchors": "warn", "unrecognized_links": "warn"},
+        },
+        "nav": navigation(source),
+    }
+
+
+def stage(source: Path, root: Path = ROOT) -> None:
+    """Copy what the site is made of; a notebook becomes a page beside where it was."""
+    for pattern in (*PAGES, *BESIDE):
+        for path in root.glob(pattern):
+            place = source / path.relative_to(root)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, place)
+            if path.suffix == ".ipynb":
+                page = place.with_suffix(".md")
+                page.write_text("\n".join(notebook(json.loads(path.read_text()))), encoding="utf-8")
+    # A page that stands for a notebook is linked to in its place.
+    for page in source.rglob("*.md"):
+        text = WRITTEN.sub("", page.read_text(encoding="utf-8"))
+        page.write_text(text.replace(".ipynb)", ".md)"), encoding="utf-8")
+    (source / STYLE).write_text(CSS, encoding="utf-8")
+
+
+def notebook(content: dict[str, Any]) -> Iterator[str]:
+    """The lines of a notebook as a page: words, code, and what it printed or drew."""
+    for cell in content["cells"]:
+        text = "".join(cell["source"])
+        yield text if cell["cell_type"] == "markdown" else f"\n```python\n{text}\n```\n"
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            if "image/png" in data:
+                yield f"\n![drawn](data:image/png;base64,{''.join(data['image/png']).strip()})\n"
+                continue
+            said = "".join(output.get("text") or data.get("text/plain") or "").rstrip()
+            if said:
+                yield f"\n```text\n{said}\n```\n"
+
+
+def navigation(source: Path) -> list[dict[str, Any]]:
+    """Every page once: those of a folder in the order in which docs/README.md names them."""
+    pages = [path.relative_to(source).as_posix() for path in source.rglob("*.md")]
+    index = (source / "docs/README.md").read_text(encoding="utf-8")
+
+    def place(page: str) -> tuple[int, str]:
+        named = index.find(f"]({page.removeprefix('docs/')})")
+        return (named if named >= 0 else len(index), page)
+
+    told = {name: [p for p in sorted(pages, key=place) if _section(p) == name] for name in SECTIONS}
+    first = ["README.md", "docs/README.md"]
+    rest = [p for p in sorted(pages) if p not in first and _section(p) is None]
+    return [
+        {"bubblefit": first[0]},
+        {"Documents": first[1]},
+        *({name: listed} for name, listed in told.items() if listed),
+        {"About": rest},
+    ]
+
+
+def _section(page: str) -> str | None:
+    """The one whose folder is the nearest above a page."""
+    held = [(len(folder), name) for name, folder in SECTIONS.items() if page.startswith(folder)]
+    return max(held)[1] if held else None
+
+
+def build(out: Path, root: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Build; mkdocs' own words and exit code, which is not 0 where a link leads nowhere."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "source"
+        stage(source, root)
+        config = Path(folder) / "mkdocs.yml"
+        config.write_text(json.dumps(settings(source, out.resolve())), encoding="utf-8")  # is YAML
+        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--clean"]
+        return subprocess.run([*command, "-f", config], capture_output=True, text=True)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Build, and say where."""
+    out = Path(arguments[0]) if arguments else ROOT / "out" / "site"
+    done = build(out)
+    told = f"wrote {out / 'index.html'}" if done.returncode == 0 else done.stderr
+    print(told, file=sys.stderr)
+    return done.returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
