@@ -17,7 +17,7 @@ from .options import numbers
 EXAMPLES = Path(__file__).parent.parent / "examples"
 #: By name: the folder of the example, and what to type next (in the folder that was written).
 KINDS = {
-    "known": ("bubble-known-solution", "bubblefit bubble {}", "project.toml"),
+    "known": ("bubble-known-solution", "bubblefit bubble {} --starts 4", "project.toml"),
     "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
     "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
     "biaxial": ("biaxial-computed", "bubblefit biaxial {}", "project.toml"),

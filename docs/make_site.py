@@ -19,7 +19,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 #: What the site is made of, below the root. Links between them are relative, as they lie.
 PAGES = ("*.md", "docs/**/*.md", "examples/*/*.md", "examples/**/*.ipynb")
-BESIDE = ("LICENSE", "docs/pictures/*", "examples/*/*.toml")
+BESIDE = ("LICENSE", "docs/pictures/*", "examples/*/*")
 #: Sections by the folder of their pages, in order; in each the pages as docs/README.md has them.
 SECTIONS = {
     "How to": "docs/how-to",
@@ -65,7 +65,7 @@ def settings(source: Path, out: Path) -> dict[str, Any]:
 def stage(source: Path, root: Path = ROOT) -> None:
     """Copy what the site is made of; a notebook becomes a page beside where it was."""
     for pattern in (*PAGES, *BESIDE):
-        for path in root.glob(pattern):
+        for path in filter(Path.is_file, root.glob(pattern)):
             place = source / path.relative_to(root)
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place)
