@@ -1,0 +1,39 @@
+"""A fit that is killed at random moments and gone on with: a few of the benchmark's kills."""
+
+from __future__ import annotations
+
+import importlib.util
+import random
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+
+from .. import needs
+from ..commands import _import_all
+from ..places import ROOT
+
+
+def script() -> ModuleType:
+    path = ROOT / "benchmarks" / "bench_kills.py"
+    spec = importlib.util.spec_from_file_location("bench_kills", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path: Path) -> None:
+    needs.linux("processes and what they leave")
+    kills = script()
+    _import_all()
+    first = kills.Trial(tmp_path / "whole", "fit")
+    begun = time.monotonic()
+    assert kills.finish(first.start()) == 0, first.said.read_text()
+    seconds = time.monotonic() - begun
+    whole, told = kills.content(first.out), kills.Told()
+    assert {"result.json", "history.csv", "moduli.csv"} <= whole.keys()
+    count = kills.one_trial(tmp_path / "one", "fit", whole, seconds, 3, random.Random(3), told)
+    assert count >= 1 and (told.trials, told.equal) == (1, 1), told
+    assert told.other == [] and told.left == []
