@@ -13,6 +13,8 @@ import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.fits import best
 from bubblefit.fits.start import StartRecord
+from bubblefit.reports import Maps, Solid
+from bubblefit.reports.page_file import read_page_data
 from bubblefit.reports.style import BLACK
 from matplotlib.figure import Figure
 
@@ -228,6 +230,28 @@ def test_starts_that_a_failure_ended_are_told(fitted: bf.Fit):
                     "--resume tries them again"]  # fmt: skip
 
 
+def maps_and_surface_say_what_the_table_says(fit: bf.Fit, folder: Path) -> None:
+    """Of the first bubble: every value of the page beside residuals.csv and the history."""
+    parts = list(read_page_data(folder).parts)
+    (maps,) = [p for p in parts if isinstance(p, Maps) and p.name == "bubble 1 maps"]
+    (solid,) = [p for p in parts if isinstance(p, Solid) and p.name == "bubble 1 bubble"]
+    table = fit.residuals().query("test == 'bubble 1'")
+    assert len(maps.panels) == 9 and sum(maps.counts) == len(table) // 3
+    for panel in maps.panels:
+        quantity, what = panel.name.split(", ")
+        column = "difference" if "−" in what else what
+        own = table[table["quantity"] == quantity][column].to_numpy()
+        np.testing.assert_allclose(panel.values.values, own, atol=0.51 * panel.values.step + 1e-9)
+    history = fit.tests["bubble 1"].histories[0]
+    heights = [float(u[:, 2].max()) for u in history.displacement]
+    assert solid.points.values[..., 2].max(axis=1) == pytest.approx(heights, rel=1e-4)
+    strain = {shade.name: shade.values.values for shade in solid.shades}
+    assert strain["strain along the warp ε1"].max() == pytest.approx(history.strain_max[0], rel=0.1)
+    # Pulled everywhere, and by no more than the law's stiffest tangent.
+    stress, e1 = strain["stress along the warp σ1"], fit.law.modulus("E1", np.linspace(0, 0.1, 50))
+    assert 0 < stress.min() and stress[-1].max() < 1.3 * e1.max() * history.strain_max.max()
+
+
 def test_two_bubbles_with_offsets_of_their_own(tmp_path: Path):
     project = bf.read_project(small(tmp_path, ("[fit]", SECOND)))
     fit = bf.fit(project, starts=1, jobs=1)
@@ -245,6 +269,7 @@ def test_two_bubbles_with_offsets_of_their_own(tmp_path: Path):
     page = fit.report(tmp_path / "out").read_text()
     for name in ("bubble-1-profiles.png", "softer-reading-heights.png", "pinned.png"):
         assert name in page and (tmp_path / "out" / name).exists()
+    maps_and_surface_say_what_the_table_says(fit, tmp_path / "out")
     alone = bf.fit(project, tests=["softer reading"], starts=1, jobs=1)
     assert list(alone.findings) == ["softer reading"] and "pinned" not in alone.result
 
