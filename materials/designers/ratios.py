@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from ...errors import InputError
@@ -24,7 +25,7 @@ def shares(ratio: str) -> tuple[float, float]:
     """
     found = _RATIO.match(ratio)
     pair = [float(text.replace(",", ".")) for text in found.groups()] if found else [0.0]
-    if not max(pair) > 0:
+    if not 0 < max(pair) < math.inf:
         problem = f"expected a load ratio such as 2:1 (warp to fill), got {ratio[:40]!r}"
         raise InputError(None, "ratio", problem)
     return pair[0] / max(pair), pair[1] / max(pair)
