@@ -256,5 +256,5 @@ def test_what_knows_strain_alone_refuses_it_in_one_line() -> None:
         check_carries(solver_named("calculix"), card.law)
     # One that is run once and kept carries what the solver behind the cache carries.
     for carries in (True, False):
-        behind = SimpleNamespace(name="lab", load_ratios=carries)
+        behind = SimpleNamespace(name="lab", external=True, load_ratios=carries)
         assert carries_load_ratios(Once(behind, RunCache(Path("runs")), {})) == carries
