@@ -115,6 +115,8 @@ def test_two_side_by_side(folder: Path, tmp_path: Path, monkeypatch: pytest.Monk
     assert (done.exit_code, done.output) == (0, "page: one-beside-two.html\n")
     text = (tmp_path / "one-beside-two.html").read_text()
     assert "one: Good. two: Good." in text and text.count("data:image/png") == 2
+    # Told apart by colour and dashes.
+    assert 'class="line c0 d0"' in text and 'class="line c1 d1"' in text
     assert '"name":"measured, one"' in text and '"name":"measured, two"' in text
     assert '<tr><td>one</td><td class="text">22</td><td>0.9997</td>' in text
     assert '<td>two</td><td class="text">22</td><td>0.5</td>' in text

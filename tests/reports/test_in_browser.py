@@ -12,7 +12,7 @@ from bubblefit.reports.pdf import print_page
 
 from .. import needs
 from ..browser import BROWSERS, Browser, browser
-from .test_html import drawn, full_report
+from .test_html import PLACES, drawn, full_report
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +56,8 @@ def test_the_slider_changes_the_maps(opened: Browser) -> None:
     opened.press(".maps input", "Home")
     assert opened.run(f"document.querySelector('{label}').textContent") == "22 kPa"
     assert opened.look("figure.maps") != before
+    spots = "document.querySelector('.spots').innerHTML.match(/h0/g).length"
+    assert opened.run(spots) == len(PLACES)
     # The largest dz of the load shown, at the middle: measured is modelled and a tenth more.
     ends = "[...document.querySelector('svg.map').querySelectorAll('.end')].map(e => e.textContent)"
     assert opened.run(ends) == ["2.1", "1.05", "0"]
