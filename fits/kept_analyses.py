@@ -40,3 +40,8 @@ class KeptAnalyses(RunCache):
                 if self.folder.exists() and not self._resume:
                     shutil.rmtree(self.folder)
         return super().read(key)
+
+    def not_kept(self, error: OSError) -> None:
+        """Raises OutputError: the study's own tables would not be written either."""
+        with telling(self.folder):
+            raise error

@@ -111,9 +111,13 @@ class RunCache:
                     os.unlink(name)
             self._bound(len(content))
         except OSError as error:
-            level = logging.INFO if self._told else logging.WARNING
-            log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
-            self._told = True
+            self.not_kept(error)
+
+    def not_kept(self, error: OSError) -> None:
+        """Told once: a run that is not kept is as good."""
+        level = logging.INFO if self._told else logging.WARNING
+        log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
+        self._told = True
 
     def entries(self) -> list[Entry]:
         """Every run that is there, that of the longest ago first."""

@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli import progress
+from bubblefit.cli import live_line
 from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.fits import prediction_page
@@ -306,7 +306,7 @@ def test_json_is_all_that_is_printed(tmp_path: Path) -> None:
 def test_progress_is_a_plain_line_where_there_is_no_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(progress, "PLAIN_EVERY_S", 0.0)
+    monkeypatch.setattr(live_line, "PLAIN_EVERY_S", 0.0)
     done = bend(write_project(tmp_path), "--out", "out", "--jobs", 1, cwd=tmp_path)
     lines = [line for line in done.stderr.splitlines() if line.startswith("4 of 4 runs")]
     assert lines and "high with stiff: finished in" in lines[-1] and "0 s left" in lines[-1]
