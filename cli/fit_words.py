@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..fits.few_strains import answers
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
-from .answer import WORDS, answers
 from .ending import written_to
 
 if TYPE_CHECKING:
     from ..fits.result import Fit
+
+#: What a modulus is of.
+WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
 def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:

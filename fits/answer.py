@@ -11,6 +11,7 @@ from ..experiments.notes import by_strain
 from ..identification.bands import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..reports import Table, percent
+from .few_strains import STRAINS, answer_at
 
 if TYPE_CHECKING:
     from .result import Fit
@@ -21,8 +22,6 @@ WORDS: Mapping[str, str] = {
     "E2": "Young's modulus along the fill, E2",
     "G12": "shear modulus between warp and fill, G12",
 }
-#: Logarithmic strains at which the answer is given, as far as the tests reached.
-STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 #: Within what stays on one line.
 SPACE = "\u00a0"
 #: The strain of the summary, and what it is called.
@@ -33,11 +32,8 @@ def modulus_at(fit: Fit, name: str, strain: float) -> tuple[float, float, float]
     """MPa and the ends of its band, NaN where that is not known; None beyond where it is known."""
     if strain > fit.best.valid[COMPONENTS[name]]:
         return None
-    own, sure = float(fit.law.modulus(name, np.array([strain]))[0]), fit.best.certainty
-    if sure is None or name not in sure.band:
-        return own, np.nan, np.nan
-    lower, upper = (float(np.interp(strain, sure.strain[name], e)) for e in sure.band[name])
-    return own, lower, upper
+    found = answer_at(fit, name, strain)
+    return (found.value, *((np.nan, np.nan) if found.band is None else found.band))
 
 
 def band_words(value: float, lower: float, upper: float) -> str:

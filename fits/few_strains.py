@@ -1,4 +1,4 @@
-"""The answer of a fit in words: each modulus at a few strains, and how sure it is there."""
+"""The answer of a fit: each modulus at a few strains, and how sure it is there."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ import numpy as np
 from ..materials.forms.base import COMPONENTS
 
 if TYPE_CHECKING:
-    from ..fits.result import Fit
+    from .result import Fit
 
 #: Logarithmic strains at which moduli are told, and the end of the valid strains beside them.
 STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 #: Of the end: a strain nearer to it is left out, the end stands for it.
 NEAR = 0.95
-#: What a modulus is of.
-WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
 @dataclass(frozen=True)
@@ -44,11 +42,12 @@ def answers(fit: Fit) -> list[Answer]:
     for name, component in COMPONENTS.items():
         end = float(fit.best.valid[component])
         strains = [*(strain for strain in STRAINS if strain < NEAR * end), end]
-        told += [_answer(fit, name, strain, strain == end) for strain in strains]
+        told += [answer_at(fit, name, strain, strain == end) for strain in strains]
     return told
 
 
-def _answer(fit: Fit, name: str, strain: float, end: bool) -> Answer:
+def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
+    """One modulus (E1, E2 or G12) at one strain."""
     value, sure = float(fit.law.modulus(name, strain)), fit.best.certainty
     per_width = value * fit.thickness
     if sure is None:
