@@ -220,8 +220,9 @@ def test_residuals_are_every_matched_load(exported):
     fit = fitted(prepared)
     table = prepared.residuals(fit)
     assert list(table.columns) == [
-        "part", "elongation_mm", "quantity", "measured", "modelled", "difference",
+        "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit",
     ]  # fmt: skip
+    assert set(table["unit"]) == {"N"}
     assert len(table) == sum(len(c.objective.load) for c in fit.comparisons)
     for direction, numbers in prepared.findings(fit).numbers["directions"].items():
         own = table[table["part"] == direction]
