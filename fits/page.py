@@ -144,13 +144,11 @@ def _moduli(fit: Fit, folder: Path) -> Charts:
     truth = None if known is None else modulus_curves(known, strains)
     shown = None if known is not None else band
     plot_moduli(folder / MODULI_PICTURE, strains, curves, truth, band=shown)
-    words = ""
-    if known is None and band is not None:
-        words = (
-            f", where a dot ends them; with their bands ({percent(LEVEL)}, noise and mesh together)"
-        )
+    words = ", where a dot ends them" if known is None and band is not None else ""
+    if band is not None:
+        words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    return moduli_charts(strains, curves, truth, shown, caption)
+    return moduli_charts(strains, curves, truth, band, caption)
 
 
 def _strains(fit: Fit, count: int = SMOOTH) -> Array:

@@ -12,24 +12,30 @@ from .markup import as_markup
 from .ticks import written
 
 WIDTH, HEIGHT = 460.0, 260.0
+#: From so many charts on they stand three in a row: narrower, so that letters keep their size.
+THREE, NARROW = 3, 340.0
 LEFT, RIGHT, ABOVE, BELOW = 60.0, 14.0, 8.0, 42.0
 #: Of a title, and of a row of the legend.
 TITLE, ROW = 22.0, 17.0
 #: About so wide is a letter of the legend, and what stands before a name.
 LETTER, SAMPLE = 6.4, 30.0
+#: Dots of a chart that has nothing else: so many are drawn large.
+FEW = 60
 #: Classes of rising loads in the style sheet, from 0 to this.
 RANKS = 10
 
 
-def chart_svg(chart: Chart) -> Markup:
-    """The chart, titles, legend and axes included."""
+def chart_svg(chart: Chart, beside: int = 1) -> Markup:
+    """The chart, titles, legend and axes included; beside : charts in its row, itself included."""
+    wide = NARROW if beside >= THREE else WIDTH
+    few = " few" if _few(chart) else ""
     x, y = axes_of(chart)
-    legend, rows = _legend(chart)
+    legend, rows = _legend(chart, wide)
     top = ABOVE + (TITLE if chart.title else 0.0) + ROW * rows
-    width, height = WIDTH - LEFT - RIGHT, HEIGHT - BELOW - ABOVE
+    width, height = wide - LEFT - RIGHT, HEIGHT - BELOW - ABOVE
     total = top + height + BELOW
     parts = [
-        f'<svg class="chart" viewBox="0 0 {WIDTH:g} {total:g}" role="img" '
+        f'<svg class="chart{few}" viewBox="0 0 {wide:g} {total:g}" role="img" '
         f'aria-label="{escape(chart.alt or chart.title)}">',
         f'<text class="title" x="{LEFT:g}" y="16">{escape(chart.title)}</text>',
         *legend,
@@ -47,6 +53,12 @@ def chart_svg(chart: Chart) -> Markup:
         parts += [mark for s in chart.series for mark in _marks(s, x, y, look)]
     parts += ["</svg>", '<g class="pointer"></g>', "</svg>"]
     return as_markup("".join(parts))
+
+
+def _few(chart: Chart) -> bool:
+    """Whether it is dots alone, and so few that they may be large."""
+    dotted = all(s.look == "dots" for s in chart.series)
+    return dotted and sum(len(s.x) for s in chart.series) <= FEW
 
 
 def _up(place: float) -> str:
@@ -114,7 +126,7 @@ def _axes(x: Axis, y: Axis, top: float, width: float, height: float) -> Iterator
         yield (f'<text x="{LEFT - 6:g}" y="{at + 4:.1f}" text-anchor="end">{written(value)}</text>')
 
 
-def _legend(chart: Chart) -> tuple[list[str], int]:
+def _legend(chart: Chart, width: float) -> tuple[list[str], int]:
     """Its marks, and how many rows they take; names that come again stand once."""
     named = {s.name: s for s in reversed(chart.series) if s.name}
     entries = [named[name] for name in dict.fromkeys(s.name for s in chart.series) if name]
@@ -124,7 +136,7 @@ def _legend(chart: Chart) -> tuple[list[str], int]:
     top = ABOVE + (TITLE if chart.title else 0.0)
     for s in entries:
         wide = SAMPLE + LETTER * len(s.name) + 10
-        if left > LEFT and left + wide > WIDTH - 4:
+        if left > LEFT and left + wide > width - 4:
             left, row = LEFT, row + 1
         at = top + ROW * row + 4
         parts.append(f'<g class="entry" transform="translate({left:g} {at:g})">{_sample(s)}')

@@ -13,7 +13,8 @@ from .ticks import written
 
 Array = NDArray[np.float64]
 
-SIDE, ABOVE, BELOW, LEFT, RIGHT = 190.0, 22.0, 34.0, 8.0, 80.0
+#: RIGHT: of the colour bar, and of numbers as long as "−7.43e−11".
+SIDE, ABOVE, BELOW, LEFT, RIGHT = 190.0, 22.0, 34.0, 8.0, 102.0
 
 
 def frame_of(maps: Maps, values: Array, load: int) -> Array:

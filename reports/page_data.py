@@ -57,7 +57,7 @@ def solid_data(part: Solid) -> Markup:
         "colours": COLOURS,
         "scale": solid_svg.scale_of(every),
         "middle": solid_svg.middle_of(every).tolist(),
-        "size": [solid_svg.WIDTH, solid_svg.HEIGHT],
+        "centre": solid_svg.CENTRE,
         "turn": solid_svg.TURN,
         "raise": solid_svg.RAISE,
     }

@@ -13,9 +13,13 @@ from .shades import COLOURS, classes, ends
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT, MARGIN = 520.0, 360.0, 16.0
+WIDTH, HEIGHT, MARGIN = 570.0, 360.0, 16.0
+#: Of the width, for the colour bar and its numbers; the surface stands in the rest.
+BAR = 112.0
 #: From where it is seen at first, degrees: turned about z, and raised over the horizon.
 TURN, RAISE = 35.0, 28.0
+#: Where the middle of the surface stands.
+CENTRE = (0.5 * (WIDTH - BAR), 0.5 * HEIGHT)
 
 
 def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
@@ -23,7 +27,7 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
     every = solid.points.values
     faces = np.rint(solid.faces.values).astype(int)
     flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
-    flat = flat * scale_of(every) * (1.0, -1.0) + (WIDTH / 2, HEIGHT / 2)
+    flat = flat * scale_of(every) * (1.0, -1.0) + CENTRE
     own = solid.shades[shade]
     low, high = ends(own.values.values, own.shades)
     number = classes(own.values.values[load], low, high)
@@ -36,7 +40,7 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
         d = "L".join(f"{x:.1f} {y:.1f}" for x, y in flat[faces[k]])
         fill = colours[number[k]] if number[k] >= 0 else "#999"
         parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
-    parts.append(f'</g><g class="scale" transform="translate({WIDTH - 84:g} {2 * MARGIN:g})">')
+    parts.append(f'</g><g class="scale" transform="translate({WIDTH - BAR + 8:g} {2 * MARGIN:g})">')
     parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
     return as_markup("".join(parts))
 

@@ -432,14 +432,25 @@ def test_one_test_alone(alone: bf.Fit, told: Told, tmp_path: Path, monkeypatch) 
 
 
 @pytest.mark.usefixtures("nothing_shown")
-def test_a_known_solution_has_no_band(together: bf.Fit, told: Told, tmp_path: Path, monkeypatch):
-    """Beside the deviation from it, what the noise might do says nothing."""
+def test_a_known_solution_with_the_band_of_noise(
+    together: bf.Fit, told: Told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The picture shows the deviation from it alone, the chart what noise would do as well."""
     monkeypatch.setattr(type(together.setup.tests[0]), "known", together.law)
     found = reported(together, tmp_path, monkeypatch)
     (_, curves, known), drawn = told.calls["plot_moduli"]
     np.testing.assert_array_equal(known, curves[0])
     assert drawn == {"band": None}
-    assert captions(found)["moduli"].endswith("over the strains reached")
+    assert captions(found)["moduli"].endswith(
+        "over the strains reached; with their bands (95 %, noise and mesh together)"
+    )
+    (charts,) = (part for part in found.parts if getattr(part, "name", "") == "moduli")
+    for name, chart in zip(("E1", "E2", "G12"), charts.charts, strict=True):
+        best = chart.series[0]
+        ends = together.best.certainty.band[name]
+        assert (best.lower[0], best.upper[0]) == pytest.approx(ends[:, 0], rel=1e-5)
+        assert (best.lower[-1], best.upper[-1]) == pytest.approx(ends[:, -1], rel=1e-5)
+        assert "known" in [series.name for series in chart.series]
 
 
 def test_the_band_is_about_the_best_fit(together: bf.Fit, told: Told, tmp_path: Path) -> None:

@@ -6,15 +6,17 @@ import re
 
 import numpy as np
 import pytest
-from bubblefit.reports import Chart, Shade, Solid, dots, line, maps_of, pack
+from bubblefit.reports import Chart, Series, Shade, Solid, dots, line, maps_of, pack
+from bubblefit.reports import map_svg as maps_drawn
+from bubblefit.reports import solid_svg as solids_drawn
 from bubblefit.reports.axes import Axis, axes_of
-from bubblefit.reports.chart_svg import chart_svg
+from bubblefit.reports.chart_svg import FEW, LEFT, NARROW, RIGHT, WIDTH, chart_svg
 from bubblefit.reports.charts import MOST_POINTS
-from bubblefit.reports.map_svg import map_svg, row_ends
+from bubblefit.reports.map_svg import map_svg, row_ends, scale_bar
 from bubblefit.reports.maps import MOST_PLACES
 from bubblefit.reports.packed import Packed
 from bubblefit.reports.shades import CLASSES, classes
-from bubblefit.reports.solid_svg import seen, solid_svg
+from bubblefit.reports.solid_svg import BAR, CENTRE, scale_of, seen, solid_svg
 from bubblefit.reports.ticks import log_ticks, ticks, written
 from hypothesis import given
 from hypothesis import strategies as st
@@ -135,3 +137,44 @@ def test_a_surface_from_the_front_and_from_above() -> None:
     shade = Shade("s", "mm", pack([[1.0, np.nan]]))
     svg = solid_svg(Solid("n", ["1"], "p", pack(corners), pack(faces), [shade], "c"), 0)
     assert svg.count("Z") == 2 and 'fill="#999"' in svg
+
+
+def test_three_charts_in_a_row_keep_the_size_of_letters() -> None:
+    """Narrower in the same unit; legend and plot keep within."""
+    series = [line(f"a name that is long, {k}", [0, 1], [0, k]) for k in range(4)]
+    chart = Chart("t", "x", "y", series)
+    for beside, width in ((1, WIDTH), (2, WIDTH), (3, NARROW), (6, NARROW)):
+        svg = chart_svg(chart, beside)
+        assert svg.startswith(f'<svg class="chart" viewBox="0 0 {width:g} ')
+        assert f'width="{width - LEFT - RIGHT:g}"' in svg
+        starts = re.findall(r'class="entry" transform="translate\(([\d.]+) ', svg)
+        assert len(starts) == 4 and all(float(start) < 0.6 * width for start in starts)
+
+
+def test_few_dots_alone_are_large() -> None:
+    def drawn(count: int, *more: Series) -> str:
+        return chart_svg(Chart("", "x", "y", [dots("", range(count), range(count)), *more]))
+
+    assert 'class="chart few"' in drawn(FEW)
+    assert 'class="chart"' in drawn(FEW + 1)
+    assert 'class="chart"' in drawn(3, line("", [0, 1], [0, 1]))
+
+
+#: As wide as a digit of 12 px is in the widest of the usual fonts.
+DIGIT = 7.7
+
+
+def test_numbers_of_a_colour_bar_have_room() -> None:
+    """The longest there are, "-7.43e-11", beside a map and beside a surface."""
+    words = re.findall(r'x="16"[^>]*>([^<]*)<', scale_bar("about zero", "mm", -7.43e-11, 7.43e-11))
+    need = 16 + DIGIT * max(map(len, words))
+    assert len(words[-1]) == 9
+    assert maps_drawn.RIGHT - 8 >= need and BAR - 8 >= need
+
+
+def test_a_surface_stands_clear_of_its_colour_bar() -> None:
+    """However it is turned about its axis."""
+    turn = np.linspace(0, 2 * np.pi, 25)
+    rim = np.column_stack([100 * np.cos(turn), 100 * np.sin(turn), 0 * turn])[None]
+    assert CENTRE[0] + scale_of(rim) * 100 <= solids_drawn.WIDTH - BAR
+    assert CENTRE[0] >= scale_of(rim) * 100

@@ -24,8 +24,8 @@ const enlivenSolid = async (figure, data) => {
     for (let k = 0; k < nodes; k++) {
       const [x, y, z] = [0, 1, 2].map((i) => points[3 * (load * nodes + k) + i] - data.middle[i]);
       const away = -sa * x + ca * y;
-      at.push(`${(data.size[0] / 2 + eye.scale * (ca * x + sa * y)).toFixed(1)} ` +
-        `${(data.size[1] / 2 - eye.scale * (z * cb + away * sb)).toFixed(1)}`);
+      at.push(`${(data.centre[0] + eye.scale * (ca * x + sa * y)).toFixed(1)} ` +
+        `${(data.centre[1] - eye.scale * (z * cb + away * sb)).toFixed(1)}`);
       near.push(z * sb - away * cb);
     }
     const depth = order.map((_, f) =>
