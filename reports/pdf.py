@@ -29,6 +29,8 @@ def browser_command(browser: str, home: Path) -> list[str]:
     bare = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
     return [
         browser, "--headless=new", "--disable-gpu", *bare, f"--user-data-dir={home}",
+        # A container's shared memory may be too small for a page.
+        "--disable-dev-shm-usage",
         "--host-resolver-rules=MAP * ~NOTFOUND", f"--virtual-time-budget={SCRIPT}",
     ]  # fmt: skip
 
