@@ -97,6 +97,8 @@ def _marks(s: Series, x: Axis, y: Axis, look: str) -> Iterator[str]:
         known = p is not None
     style = f"line {own} d{s.dashes % 4}" + (" faint" if s.faint else "")
     yield _path(style, d)
+    if s.marks:
+        yield _path(f"dot {own}", "".join(f"M{p}h0" for p in points if p))
     last = next((p for p in reversed(points) if p), None)
     if s.ends and last:
         yield _path(f"dot end {own}", f"M{last}h0")

@@ -30,7 +30,8 @@ class Series:
     look : line, dots, or nothing but the band.
     colour : number of the named colour; rank : 0 to 1 along the colours of rising loads instead.
     dashes : number of the pattern, 0 for none. ends : whether a dot ends the curve: nothing is
-    known further on. faint : what stands behind the others.
+    known further on. faint : what stands behind the others. marks : whether every value of a line
+    has a dot.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Series:
     dashes: int = 0
     ends: bool = False
     faint: bool = False
+    marks: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,11 +94,12 @@ def line(
     dashes: int = 0,
     ends: bool = False,
     faint: bool = False,
+    marks: bool = False,
 ) -> Series:
     """A curve of arrays (n,), with its band where there is one."""
     lower, upper = ([], []) if band is None else (numbers(band[0]), numbers(band[1]))
     return Series(
-        name, numbers(x), numbers(y), lower, upper, "line", colour, rank, dashes, ends, faint
+        name, numbers(x), numbers(y), lower, upper, "line", colour, rank, dashes, ends, faint, marks
     )
 
 

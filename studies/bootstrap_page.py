@@ -11,7 +11,8 @@ from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Picture, Report, Section, Table, percent, write_report
+from ..reports import Report, Section, Table, percent, write_report
+from ..reports.bootstrap_charts import Array, bootstrap_charts
 from ..reports.bootstraps import plot_bootstrap
 from ..writing import replacing, write_text
 from .bootstrap_record import SAMPLES
@@ -29,13 +30,17 @@ def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
     for name, table in ((TABLE, done.table()), (COEFFICIENTS, done.coefficients())):
         with replacing(folder / name) as path:
             table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
-    law = done.found.best.law
-    best = {name: law.modulus(name, strain) for name, strain in done.strains.items()}
-    plot_bootstrap(folder / FIGURE, done.strains, best, done.bands, done.of_fit)
+    plot_bootstrap(folder / FIGURE, done.strains, _best(done), done.bands, done.of_fit)
     write_notes(folder, done.notes)
     page = write_report(folder, _page(done))
     write_text(folder / RESULT, json.dumps(done.result, indent=1) + "\n")
     return page
+
+
+def _best(done: Bootstrap) -> dict[str, Array]:
+    """Moduli of the fit, MPa, by name, along their strains."""
+    law = done.found.best.law
+    return {name: law.modulus(name, strain) for name, strain in done.strains.items()}
 
 
 def _page(done: Bootstrap) -> Report:
@@ -59,7 +64,7 @@ def _page(done: Bootstrap) -> Report:
             Section(
                 "The samples",
                 [
-                    Picture(FIGURE, caption),
+                    bootstrap_charts(done.strains, _best(done), done.bands, done.of_fit, caption),
                     _sigmas(done),
                     _correlations(done),
                 ],
@@ -67,6 +72,7 @@ def _page(done: Bootstrap) -> Report:
         ],
         files=[
             (TABLE, "moduli along their strains, with both bands"),
+            (FIGURE, "picture of the moduli"),
             (COEFFICIENTS, "the unknowns, with their correlations over the samples"),
             (SAMPLES, "every sample: what was drawn, and the optimiser's unknowns"),
             (NOTES, NOTES_ARE),

@@ -132,11 +132,13 @@ class Nu12Study:
         OutputError : the folder cannot be written.
         """
         from ..reports import plot_nu12
+        from ..reports.nu12_charts import nu12_charts
 
         panels = {
             name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
             for name, part in self.parts.items()
         }
+        title = f"{self.project.name}: what nu12 changes"
         write_study(
             Path(folder),
             "nu12",
@@ -144,8 +146,9 @@ class Nu12Study:
             lambda path: plot_nu12(path, panels, self.base, self.response),
             self.result,
             self.notes,
-            f"{self.project.name}: what nu12 changes",
+            title,
             self.lines(),
+            [nu12_charts(panels, self.base, self.response, title)],
         )
 
 

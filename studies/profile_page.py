@@ -10,8 +10,9 @@ from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..identification.likelihood import THRESHOLD
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Picture, Report, Section, Table, write_report
+from ..reports import Report, Section, Table, write_report
 from ..reports.likelihoods import ProfilePanel, plot_likelihoods
+from ..reports.profile_charts import profile_charts
 from ..writing import replacing, write_text
 from .profiled import METHOD
 
@@ -26,15 +27,19 @@ def write_profiles(found: Profiles, folder: Path) -> Path:
     (folder / RESULT).unlink(missing_ok=True)
     with replacing(folder / TABLE) as path:
         found.table().to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
-    panels = [
-        ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
-        for one in found.each
-    ]
+    panels = _panels(found)
     plot_likelihoods(folder / FIGURE, panels, THRESHOLD)
     write_notes(folder, found.notes)
     page = write_report(folder, _page(found))
     write_text(folder / RESULT, json.dumps(found.result, indent=1) + "\n")
     return page
+
+
+def _panels(found: Profiles) -> list[ProfilePanel]:
+    return [
+        ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
+        for one in found.each
+    ]
 
 
 def _page(found: Profiles) -> Report:
@@ -53,9 +58,15 @@ def _page(found: Profiles) -> Report:
             ("analyses", found.analyses),
         ],
         warnings=[note.line for note in found.notes],
-        sections=[Section("The profiles", [Picture(FIGURE, caption), _ends(found)])],
+        sections=[
+            Section(
+                "The profiles",
+                [profile_charts(_panels(found), THRESHOLD, caption), _ends(found)],
+            )
+        ],
         files=[
             (TABLE, "the curves"),
+            (FIGURE, "picture of the profiles"),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
         ],

@@ -132,17 +132,20 @@ class Refinement:
         OutputError : the folder cannot be written.
         """
         from ..reports import plot_convergence
+        from ..reports.convergence_charts import convergence_charts
         from .refinement_tables import panels
 
+        drawn, title = panels(self), f"{self.project.name}: finer and finer {self.what}"
         write_study(
             Path(folder),
             "convergence",
             self.table(),
-            lambda path: plot_convergence(path, panels(self), self.what),
+            lambda path: plot_convergence(path, drawn, self.what),
             self.result,
             self.notes,
-            f"{self.project.name}: finer and finer {self.what}",
+            title,
             self.lines(),
+            [convergence_charts(drawn, self.what, title)],
         )
 
 

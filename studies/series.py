@@ -27,6 +27,8 @@ from .study_page import write_study_page
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..reports import Charts
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -184,10 +186,11 @@ def write_study(
     notes: Sequence[Note],
     title: str = "",
     said: Sequence[str] = (),
+    charts: Sequence[Charts] = (),
 ) -> None:
     """Write the table NAME.csv, the figure NAME.png, notes.csv, the page and, last, result.json.
 
-    title : of the page; said : the lines of the terminal.
+    title : of the page; said : the lines of the terminal. charts : what the figure shows.
 
     Raises
     ------
@@ -197,5 +200,6 @@ def write_study(
         table.to_csv(path, index=False, lineterminator="\n")
     draw(folder / f"{name}.png")
     write_notes(folder, notes)
-    write_study_page(folder, title or name, said, table, f"{name}.csv", notes, f"{name}.png")
+    page = (title or name, said, table, f"{name}.csv", notes, f"{name}.png", charts)
+    write_study_page(folder, *page)
     write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..fits.citation import citation
 from ..fits.store import RESULT
 from ..notes import NOTES, NOTES_ARE, Note
-from ..reports import Listing, Picture, Report, Section, Table, write_report
+from ..reports import Charts, Listing, Picture, Report, Section, Table, write_report
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +23,10 @@ def write_study_page(
     table_file: str,
     notes: Sequence[Note],
     figure: str | None = None,
+    charts: Sequence[Charts] = (),
 ) -> Path:
-    """Write page.json and report.html; figure : a picture in the folder.
+    """Write page.json and report.html; figure : a picture in the folder, which
+    stands in the page unless charts do.
 
     said : the lines of the terminal.
 
@@ -41,12 +43,13 @@ def write_study_page(
         warnings=[note.line for note in notes],
         sections=[
             Section("What it comes to", [Listing("\n".join(said))] if said else []),
-            Section("Figure", [Picture(figure, title)] if figure else []),
+            Section("Figure", charts or ([Picture(figure, title)] if figure else [])),
             Section("The numbers", [shown]),
             Section("How to cite", citation()),
         ],
         files=[
             (table_file, "the table"),
+            *([(figure, "picture of the charts")] if figure else []),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
         ],

@@ -142,12 +142,12 @@ class WeightStudy:
         """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
         from ..fits.store import Store
         from ..reports import plot_weights
+        from ..reports.weights_charts import weights_charts
         from .study_page import write_study_page
 
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
-        plot_weights(
-            folder / FIGURE,
+        shown = (
             self.counted,
             [run.count for run in self.ended],
             {name: [run.relative[name] for run in self.ended] for name in self.ended[0].relative},
@@ -160,7 +160,9 @@ class WeightStudy:
             },
             {name: self.sigma(name) for name in COMPONENTS},
         )
+        plot_weights(folder / FIGURE, *shown)
         write_notes(folder, self.notes)
         title = f"{self.title}: the weight of {self.counted}"
-        write_study_page(folder, title, self.lines(), self.table(), TABLE, self.notes, FIGURE)
+        said = (title, self.lines(), self.table(), TABLE, self.notes)
+        write_study_page(folder, *said, FIGURE, weights_charts(*shown))
         Store(folder).finish(self.result)

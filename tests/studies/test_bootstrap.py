@@ -21,6 +21,7 @@ from bubblefit.studies.bootstrapped import Bootstrap
 from scipy.optimize import minimize_scalar
 
 from ..commands import in_process
+from ..page_charts import charts_of
 from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file
 
 #: MPa, near the optima of the tests.
@@ -194,6 +195,9 @@ def test_the_command(tmp_path: Path) -> None:
     own = table[(table["modulus"] == "E1")]
     assert (own["lower_MPa"] <= own["median_MPa"]).all()
     assert own["sigma_relative"].iloc[0] == pytest.approx(said["sigma_relative"]["E1"], rel=1e-6)
+    _, low, high = charts_of(folder)["bootstrap"][0].series
+    assert low.y == pytest.approx(own["lower_MPa"], rel=1e-5)
+    assert high.y == pytest.approx(own["upper_MPa"], rel=1e-5)
     assert (folder / "bootstrap.png").stat().st_size > 10_000
     assert len(pd.read_csv(folder / "coefficients.csv")) == 3
     assert {row["kind"] for row in said["notes"]} == {"few to draw from"}

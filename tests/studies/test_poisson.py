@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 
 from ..bars import STRETCH, BarSolver, BarTest, project_of
 from ..drawings import data
+from ..page_charts import charts_of
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 END = "load at the end, N"
@@ -53,6 +54,9 @@ def test_a_bar_in_closed_form(bars: BarSolver, tmp_path: Path, drawn: list[Figur
     _, shown, base = data(drawn[0].axes[0])
     np.testing.assert_array_equal(shown, [found.nu12, found.to_base])
     assert base.ravel().tolist() == [0.24, 1.0]
+    (chart,) = charts_of(tmp_path)["nu12"]
+    assert chart.series[0].x == found.nu12.tolist() and chart.series[0].name == END
+    assert chart.series[0].y == pytest.approx(found.to_base, rel=1e-5)
     assert any(line.startswith(f"a bar, {END}") for line in study.lines())
 
 

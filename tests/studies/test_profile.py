@@ -19,6 +19,7 @@ from bubblefit.studies.profile import profile
 from bubblefit.studies.profiled import Profile
 
 from ..commands import in_process
+from ..page_charts import charts_of
 from ..projects import ELONGATION, constant_strips
 
 #: MPa; not quite the optimum of test "one", which is at 330 and 190.
@@ -136,6 +137,11 @@ def test_the_command(tmp_path: Path) -> None:
     assert words in done.output and words in (folder / "report.html").read_text()
     assert said["analyses"] > sum(one["analyses"] for one in said["profiles"])
     assert f"{said['analyses']} analyses" in done.output
+    charts = charts_of(folder)["profiles"]
+    assert len(charts) == 3 and charts[0].series[0].x == pytest.approx(own["MPa"], rel=1e-5)
+    assert charts[0].series[0].y == pytest.approx(own["minus_2_log_L"], rel=1e-5, abs=1e-9)
+    ends = [series.x[0] for series in charts[0].series if series.name == "ends"]
+    assert ends == pytest.approx([first["lower_MPa"], first["upper_MPa"]], rel=1e-5)
     assert (folder / "profile.png").stat().st_size > 10_000
     refused = in_process(*command, "--quiet", cwd=tmp_path, code=2)
     assert "already holds a result" in refused.output + refused.stderr

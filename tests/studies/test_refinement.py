@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from ..bars import STRETCH, WIDTH, BarSolver, BarTest, project_of
 from ..drawings import data
+from ..page_charts import charts_of
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WIDTH
@@ -111,6 +112,10 @@ def test_a_level_that_fails_is_named_and_left_out(
     shown = data(drawn[0].axes[0])[0]
     assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1])
     assert shown[1] == pytest.approx(change)
+    first = charts_of(tmp_path)["convergence"][0]
+    (own,) = (series for series in first.series if series.name == END)
+    assert own.x == pytest.approx(shown[0], rel=1e-5)
+    assert own.y == pytest.approx(change, rel=1e-5)
 
 
 def test_nothing_to_compare_is_a_failure(bars: BarSolver) -> None:

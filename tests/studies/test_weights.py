@@ -16,6 +16,7 @@ from bubblefit.studies.weights import COUNTS, weight_study
 from scipy.optimize import minimize_scalar
 
 from ..commands import in_process
+from ..page_charts import charts_of
 from ..projects import ELONGATION, MODULI, constant_strips
 
 
@@ -70,6 +71,12 @@ def test_moduli_and_errors_follow_the_weight(tmp_path: Path) -> None:
     assert said["change"]["E1"] == pytest.approx(change, abs=1e-3)
     assert said["change"]["E2"] == pytest.approx([0, 0], abs=1e-4)
     assert f"E1 changes by {100 * change[0]:+.2g} to {100 * change[1]:+.2g} %" in done.output
+    charts = charts_of(tmp_path / "out")
+    for series in charts["errors"][0].series:
+        assert series.x == pytest.approx(COUNTS, rel=1e-5)
+        assert series.y == pytest.approx(100 * table[f"relative {series.name}"], rel=1e-5)
+    (warp,) = (s for s in charts["moduli"][0].series if s.name == f"at {float(column[10:]):.3g}")
+    assert warp.y == pytest.approx(table[column], rel=1e-5)
     assert (tmp_path / "out" / "weights.png").stat().st_size > 10_000
 
 

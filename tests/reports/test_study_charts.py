@@ -1,0 +1,113 @@
+"""Charts of studies: every value of a result in its place, thresholds, bands, what is left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bubblefit.reports import ConvergencePanel
+from bubblefit.reports.axes import axes_of
+from bubblefit.reports.bootstrap_charts import bootstrap_charts
+from bubblefit.reports.chart_svg import chart_svg
+from bubblefit.reports.charts import Chart, Series, line
+from bubblefit.reports.convergence_charts import convergence_charts
+from bubblefit.reports.likelihoods import ProfilePanel
+from bubblefit.reports.nu12_charts import nu12_charts
+from bubblefit.reports.profile_charts import profile_charts
+from bubblefit.reports.weights_charts import weights_charts
+
+
+def named(chart: Chart) -> dict[str, Series]:
+    return {series.name: series for series in chart.series}
+
+
+def test_every_value_of_a_line_may_have_a_dot() -> None:
+    svg = chart_svg(Chart("", "x", "y", [line("", [0, 1, 2], [0, np.nan, 2], marks=True)]))
+    (drawn,) = (part for part in svg.split("<path ") if part.startswith('class="dot'))
+    assert drawn.count("h0") == 2
+
+
+def test_profiles() -> None:
+    """One end is not closed: then there is no line at it."""
+    panel = ProfilePanel(
+        "E1 at 1 %", [90.0, 100.0, 120.0], [5.0, 0.0, 2.0], 100.0, 5.0, (92.5, None), (90.0, 110.0)
+    )
+    found = profile_charts([panel], 3.84, "c")
+    (chart,) = found.charts
+    own = named(chart)
+    assert (own["profile"].x, own["profile"].y) == ([90.0, 100.0, 120.0], [5.0, 0.0, 2.0])
+    assert (own["ends"].x, own["ends"].y) == ([92.5, 92.5], [0.0, 3.84])
+    assert [series.name for series in chart.series].count("ends") == 1
+    assert chart.level == 3.84 and axes_of(chart)[1].high == pytest.approx(1.6 * 3.84)
+    sigma = own["by the 1 sigma of the fit"]
+    for x, y in zip(sigma.x, sigma.y, strict=True):
+        value = ((x - 100.0) / 5.0) ** 2
+        assert y == pytest.approx(value, abs=1e-4) if value < 6 else y is None or y < 6.2
+    assert "92.5 MPa, upper end not closed" in chart.alt
+
+
+def test_bootstrap() -> None:
+    strains = {name: np.array([0.0, 0.1]) for name in ("E1", "E2", "G12")}
+    best = {name: np.array([10.0, 20.0]) * k for k, name in enumerate(strains, 1)}
+    samples = {name: np.array([0.9 * v, 1.3 * v]) for name, v in best.items()}
+    fit = {name: np.array([0.95 * v, 1.05 * v]) for name, v in best.items()}
+    charts = bootstrap_charts(strains, best, samples, fit, "c").charts
+    for k, chart in enumerate(charts, 1):
+        own, low, high = chart.series
+        assert own.y == pytest.approx([10 * k, 20 * k])
+        assert own.lower == pytest.approx([9.5 * k, 19 * k])
+        assert own.upper == pytest.approx([10.5 * k, 21 * k])
+        assert low.y == pytest.approx([9 * k, 18 * k]) and low.name == high.name
+        assert high.y == pytest.approx([13 * k, 26 * k])
+        assert axes_of(chart)[1].high > 26 * k
+        # Two curves, once in the legend.
+        assert chart_svg(chart, 3).count('class="entry"') == 2
+
+
+def test_convergence() -> None:
+    """The solver's tolerance is not drawn; guides are of first and second order."""
+    panel = ConvergencePanel(
+        "warp", [4.0, 2.0, 1.0], {"apex at 1 kPa": [1.0, 0.25], "load": [0.5, 1e-7]},
+        [8, 32, 128], [0.1, 0.3, 1.1],
+    )  # fmt: skip
+    found = convergence_charts([panel], "elements", "Title")
+    chart, cost = found.charts
+    own = named(chart)
+    assert own["apex at 1 kPa"].x == [4.0, 2.0] and own["apex at 1 kPa"].y == [1.0, 0.25]
+    assert own["load"].y == [0.5, None]
+    assert own["apex at 1 kPa"].rank is not None and own["load"].rank is None
+    assert own["order 1"].y == pytest.approx([1.6, 0.8])
+    assert own["order 2"].y == pytest.approx([1.6, 0.4])
+    assert chart.log_x and chart.log_y and chart.x_label == "mean edge, mm"
+    assert (cost.series[0].x, cost.series[0].y) == ([8, 32, 128], [0.1, 0.3, 1.1])
+    assert "below 1e-05 %" in found.caption
+
+
+def test_no_change_at_all() -> None:
+    panel = ConvergencePanel("warp", [0.2, 0.1], {"load": [0.0]}, [8, 32], [0.1, 0.3])
+    chart = convergence_charts([panel], "increments", "Title").charts[0]
+    assert [series.y for series in chart.series] == [[None]] and chart.alt.endswith(": none")
+    assert "<svg" in chart_svg(chart)
+
+
+def test_nu12() -> None:
+    lines = {f"at {k}": ([0.1, 0.24], [1.0 + 0.1 * k, 1.0]) for k in range(8)}
+    chart, few = nu12_charts({"a": lines, "b": {"one": ([0.1, 0.2], [np.nan, 1.0])}}, 0.24,
+                             "apex", "c").charts  # fmt: skip
+    assert [series.rank for series in chart.series] == pytest.approx(np.linspace(0, 1, 8))
+    assert chart.series[3].y == pytest.approx([1.3, 1.0]) and chart.level == 1.0
+    assert chart.y_label == "apex / that at nu12 = 0.24" and "1 to 1.7" in chart.alt
+    assert few.series[0].y == [None, 1.0] and few.series[0].rank is None
+
+
+def test_weights() -> None:
+    """Errors in percent; a bar of one standard deviation where the weight is as written."""
+    moduli = {"E1": {0.0: [90.0, 100.0, 110.0], 0.05: [50.0, 60.0, 70.0]}, "G12": {0.0: [1, 2, 3]}}
+    sigma = {"E1": [0.1, 0.05], "G12": None}
+    errors, others = weights_charts(
+        "strip", [0.5, 1.0, 2.0], {"one": [0.01, 0.02, 0.03]}, moduli, sigma
+    )
+    assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
+    first, shear = others.charts
+    assert [s.y for s in first.series] == [[90, 100, 110], [90, 110], [50, 60, 70], [57, 63]]
+    assert first.series[1].x == [1.0, 1.0] and [s.y for s in shear.series] == [[1, 2, 3]]
+    assert first.log_x and first.x_label == "weight of strip, times that of the project"
