@@ -52,6 +52,8 @@ def axes_of(chart: Chart) -> tuple[Axis, Axis]:
         y = Axis(0.0, y.high)
     if chart.top is not None:
         y = Axis(y.low, max(chart.top, y.low + 1e-12), chart.log_y)
+    if chart.x_names:
+        return Axis(0.5, len(chart.x_names) + 0.5), y
     dotted = any(s.look == "dots" or s.marks for s in chart.series)
     return _axis(_known(along, chart.log_x), chart.log_x, 0.02 if dotted else 0.0), y
 

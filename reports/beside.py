@@ -77,6 +77,8 @@ def _alike(one: Part, other: Part) -> bool:
     if isinstance(one, Table) and isinstance(other, Table):
         return (one.title, list(one.header)) == (other.title, list(other.header))
     if isinstance(one, Charts) and isinstance(other, Charts):
+        if [list(c.x_names) for c in one.charts] != [list(c.x_names) for c in other.charts]:
+            return False
         same = [c.title for c in one.charts] == [c.title for c in other.charts]
         return one.name == other.name and (same or len(one.charts) == len(other.charts) == 1)
     return one.part == other.part and getattr(one, "name", "") == getattr(other, "name", "")

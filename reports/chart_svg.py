@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup, escape
 
@@ -39,7 +39,7 @@ def chart_svg(chart: Chart, beside: int = 1) -> Markup:
         f'aria-label="{escape(chart.alt or chart.title)}">',
         f'<text class="title" x="{LEFT:g}" y="16">{escape(chart.title)}</text>',
         *legend,
-        f'<g class="axes">{"".join(_axes(x, y, top, width, height))}</g>',
+        f'<g class="axes">{"".join(_axes(x, y, top, width, height, chart.x_names))}</g>',
         f'<text class="label" x="{LEFT + width / 2:g}" y="{top + height + 36:g}" '
         f'text-anchor="middle">{escape(chart.x_label)}</text>',
         f'<text class="label" transform="translate(13 {top + height / 2:g}) rotate(-90)" '
@@ -113,9 +113,24 @@ def _left(place: float) -> str:
     return f"{place:.2f}".rstrip("0").rstrip(".")
 
 
-def _axes(x: Axis, y: Axis, top: float, width: float, height: float) -> Iterator[str]:
-    """Grid lines and numbers."""
-    for value in x.ticks:
+def _short(name: str, width: float, count: int) -> str:
+    """Of a name, what there is room for beside the others."""
+    most = max(3, int(width / count / LETTER) - 1)
+    return name if len(name) <= most else f"{name[: most - 1]}…"
+
+
+def _axes(
+    x: Axis, y: Axis, top: float, width: float, height: float, names: Sequence[str]
+) -> Iterator[str]:
+    """Grid lines and numbers, or names."""
+    for k, name in enumerate(names, start=1):
+        at = LEFT + width * (x.place(float(k)) or 0.0) / PLACES
+        yield f'<path d="M{at:.1f} {top:g}v{height:g}"/>'
+        yield (
+            f'<text x="{at:.1f}" y="{top + height + 16:g}" text-anchor="middle">'
+            f"{escape(_short(name, width, len(names)))}<title>{escape(name)}</title></text>"
+        )
+    for value in () if names else x.ticks:
         at = LEFT + width * (x.place(value) or 0.0) / PLACES
         yield f'<path d="M{at:.1f} {top:g}v{height:g}"/>'
         yield (

@@ -54,6 +54,7 @@ class Chart:
 
     from_zero : whether the y axis begins at zero. top : of the y axis, where a band may be as wide
     as it likes; None for that of everything drawn. level : a line across, at this y.
+    x_names : what stands at x = 1, 2, ... instead of numbers.
     """
 
     title: str
@@ -66,6 +67,7 @@ class Chart:
     top: float | None = None
     level: float | None = None
     log_x: bool = False
+    x_names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ def charts_data(part: Charts) -> Markup:
         charts.append(
             {
                 "title": chart.title,
+                "names": chart.x_names,
                 "labels": [chart.x_label, chart.y_label],
                 "axes": [asdict(axis) for axis in (x, y)],
                 "series": [

@@ -13,7 +13,6 @@ from ..fits.store import RESULT, Store
 from ..notes import NOTES, NOTES_ARE, write_notes
 from ..reports import (
     LawRow,
-    Picture,
     Report,
     Section,
     Table,
@@ -21,6 +20,7 @@ from ..reports import (
     plot_laws,
     write_report,
 )
+from ..reports.named_charts import law_charts
 from ..writing import replacing
 from .law_words import conclusion, noise, table_of
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .laws import LawComparison
 
 COMPARISON = "comparison.csv"
+CAPTION = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
 
 
 def write_comparison(comparison: LawComparison, folder: Path) -> Path:
@@ -51,7 +52,7 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         warnings=[note.line for note in comparison.notes],
         sections=[
             Section("Errors", [
-                Picture("laws.png", "Error of the fit, and at specimens left out of it"),
+                law_charts(rows, total, result["objective_is"], CAPTION),
                 Table(
                     "Errors",
                     list(table.columns),
@@ -67,6 +68,7 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         ],
         files=[
             (COMPARISON, "the table"),
+            ("laws.png", "picture of the errors"),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers, for programs"),
         ],

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from ..fits.store import RESULT
 from ..materials.forms.base import COMPONENTS
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Picture, Report, Section, Table, plot_plan, write_report
+from ..reports import Report, Section, Table, plot_plan, write_report
+from ..reports.named_charts import plan_charts
 from ..writing import replacing, write_text
 from .planned import ASSUMED, words
 
@@ -26,14 +27,18 @@ def write_plan(plan: Plan, folder: Path) -> Path:
     (folder / RESULT).unlink(missing_ok=True)
     with replacing(folder / TABLE) as path:
         plan.table().to_csv(path, index=False, float_format="%.6g", lineterminator="\n")
-    every = (plan.now, *plan.candidates)
-    titles = [WITHOUT, *(planned.title for planned in plan.candidates)]
-    sigma = {name: [100 * planned.summary[name] for planned in every] for name in COMPONENTS}
-    plot_plan(folder / FIGURE, titles, sigma, WITHOUT)
+    plot_plan(folder / FIGURE, *_shown(plan), WITHOUT)
     write_notes(folder, plan.notes)
     page = write_report(folder, _page(plan))
     write_text(folder / RESULT, json.dumps(plan.result, indent=1) + "\n")
     return page
+
+
+def _shown(plan: Plan) -> tuple[list[str], dict[str, list[float]]]:
+    """Titles, and of each modulus 1 sigma in percent."""
+    every = (plan.now, *plan.candidates)
+    titles = [WITHOUT, *(planned.title for planned in plan.candidates)]
+    return titles, {name: [100 * one.summary[name] for one in every] for name in COMPONENTS}
 
 
 def _page(plan: Plan) -> Report:
@@ -53,11 +58,18 @@ def _page(plan: Plan) -> Report:
         ],
         warnings=[note.line for note in plan.notes],
         sections=[
-            Section("Which test next", [Picture(FIGURE, CAPTION), _summaries(plan)]),
+            Section(
+                "Which test next",
+                [
+                    plan_charts([title for title, _ in _rows(plan)], _shown(plan)[1], CAPTION),
+                    _summaries(plan),
+                ],
+            ),
             Section("Along the strains", [_at_strains(plan, name) for name in COMPONENTS]),
         ],
         files=[
             (TABLE, "the tables"),
+            (FIGURE, "picture of the chart"),
             (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
         ],

@@ -119,15 +119,34 @@ class Validation:
             said.append(f"foretells best: {min(means, key=means.__getitem__)}")
         return said
 
+    def _shown(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
+        """Names of the tests or parts; by law the errors there, foretold and fitted."""
+        names = list(dict.fromkeys(one.foretold.test for one in self.judged))
+        laws = dict.fromkeys(one.law for one in self.judged)
+        of = {(one.law, one.foretold.test): one for one in self.judged}
+
+        def errors(law: str, fitted: bool) -> list[float]:
+            found = [of.get((law, name)) for name in names]
+            return [
+                np.nan if one is None else _relative(one.fitted if fitted else one.foretold)
+                for one in found
+            ]
+
+        after = {law: own for law in laws if np.isfinite(own := errors(law, True)).any()}
+        return names, {law: errors(law, False) for law in laws}, after
+
     def write(self, folder: Path) -> None:
         """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
+        from ..reports.named_charts import held_out_charts
         from .study_page import write_study_page
 
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
         write_notes(folder, self.notes)
         title = f"{self.title}: does a fit foretell what it was not given?"
-        write_study_page(folder, title, self.lines(), self.table(), TABLE, self.notes)
+        charts = held_out_charts(*self._shown(), "Errors at what a fit was not given, and was")
+        said = (title, self.lines(), self.table(), TABLE, self.notes)
+        write_study_page(folder, *said, charts=[charts])
         Store(folder).finish(self.result)
 
 

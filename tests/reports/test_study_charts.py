@@ -11,6 +11,7 @@ from bubblefit.reports.chart_svg import chart_svg
 from bubblefit.reports.charts import Chart, Series, line
 from bubblefit.reports.convergence_charts import convergence_charts
 from bubblefit.reports.likelihoods import ProfilePanel
+from bubblefit.reports.named_charts import plan_charts
 from bubblefit.reports.nu12_charts import nu12_charts
 from bubblefit.reports.profile_charts import profile_charts
 from bubblefit.reports.weights_charts import weights_charts
@@ -111,3 +112,17 @@ def test_weights() -> None:
     assert [s.y for s in first.series] == [[90, 100, 110], [90, 110], [50, 60, 70], [57, 63]]
     assert first.series[1].x == [1.0, 1.0] and [s.y for s in shear.series] == [[1, 2, 3]]
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
+
+
+def test_names_stand_where_numbers_would() -> None:
+    """Cut where there is no room, whole when pointed at."""
+    names = ["one", "two & a name that is far too long for its place in the row", *"abcd"]
+    known = plan_charts(names, {"E1": [1.0, 20.0, 100.0, 3, 4, 5], "G12": [2.0] * 6}, "c")
+    (chart,) = known.charts
+    x, _ = axes_of(chart)
+    assert (x.low, x.high) == (0.5, 6.5) and chart.log_y
+    svg = chart_svg(chart)
+    assert "two &amp; a …<title>two &amp; a name that is far" in svg
+    assert ">one<title>one</title></text>" in svg
+    assert chart.series[0].y == [1, 20, None, 3, 4, 5]
+    assert np.round(chart.series[1].x).tolist() == [1, 2, 3, 4, 5, 6]

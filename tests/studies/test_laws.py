@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from bubblefit.errors import OutputError
 from bubblefit.notes import rows
-from bubblefit.reports import LawRow, Report, Table
+from bubblefit.reports import Charts, LawRow, Report, Table
 from bubblefit.studies import law_page
 from bubblefit.studies.folds import FoldError
 from bubblefit.studies.laws import LawComparison, compare_laws
@@ -127,11 +127,16 @@ def test_table_and_page(compared: LawComparison, run: Run) -> None:
         found.summary == f"least at specimens left out: {best}; simplest within 5 % of it: constant"
     )
     assert found.facts == [("error", label), ("the data's own noise", noise)]
-    assert found.figures == [
-        ("laws.png", "Error of the fit, and at specimens left out of it"), ("loads.png", "loads")
-    ]  # fmt: skip
+    assert found.figures == [("loads.png", "loads")]
+    (chart,) = next(part for part in found.parts if isinstance(part, Charts)).charts
+    forms = result["forms"]
+    for series, key in zip(chart.series, ("fitted", "cross_validated"), strict=True):
+        assert series.y == pytest.approx([form[key] for form in forms], rel=1e-5)
+    assert chart.x_names == tuple(f"{f['form']} ({f['coefficients']})" for f in forms)
+    assert chart.level == noise
     assert found.files == [
         ("comparison.csv", "the table"),
+        ("laws.png", "picture of the errors"),
         ("notes.csv", "what a reader of the numbers should know, note by note"),
         ("result.json", "all numbers, for programs"),
     ]

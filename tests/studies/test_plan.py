@@ -25,6 +25,7 @@ from bubblefit.studies.planned import NOW, Plan, Planned
 from bubblefit.studies.present_tests import Present
 
 from ..commands import in_process
+from ..page_charts import charts_of
 from ..projects import ELONGATION, constant_strips, small
 from ..published_laws import TABLE_4_2
 
@@ -215,7 +216,14 @@ def test_the_command(tmp_path: Path, few: None) -> None:
     assert next(line for line in said if line.startswith(" 1. ")).split()[1] in first["test"]
     assert any(line.startswith("Assumed:") for line in said)
     page = (tmp_path / "plan" / "report.html").read_text()
-    assert first["test"] in page and "unknown" in page and "data:image/png" in page
+    assert first["test"] in page and "unknown" in page
+    (chart,) = charts_of(tmp_path / "plan")["plan"]
+    assert chart.x_names[0] == "the present tests alone"
+    for rank, (own, one) in enumerate(zip(chart.x_names[1:], result["candidates"], strict=True), 1):
+        assert own.startswith(f"{rank}. {one['test']}")
+    for series in chart.series:
+        own = 100 * table[f"sigma_{series.name}"].to_numpy()
+        assert series.y == [pytest.approx(v, rel=1e-4) if v < 100 else None for v in own]
     assert "Assumed:" in page
     again = in_process("plan", "project.toml", "--out", "plan", cwd=tmp_path, code=2)
     assert "already holds a result" in again.output

@@ -14,6 +14,8 @@ from bubblefit.notes import Note, NoteKind
 from bubblefit.studies.held_out import HeldOut
 from bubblefit.studies.validated import Judged, Validation
 
+from ..page_charts import charts_of
+
 UNITS = {"one: warp": "N", "one: fill": "N"}
 FAILED = Note(NoteKind.FAILED, "no analysis: too tired", "two")
 ONE = HeldOut("one", 0.05, {"one: warp": 12.5, "one: fill": 7.0}, UNITS)
@@ -73,6 +75,14 @@ def test_table_and_result(tmp_path: Path) -> None:
     }  # fmt: skip
     FOUND.write(tmp_path / "new" / "folder")
     assert json.loads((tmp_path / "new" / "folder" / "result.json").read_text()) == FOUND.result
+    (chart,) = charts_of(tmp_path / "new" / "folder")["held out"]
+    assert chart.x_names == ["one", "two"]
+    assert {series.name: series.y for series in chart.series} == {
+        "cubic, foretold": [5.0, 15.0], "constant, foretold": [6.0, 7.0],
+        "spline, foretold": [5.0, None], "cubic, fitted": [2.0, None],
+    }  # fmt: skip
+    for series in chart.series:
+        assert np.round(series.x).tolist() == [1.0, 2.0]
     text = (tmp_path / "new" / "folder" / "validation.csv").read_text().splitlines()
     assert text[0] == ",".join(columns)
     assert text[1] == "cubic,one,one: warp,N,12.5,5,0.05,0.02,"

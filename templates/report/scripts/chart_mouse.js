@@ -17,9 +17,10 @@ const enliven = (svg, data, name) => {
     pointer.append(make("circle", { cx, cy, r: 5 }));
     const band = Number.isFinite(one.lower) && Number.isFinite(one.upper)
       ? ` (${shown(one.lower)} to ${shown(one.upper)})` : "";
-    const [x, y] = data.labels;
+    const [x, y] = data.labels, at = across(data, one.x);
+    const where = typeof at === "string" ? at : shown(at);
     said.textContent =
-      `${one.name ? `${one.name}: ` : ""}${x} ${shown(one.x)}; ${y} ${shown(one.y)}${band}`;
+      `${one.name ? `${one.name}: ` : ""}${x} ${where}; ${y} ${shown(one.y)}${band}`;
   };
   const nearest = (at) => {
     let best = -1, least = Infinity;

@@ -1,6 +1,11 @@
 // A chart that can be looked into: a window on its places, and the axes that belong to it.
 const WHOLE = { x: 0, y: 0, w: PLACES, h: PLACES };
 
+// About so wide is a letter.
+const LETTER = 6.4;
+// A value along the axis across, or the name that stands there.
+const across = (data, x) => data.names[Math.round(x) - 1] ?? x;
+
 const windowOn = (svg, data) => {
   const plot = svg.querySelector(".plot"), grid = svg.querySelector(".axes");
   const [left, top, width, height] =
@@ -21,10 +26,16 @@ const windowOn = (svg, data) => {
   };
   const axes = () => {
     grid.replaceChildren();
-    for (const value of ticksOf(across, view.x, view.x + view.w)) {
+    const within = ([at]) => at >= left - 1e-6 && at <= left + width + 1e-6;
+    const named = data.names.map((name, k) => k + 1)
+      .filter((value) => within(onPaper(placeOf(across, value), 0)));
+    const most = Math.max(3, Math.floor(width / named.length / LETTER) - 1);
+    const short = (name) => (name.length <= most ? name : `${name.slice(0, most - 1)}…`);
+    for (const value of data.names.length ? named : ticksOf(across, view.x, view.x + view.w)) {
       const [at] = onPaper(placeOf(across, value), 0);
+      const words = data.names.length ? short(data.names[value - 1]) : shown(value);
       grid.append(make("path", { d: `M${at} ${top}v${height}` }), make("text",
-        { x: at, y: top + height + 16, "text-anchor": "middle" }, shown(value)));
+        { x: at, y: top + height + 16, "text-anchor": "middle" }, words));
     }
     for (const value of ticksOf(up, view.y, view.y + view.h)) {
       const [, at] = onPaper(0, placeOf(up, value));
@@ -60,5 +71,5 @@ const placed = (data) => data.series.flatMap((own) => {
 const chartRows = (data) => [
   ["series", ...data.labels, "lower", "upper"],
   ...data.series.flatMap((own) => own.x.map((value, k) =>
-    [own.name, value, own.y[k], own.lower[k], own.upper[k]])),
+    [own.name, across(data, value), own.y[k], own.lower[k], own.upper[k]])),
 ];
