@@ -36,6 +36,7 @@ const windowOn = (svg, data) => {
       const words = data.names.length ? short(data.names[value - 1]) : shown(value);
       grid.append(make("path", { d: `M${at} ${top}v${height}` }), make("text",
         { x: at, y: top + height + 16, "text-anchor": "middle" }, words));
+      if (data.names.length) grid.lastChild.append(make("title", {}, data.names[value - 1]));
     }
     for (const value of ticksOf(up, view.y, view.y + view.h)) {
       const [, at] = onPaper(0, placeOf(up, value));
