@@ -24,8 +24,8 @@ def charts_data(part: Charts) -> Markup:
         charts.append(
             {
                 "title": chart.title,
-                "names": chart.x_names,
                 "labels": [chart.x_label, chart.y_label],
+                "names": chart.x_names,
                 "axes": [asdict(axis) for axis in (x, y)],
                 "series": [
                     {"name": s.name, "x": s.x, "y": s.y, "lower": s.lower, "upper": s.upper}
