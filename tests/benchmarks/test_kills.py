@@ -28,12 +28,16 @@ def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path: Path) -> None:
     needs.linux("processes and what they leave")
     kills = script()
     _import_all()
-    first = kills.Trial(tmp_path / "whole", "fit")
-    begun = time.monotonic()
-    assert kills.finish(first.start()) == 0, first.said.read_text()
-    seconds = time.monotonic() - begun
+    # The second is timed: the first may have had kernels to compile.
+    for folder in ("first", "whole"):
+        first = kills.Trial(tmp_path / folder, "fit")
+        begun = time.monotonic()
+        assert kills.finish(first.start()) == 0, first.said.read_text()
+        seconds = time.monotonic() - begun
     whole, told = kills.content(first.out), kills.Told()
     assert {"result.json", "history.csv", "moduli.csv"} <= whole.keys()
-    count = kills.one_trial(tmp_path / "one", "fit", whole, seconds, 3, random.Random(3), told)
+    count = kills.one_trial(
+        tmp_path / "one", "fit", whole, 0.7 * seconds, 3, random.Random(3), told
+    )
     assert count >= 1 and (told.trials, told.equal) == (1, 1), told
     assert told.other == [] and told.left == []
