@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 import quadprog
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, ndtri_exp
 
 Array = NDArray[np.float64]
@@ -142,29 +143,38 @@ def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     inverse of the curvature there: round in a wide place, flat between bounds that are close.
     """
     place = _inside(rows, least, centre)
-    value, slope, curvature = _barrier(rows, least, centre, place)
+    value, slope, factor = _barrier(rows, least, centre, place)
     for _ in range(NEWTON):
-        step, share = -np.linalg.solve(curvature, slope), 1.0
+        root = _root(factor)
+        step, share = -root @ (root.T @ slope), 1.0
         for _ in range(HALVINGS):
             trial = _barrier(rows, least, centre, place + share * step)
             if trial[0] < value:
                 place = place + share * step
-                value, slope, curvature = trial
+                value, slope, factor = trial
                 break
             share /= 2
         else:
             break
-    return place, np.linalg.inv(np.linalg.cholesky(curvature)).T
+    return place, _root(factor)
+
+
+def _root(factor: Array) -> Array:
+    """A root of the inverse of factor' factor, which itself would lose all digits between bounds
+    that nearly meet."""
+    upper = np.linalg.qr(factor, mode="r")
+    upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
+    return np.asarray(solve_triangular(upper, np.eye(len(upper))))
 
 
 def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
-    """Value (infinite outside), slope and curvature."""
+    """Value (infinite outside), slope, and a factor F of the curvature F' F."""
     away, room = place - centre, rows @ place - least
     if (room <= 0).any():
         return np.inf, away, np.eye(len(away))
     by_room = rows / room[:, None]
-    curvature = np.eye(len(away)) + by_room.T @ by_room
-    return float(away @ away / 2 - np.log(room).sum()), away - by_room.sum(axis=0), curvature
+    factor = np.vstack([np.eye(len(away)), by_room])
+    return float(away @ away / 2 - np.log(room).sum()), away - by_room.sum(axis=0), factor
 
 
 def _inside(rows: Array, least: Array, centre: Array) -> Array:

@@ -92,3 +92,18 @@ def test_between_bounds_that_are_close_to_each_other() -> None:
     assert kstest(drawn @ along, norm.cdf).pvalue > 0.01
     assert kstest(drawn[:, 2], norm.cdf).pvalue > 0.01
     assert kstest(drawn @ across, uniform(2.0, 0.001).cdf).pvalue > 0.01
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-8, 3e-9])
+def test_oblique_bounds_that_nearly_meet(width: float) -> None:
+    """Between x + y = 0 and a width more: rounding of so sharp a curvature is larger than one."""
+    rows = np.array([[1.0, 1.0, 0.3], [-1.0, -1.0, -0.3], [0.2, -0.7, 1.0]])
+    least = np.array([0.0, -width, -50.0])
+    start = np.array([width / 2, 0.0, 0.0])
+    drawn = truncated_draws(
+        np.zeros(3), np.eye(3), (rows, least), start, COUNT, np.random.default_rng(4)
+    )
+    across = drawn @ rows[0]
+    assert across.min() >= -1e-9 and across.max() <= width + 1e-9
+    along = drawn @ np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    assert along.std() == pytest.approx(1.0, abs=0.05)
