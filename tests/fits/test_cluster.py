@@ -21,7 +21,7 @@ from bubblefit.errors import BubblefitError, InputError
 from bubblefit.fits import cluster, cluster_worker
 from bubblefit.fits.executor import Executor
 from bubblefit.fits.start import StartRecord
-from bubblefit.solvers import licences
+from bubblefit.solvers import licence_leases, licences
 from bubblefit.solvers.announcements import Announcement, announce, hearing
 from bubblefit.solvers.process import run_process
 
@@ -393,8 +393,11 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path
     assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
 
 
-def test_no_licence_is_leased_where_nobody_answers(tmp_path: Path) -> None:
+def test_no_licence_is_leased_where_nobody_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Nor is one kept from others on this machine; a scheduler that goes takes its leases along."""
+    monkeypatch.setattr(licence_leases, "CONNECT_S", 1.0)
     distributed: Any = needs.library("distributed")
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
     options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}
