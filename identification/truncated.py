@@ -162,7 +162,7 @@ def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
 def _root(factor: Array) -> Array:
     """A root of the inverse of factor' factor, which itself would lose all digits between bounds
     that nearly meet."""
-    upper = np.linalg.qr(factor, mode="r")
+    upper: Array = np.linalg.qr(factor).R
     upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
     return np.asarray(solve_triangular(upper, np.eye(len(upper))))
 
