@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import cast
 
 import click
 
 from .arguments import AS_JSON, DATA, OVERWRITE, PROJECT, TESTS, out_option
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import exits
 from .options import data_folders, result_folder
@@ -88,8 +87,5 @@ def command(
         "tests": {one.test: numbers_of(one) for one in evaluations},
     }
     Store(folder).finish(result)
-    if as_json:
-        click.echo(json.dumps(result, indent=1))
-        return
     said = [line for one in evaluations for line in lines_of(one)]
-    click.echo("\n".join([*said, *note_lines(notes), written_to(folder)]))
+    tell(result, [*said, *note_lines(notes), written_to(folder)], as_json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from .arguments import (
     solver_choice,
     with_options,
 )
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import exits, resumable
 from .options import data_folders, folder_beside, read_with_solver
@@ -87,5 +86,4 @@ def command(over: str, samples: int, seed: int | None, card: str | None, **optio
             resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
         )  # fmt: skip
     done.write(folder)
-    lines = [*done.lines(), written_to(folder)]
-    click.echo(json.dumps(done.result, indent=1) if options["as_json"] else "\n".join(lines))
+    tell(done.result, [*done.lines(), written_to(folder)], options["as_json"])

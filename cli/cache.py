@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from ..errors import InputError
 from .arguments import AS_JSON, PATH
+from .ending import tell
 from .examples import examples
 from .exits import exits
 
@@ -75,7 +75,7 @@ def command(
         "used_first": entries[0].used if entries else None,
         "used_last": entries[-1].used if entries else None,
     }
-    click.echo(json.dumps(told, indent=1) if as_json else "\n".join(_lines(told)))
+    tell(told, _lines(told), as_json)
 
 
 def _lines(told: dict[str, Any]) -> list[str]:

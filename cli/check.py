@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
 import click
 
 from .arguments import DATA, PROJECT, TESTS, TRUST, out_option
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import exits
 from .options import data_folders, folder_beside
@@ -52,9 +51,6 @@ def command(
     found = check(read_project(project, data_folders(data)), tests or None, trust)
     folder = out or folder_beside(project, "check")
     found.report(folder)
-    if as_json:
-        click.echo(json.dumps(found.result, indent=1))
-    else:
-        click.echo("\n".join([*found.lines(), written_to(folder)]))
+    tell(found.result, [*found.lines(), written_to(folder)], as_json)
     if not found.sound:
         sys.exit(DOUBTFUL)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .fitting import fit_options, settings_given
 from .options import command_line, data_folders, folder_beside, read_with_solver
@@ -74,4 +73,4 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
         *note_lines(comparison.notes),
         written_to(folder),
     ]
-    click.echo(json.dumps(result, indent=1) if options["as_json"] else "\n".join(lines))
+    tell(result, lines, options["as_json"])

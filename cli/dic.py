@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from ..data.tables import write_table
 from ..errors import InputError, OutputError
 from ..sections import LENGTH_UNITS
 from ..writing import replacing
+from .ending import tell
 from .examples import examples
 from .exits import exits
 from .frame_arguments import check_out, columns_named, frame_options
@@ -100,7 +100,7 @@ def sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **options: 
     if out is not None:
         _write(out, rows, names, found)
         result["out"] = [str(out), str(out.with_suffix(".png"))]
-    click.echo(json.dumps(result, indent=1) if as_json else "\n".join(_lines(result)))
+    tell(result, _lines(result), as_json)
 
 
 def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:

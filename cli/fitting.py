@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -27,6 +26,7 @@ from .arguments import (
     solver_choice,
     with_checks,
 )
+from .ending import tell
 from .exits import WORSE, resumable
 from .fit_words import lines_of
 from .logs import verbose
@@ -113,7 +113,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
         )
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
-    tell(result, folder, options["fail_above"], options["as_json"])
+    _end(result, folder, options["fail_above"], options["as_json"])
 
 
 def _tests(
@@ -127,12 +127,9 @@ def _tests(
     return names or kind
 
 
-def tell(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
+def _end(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 1 when the best fit is worse than asked for."""
-    if as_json:
-        click.echo(json.dumps(fit.result, indent=1))
-    else:
-        click.echo("\n".join(lines_of(fit, folder, every=verbose())))
+    tell(fit.result, lines_of(fit, folder, every=verbose()), as_json)
     if fail_above is not None and fit.objective > fail_above:
         said = f"{fit.objective:.4g} is left of the objective, above {fail_above:g}"
         click.echo(f"bubblefit: --fail-above: {said}", err=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from ..data.gauge_table import GaugeTable
 from ..errors import InputError
 from ..notes import lines as note_lines
 from ..sections import LENGTH_UNITS
+from .ending import tell
 from .examples import examples
 from .exits import exits
 from .frame_arguments import check_out, columns_named, frame_options
@@ -112,11 +112,8 @@ def command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
             table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
-    if options["as_json"]:
-        click.echo(json.dumps(result, indent=1))
-        return
     more = [note for note in table.notes if note not in said]
-    click.echo("\n".join([*_lines(result), *note_lines(more), f"written to {out}"]))
+    tell(result, [*_lines(result), *note_lines(more), f"written to {out}"], options["as_json"])
 
 
 def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from .arguments import (
     solver_choice,
     with_options,
 )
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import exits
 from .options import data_folders, numbers, read_with_solver, result_folder
@@ -95,8 +94,7 @@ def command(
             progress=progress.saw,
         )
     made.write(folder)
-    lines = [*made.lines(), written_to(folder)]
-    click.echo(json.dumps(made.result, indent=1) if options["as_json"] else "\n".join(lines))
+    tell(made.result, [*made.lines(), written_to(folder)], options["as_json"])
 
 
 def _noise(given: str) -> tuple[str, float]:

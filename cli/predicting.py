@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,7 +21,7 @@ from .arguments import (
     solver_choice,
     with_checks,
 )
-from .ending import written_to
+from .ending import tell, written_to
 from .exits import WORSE, resumable
 from .options import command_line, with_solver
 from .progress import RunsProgress
@@ -97,13 +96,13 @@ def run_predictions(
             command_line=command_line(),
         )
     predictions.report(folder)
-    tell(predictions, folder, options["fail_above"], options["as_json"])
+    _end(predictions, folder, options["fail_above"], options["as_json"])
 
 
-def tell(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
+def _end(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
     lines = [*predictions.lines(), written_to(folder)]
-    click.echo(json.dumps(predictions.result, indent=1) if as_json else "\n".join(lines))
+    tell(predictions.result, lines, as_json)
     failed = predictions.failed()
     if failed:
         run = predictions.each[failed[0]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from .arguments import (
     solver_choice,
     with_options,
 )
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import exits
 from .options import data_folders, numbers, read_with_solver, result_folder
@@ -83,8 +82,7 @@ def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **opt
     with NamedProgress("sides", options["quiet"] or options["as_json"]) as progress:
         found = profile(project, asked, card, options["tests"] or None, progress=progress.saw)
     found.write(folder)
-    lines = [*found.lines(), written_to(folder)]
-    click.echo(json.dumps(found.result, indent=1) if options["as_json"] else "\n".join(lines))
+    tell(found.result, [*found.lines(), written_to(folder)], options["as_json"])
 
 
 def _asked(moduli: Sequence[str], strain: str | None) -> dict[str, list[float]] | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -21,7 +20,7 @@ from .arguments import (
     solver_choice,
     with_checks,
 )
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import resumable
 from .live_line import SeriesProgress
@@ -70,12 +69,7 @@ def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **g
             **given,
         )  # fmt: skip
     done.write(folder)
-    if options["as_json"]:
-        click.echo(json.dumps(done.result, indent=1))
-        return
-    for words in done.lines():
-        click.echo(words)
-    click.echo(written_to(folder))
+    tell(done.result, [*done.lines(), written_to(folder)], options["as_json"])
 
 
 @click.group(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from .ending import written_to
+from .ending import tell, written_to
 from .examples import examples
 from .exits import resumable
 from .fitting import fit_options, settings_given
@@ -96,8 +95,7 @@ def command(
             )  # fmt: skip
     validation.write(folder)
     lines = [*validation.lines(), *note_lines(validation.notes), written_to(folder)]
-    said = json.dumps(validation.result, indent=1) if options["as_json"] else "\n".join(lines)
-    click.echo(said)
+    tell(validation.result, lines, options["as_json"])
 
 
 def _project(options: Mapping[str, Any]) -> Project:
@@ -132,4 +130,4 @@ def _weights(counted: str, forms: Sequence[str], options: Mapping[str, Any]) -> 
         )  # fmt: skip
     study.write(folder)
     lines = [*study.lines(), *note_lines(study.notes), written_to(folder)]
-    click.echo(json.dumps(study.result, indent=1) if options["as_json"] else "\n".join(lines))
+    tell(study.result, lines, options["as_json"])
