@@ -19,7 +19,7 @@ from ..errors import InputError
 from .graded import Refinement, rows
 from .mesh import Mesh
 from .mirror import with_mirror_image
-from .tube import around, of_equal_area, tube_grid, with_cap
+from .tube import angles, of_equal_area, tube_grid, with_cap
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -28,11 +28,10 @@ Masks = dict[str, NDArray[np.bool_]]
 MAX_ELEMENTS = 1_000_000
 #: Core divisions of a cap, at least: eight quads around half of the tube.
 FEWEST = 2
-#: The longest side around the tube, in sizes: where a whole number does not go around, rather more
-#: quads than longer ones. Sides longer by a sixth than the 25 mm asked for put the load at the
-#: first millimetres 2.6 % off.
+#: How much longer than asked for a side around the tube may be: where a whole number does not go
+#: around, rather more quads than longer ones.
 LONGEST = 1.05
-#: Half of the seam in elements, at least: with less the cap's quads next to it are bad.
+#: Half of the seam in sides, at least: with less the cap's quads next to it are bad.
 NARROWEST = 0.25
 NEAR = 1e-9  # of an angle
 #: Directions of the warp yarn that are symmetric in both planes.
@@ -48,6 +47,7 @@ def cylinder_mesh(
     symmetry: Literal["quarter", "full"] = "quarter",
     refinements: Sequence[Refinement] = (),
     cap_warp: Literal["x", "y"] = "x",
+    around: float = 1.0,
 ) -> Mesh:
     """Mesh the middle surface of a cylinder with flat caps.
 
@@ -57,12 +57,13 @@ def cylinder_mesh(
     Parameters
     ----------
     length, diameter : mm, of the whole cylinder before inflation.
-    size : mm, of an element; a whole number of quads, a multiple of eight, goes around the tube.
-        Around it they are at most 5 % longer where the seam lets them.
+    size : mm, of an element.
     seam_width : mm around the tube, centred at the bottom; its edges are rows of nodes.
     symmetry : the quarter x, z >= 0, or the whole: the quarter mirrored twice.
     refinements : places along the half z >= 0 with smaller elements (supports, collar).
     cap_warp : axis that the warp yarn of the caps follows.
+    around : sides around the tube, in sizes: a whole number of quads, a multiple of eight, goes
+        around it, at most 5 % longer where the seam lets them. The caps' quads are as large.
 
     Returns
     -------
@@ -80,14 +81,14 @@ def cylinder_mesh(
         them, a seam too narrow for them or wider than a quarter of the tube, refinements that do
         not fit or share a name.
     """
-    _check(length, diameter, size, seam_width, symmetry, cap_warp)
+    _check(length, diameter, size, seam_width, symmetry, cap_warp, around)
     radius = 0.5 * diameter
     z = rows(0.5 * length, size, refinements)
-    n = max(FEWEST, math.ceil(math.pi * radius / (4 * LONGEST * size)))
+    n = max(FEWEST, math.ceil(math.pi * radius / (4 * LONGEST * around * size)))
     if 8 * n * (len(z) - 1) + 3 * n * n > MAX_ELEMENTS:
         problem = f"{size:g} mm gives more than {MAX_ELEMENTS} elements a half; make them larger"
         raise InputError(None, "size", problem)
-    angle = around(n, 0.5 * seam_width / radius)
+    angle = angles(n, 0.5 * seam_width / radius)
     points, quads, grid = tube_grid(angle, z, of_equal_area(angle, radius))
     points, quads, tube = with_cap(points, quads, grid, angle, n)
 
@@ -122,6 +123,7 @@ def _check(
     seam_width: float,
     symmetry: str,
     cap_warp: str,
+    around: float,
 ) -> None:
     lengths = {"length": length, "diameter": diameter, "size": size, "seam_width": seam_width}
     for name, value in lengths.items():
@@ -132,13 +134,15 @@ def _check(
     if not size <= 0.5 * min(diameter, length):
         problem = f"expected at most the radius and half the length, got {size:g} mm"
         raise InputError(None, "size", problem)
+    if not 0 < around <= 1:
+        raise InputError(None, "around", f"expected above 0 and at most 1, got {around!r}")
     if seam_width > math.pi * diameter / 4:
         problem = f"{seam_width:g} mm is more than a quarter of the tube's circumference"
         raise InputError(None, "seam_width", problem)
-    if 0 < seam_width < 2 * NARROWEST * size:
+    if 0 < seam_width < 2 * NARROWEST * around * size:
         problem = (
             f"{seam_width:g} mm is too narrow for elements of {size:g} mm; make them"
-            f" {seam_width / (2 * NARROWEST):g} mm or smaller"
+            f" {seam_width / (2 * NARROWEST * around):g} mm or smaller"
         )
         raise InputError(None, "seam_width", problem)
     for name, choice, choices in (

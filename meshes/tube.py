@@ -19,7 +19,7 @@ Numbers = NDArray[np.intp]
 NEAR = 1e-9  # in radii
 
 
-def around(n: int, seam: float) -> Array:
+def angles(n: int, seam: float) -> Array:
     """Angles (4 n + 1,) of the rows of nodes from the bottom (0) to the top (pi).
 
     Equal but for the lowest quarter, where a row is put on the edge of the seam, at `seam`.

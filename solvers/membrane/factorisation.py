@@ -20,7 +20,7 @@ from .ordering import swept
 
 Array = NDArray[np.float64]
 # Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
-LARGEST_BAND = 2_000_000
+LARGEST_BAND = 8_000_000
 
 
 class SingularTangent(Exception):
