@@ -16,18 +16,11 @@ from typing import Any, TypeVar
 from ..errors import LicenceDenied, SolverFailure
 from ..materials.law import HypoelasticLaw
 from .announcements import announce
-from .base import (
-    BandedSolver,
-    BandEnd,
-    DifferentiatingSolver,
-    History,
-    Solver,
-    SolverCheck,
-    carries_load_ratios,
-)
+from .base import BandedSolver, DifferentiatingSolver, History, Solver
 from .licence_settings import SCHEDULER, LicenceSettings, licence_settings
 from .process import check_wanted, kept_open
 from .scratch import remove
+from .wrapped import WrappedBand, WrappedSolver
 
 T = TypeVar("T")
 #: Pauses between tries grow by GROWTH, up to MOST times the first one.
@@ -50,7 +43,7 @@ def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
     if not solver.external or (settings.licences is None and settings.wait <= 0):
         return solver
     # What it can do beside running a model must be asked of it as before.
-    protocols = ((_Slopes, DifferentiatingSolver), (_Band, BandedSolver))
+    protocols = ((_Slopes, DifferentiatingSolver), (WrappedBand, BandedSolver))
     more: list[type] = [part for part, protocol in protocols if isinstance(solver, protocol)]
     # Not by asking for them: where there is no program that is an error, of whoever runs it.
     if inspect.getattr_static(solver, "programs", None) is not None:
@@ -62,7 +55,7 @@ def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
     return made
 
 
-class LicensedSolver:
+class LicensedSolver(WrappedSolver):
     """A solver that runs only while it has a licence.
 
     Parameters
@@ -75,27 +68,8 @@ class LicensedSolver:
     def __init__(
         self, solver: Solver, settings: LicenceSettings, scheduler: str | None = None
     ) -> None:
-        self.solver, self.licences, self.scheduler = solver, settings, scheduler
-        self.keep, self.load_ratios = getattr(solver, "keep", False), carries_load_ratios(solver)
-        self.name, self.external = solver.name, solver.external
-
-    @property
-    def progress(self) -> Callable[[Any], None] | None:
-        """The solver's own."""
-        return self.solver.progress
-
-    @progress.setter
-    def progress(self, progress: Callable[[Any], None] | None) -> None:
-        self.solver.progress = progress
-
-    @property
-    def identity(self) -> str:
-        """The solver's own: no result depends on licences."""
-        return self.solver.identity
-
-    def check(self) -> SolverCheck:
-        """The solver's own."""
-        return self.solver.check()
+        super().__init__(solver)
+        self.licences, self.scheduler = settings, scheduler
 
     def run(
         self,
@@ -119,14 +93,6 @@ class _Slopes:
     def run_with_sensitivity(self: Any, *given: Any, **named: Any) -> Any:
         """As the solver, with a licence."""
         return self._with_one(lambda: self.solver.run_with_sensitivity(*given, **named))
-
-
-class _Band:
-    """Of a solver whose answer is a band."""
-
-    def band(self: Any, model: Any) -> list[BandEnd]:
-        """As the solver; nothing is run."""
-        return list(self.solver.band(model))
 
 
 class _Program:

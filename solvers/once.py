@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,10 @@ from typing import Any
 from ..content import digest_of
 from ..errors import BubblefitError
 from ..materials.law import HypoelasticLaw
-from .base import (
-    BandedSolver,
-    BandEnd,
-    DifferentiatingSolver,
-    History,
-    ProgramSolver,
-    Solver,
-    SolverCheck,
-    carries_load_ratios,
-)
+from .base import BandedSolver, DifferentiatingSolver, History, ProgramSolver, Solver
 from .identity import code_mark, program_mark
 from .run_cache import RunCache
+from .wrapped import WrappedBand, WrappedSolver
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +38,7 @@ def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> S
     return kind(solver, cache, options)
 
 
-class Once:
+class Once(WrappedSolver):
     """A solver of the protocol `Solver`, whoever runs it, that looks into a cache before it runs.
 
     A run that fails is not kept: what made it fail (a licence, memory, a full disk) may be gone the
@@ -54,34 +46,8 @@ class Once:
     """
 
     def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
-        self.solver, self.cache, self.options = solver, cache, options
-        self.name: str = solver.name
-        self.external: bool = solver.external
-
-    @property
-    def progress(self) -> Callable[[Any], None] | None:
-        """Of the solver; a run that is in the cache tells nothing."""
-        told: Callable[[Any], None] | None = self.solver.progress
-        return told
-
-    @progress.setter
-    def progress(self, tell: Callable[[Any], None] | None) -> None:
-        self.solver.progress = tell
-
-    @property
-    def identity(self) -> str:
-        """Of the solver."""
-        return str(self.solver.identity)
-
-    @property
-    def load_ratios(self) -> bool:
-        """Of the solver."""
-        return carries_load_ratios(self.solver)
-
-    def check(self) -> SolverCheck:
-        """Of the solver."""
-        found: SolverCheck = self.solver.check()
-        return found
+        super().__init__(solver)
+        self.cache, self.options = cache, options
 
     def run(
         self,
@@ -118,9 +84,5 @@ class Once:
             return None
 
 
-class BandedOnce(Once):
+class BandedOnce(WrappedBand, Once):
     """The same for a solver whose answer to some models is a band."""
-
-    def band(self, model: Any) -> list[BandEnd]:
-        """Of the solver."""
-        return list(self.solver.band(model))
