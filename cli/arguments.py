@@ -27,6 +27,9 @@ DATA: Decorator = click.option(
 TRUST: Decorator = click.option(
     "--trust", multiple=True, metavar="NAME", help="Let a doubt of the data pass; several."
 )
+CARD_OF_FIT: Decorator = click.option(
+    "--card", help="Of the fit: a card's file or name [that of the project's fit]."
+)
 JOBS: Decorator = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
 SCHEDULER: Decorator = click.option(
     "--scheduler", envvar="BUBBLEFIT_SCHEDULER", metavar="ADDRESS",

@@ -9,6 +9,7 @@ import click
 
 from .arguments import (
     AS_JSON,
+    CARD_OF_FIT,
     DATA,
     JOBS,
     OVERWRITE,
@@ -24,7 +25,7 @@ from .arguments import (
 from .ending import tell, written_to
 from .examples import examples
 from .exits import exits, resumable
-from .options import data_folders, folder_beside, read_with_solver
+from .options import folder_beside, read_to_refit
 from .progress import NamedProgress
 
 
@@ -40,9 +41,7 @@ def _options(command: Any) -> Any:
             help="How often.",
         ),
         click.option("--seed", type=click.IntRange(min=0), help="Of the draws [the project's]."),
-        click.option(
-            "--card", help="Of the fit: a card's file or name [that of the project's fit]."
-        ),
+        CARD_OF_FIT,
         TESTS,
         out_option("out/NAME-bootstrap"),
         DATA,
@@ -76,8 +75,7 @@ def command(over: str, samples: int, seed: int | None, card: str | None, **optio
     from ..studies.bootstrap import bootstrap
 
     path: Path = options["project"]
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
+    project = read_to_refit(path, options)
     folder: Path = options["out"] or folder_beside(path, "bootstrap")
     quiet = options["quiet"] or options["as_json"]
     with resumable(folder), NamedProgress("samples", quiet) as progress:

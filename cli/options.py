@@ -82,6 +82,19 @@ def read_with_solver(
     return with_solver(read_project(path, data, need_data), given)
 
 
+def read_to_refit(path: Path, options: Mapping[str, Any]) -> Project:
+    """The project of a file for a study that fits again: `read_with_solver`, jobs, scheduler.
+
+    options : of the command, by name.
+
+    Raises
+    ------
+    InputError : as `read_with_solver`; a scheduler's address that is none.
+    """
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    return project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
+
+
 def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
     """The project with the solver and the solver's options of the command line.
 

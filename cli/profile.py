@@ -11,6 +11,7 @@ import click
 from ..errors import InputError
 from .arguments import (
     AS_JSON,
+    CARD_OF_FIT,
     DATA,
     JOBS,
     OVERWRITE,
@@ -26,7 +27,7 @@ from .arguments import (
 from .ending import tell, written_to
 from .examples import examples
 from .exits import exits
-from .options import data_folders, numbers, read_with_solver, result_folder
+from .options import numbers, read_to_refit, result_folder
 from .progress import NamedProgress
 
 
@@ -40,9 +41,7 @@ def _options(command: Any) -> Any:
         click.option(
             "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
         ),
-        click.option(
-            "--card", help="Of the fit: a card's file or name [that of the project's fit]."
-        ),
+        CARD_OF_FIT,
         TESTS,
         out_option("out/NAME-profile"),
         DATA,
@@ -75,8 +74,7 @@ def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **opt
     from ..studies.profile import profile
 
     path: Path = options["project"]
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
+    project = read_to_refit(path, options)
     asked = _asked(moduli, strain)
     folder = result_folder(path, "profile", options["out"], options["overwrite"])
     with NamedProgress("sides", options["quiet"] or options["as_json"]) as progress:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..fits.coefficients import two_digits
-from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..materials.forms.base import COMPONENTS
-from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Section, Table, percent, write_report
+from ..reports import Report, Section, Table, percent
 from ..reports.bootstrap_charts import Array, bootstrap_charts
 from ..reports.bootstraps import plot_bootstrap
-from ..writing import replacing, write_text
 from .bootstrap_record import SAMPLES
 from .bootstrapped import METHOD
+from .study_folder import FILES, write_study
 
 if TYPE_CHECKING:
     from .bootstrapped import Bootstrap
@@ -26,15 +23,12 @@ TABLE, COEFFICIENTS, FIGURE = "bootstrap.csv", "coefficients.csv", "bootstrap.pn
 
 def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-    (folder / RESULT).unlink(missing_ok=True)
-    for name, table in ((TABLE, done.table()), (COEFFICIENTS, done.coefficients())):
-        with replacing(folder / name) as path:
-            table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
-    plot_bootstrap(folder / FIGURE, done.strains, _best(done), done.bands, done.of_fit)
-    write_notes(folder, done.notes)
-    page = write_report(folder, _page(done))
-    write_text(folder / RESULT, json.dumps(done.result, indent=1) + "\n")
-    return page
+
+    def draw() -> None:
+        plot_bootstrap(folder / FIGURE, done.strains, _best(done), done.bands, done.of_fit)
+
+    tables = {TABLE: done.table(), COEFFICIENTS: done.coefficients()}
+    return write_study(folder, tables, 9, draw, done.notes, _page(done), done.result)
 
 
 def _best(done: Bootstrap) -> dict[str, Array]:
@@ -75,8 +69,7 @@ def _page(done: Bootstrap) -> Report:
             (FIGURE, "picture of the moduli"),
             (COEFFICIENTS, "the unknowns, with their correlations over the samples"),
             (SAMPLES, "every sample: what was drawn, and the optimiser's unknowns"),
-            (NOTES, NOTES_ARE),
-            (RESULT, "all numbers of this page, for programs"),
+            *FILES,
         ],
     )
 

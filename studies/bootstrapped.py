@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..experiments.notes import by_strain
 from ..identification.bands import LEVEL, bands_of
+from ..identification.information import summary
 from ..identification.optimum import ANALYSES_USED_UP
 from ..identification.propagation import moduli_of
 from ..identification.resampling import Group
@@ -101,14 +102,13 @@ class Bootstrap:
     @cached_property
     def sigma(self) -> dict[str, tuple[float, float]]:
         """By modulus, 1 sigma relative, root mean square along its strain: samples, and fit."""
-        found = {}
-        sure = self.found.sure
+        spread, first, sure = {}, {}, self.found.sure
         for name, own in self.moduli.items():
             best = self.found.best.law.modulus(name, self.strains[name])
-            spread = own.std(axis=0, ddof=1) / best
-            first = np.interp(self.strains[name], sure.strain[name], sure.sigma[name])
-            found[name] = _rms(spread), _rms(first)
-        return found
+            spread[name] = own.std(axis=0, ddof=1) / best
+            first[name] = np.interp(self.strains[name], sure.strain[name], sure.sigma[name])
+        samples, fit = summary(spread), summary(first)
+        return {name: (samples[name], fit[name]) for name in samples}
 
     def coefficients(self) -> pd.DataFrame:
         """A row an unknown: value, sigma of the samples and of the fit, and correlations.
@@ -231,7 +231,3 @@ class Bootstrap:
         from .bootstrap_page import write_bootstrap
 
         write_bootstrap(self, Path(folder))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..fits.store import RESULT
 from ..materials.forms.base import COMPONENTS
-from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Section, Table, plot_plan, write_report
+from ..reports import Report, Section, Table, plot_plan
 from ..reports.named_charts import plan_charts
-from ..writing import replacing, write_text
 from .planned import ASSUMED, words
+from .study_folder import FILES, write_study
 
 if TYPE_CHECKING:
     from .planned import Plan, Planned
@@ -24,14 +21,11 @@ CAPTION = "1 sigma of the moduli with one more test, root mean square along each
 
 def write_plan(plan: Plan, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-    (folder / RESULT).unlink(missing_ok=True)
-    with replacing(folder / TABLE) as path:
-        plan.table().to_csv(path, index=False, float_format="%.6g", lineterminator="\n")
-    plot_plan(folder / FIGURE, *_shown(plan), WITHOUT)
-    write_notes(folder, plan.notes)
-    page = write_report(folder, _page(plan))
-    write_text(folder / RESULT, json.dumps(plan.result, indent=1) + "\n")
-    return page
+
+    def draw() -> None:
+        plot_plan(folder / FIGURE, *_shown(plan), WITHOUT)
+
+    return write_study(folder, {TABLE: plan.table()}, 6, draw, plan.notes, _page(plan), plan.result)
 
 
 def _shown(plan: Plan) -> tuple[list[str], dict[str, list[float]]]:
@@ -70,8 +64,7 @@ def _page(plan: Plan) -> Report:
         files=[
             (TABLE, "the tables"),
             (FIGURE, "picture of the chart"),
-            (NOTES, NOTES_ARE),
-            (RESULT, "all numbers of this page, for programs"),
+            *FILES,
         ],
     )
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..fits.store import RESULT
 from ..identification.bands import LEVEL
 from ..identification.likelihood import THRESHOLD
-from ..notes import NOTES, NOTES_ARE, write_notes
-from ..reports import Report, Section, Table, write_report
+from ..reports import Report, Section, Table
 from ..reports.likelihoods import ProfilePanel, plot_likelihoods
 from ..reports.profile_charts import profile_charts
-from ..writing import replacing, write_text
 from .profiled import METHOD
+from .study_folder import FILES, write_study
 
 if TYPE_CHECKING:
     from .profiled import Profile, Profiles
@@ -24,15 +21,13 @@ TABLE, FIGURE = "profile.csv", "profile.png"
 
 def write_profiles(found: Profiles, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-    (folder / RESULT).unlink(missing_ok=True)
-    with replacing(folder / TABLE) as path:
-        found.table().to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
-    panels = _panels(found)
-    plot_likelihoods(folder / FIGURE, panels, THRESHOLD)
-    write_notes(folder, found.notes)
-    page = write_report(folder, _page(found))
-    write_text(folder / RESULT, json.dumps(found.result, indent=1) + "\n")
-    return page
+
+    def draw() -> None:
+        plot_likelihoods(folder / FIGURE, _panels(found), THRESHOLD)
+
+    return write_study(
+        folder, {TABLE: found.table()}, 9, draw, found.notes, _page(found), found.result
+    )
 
 
 def _panels(found: Profiles) -> list[ProfilePanel]:
@@ -67,8 +62,7 @@ def _page(found: Profiles) -> Report:
         files=[
             (TABLE, "the curves"),
             (FIGURE, "picture of the profiles"),
-            (NOTES, NOTES_ARE),
-            (RESULT, "all numbers of this page, for programs"),
+            *FILES,
         ],
     )
 
