@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import bubblefit
 
 from .places import ROOT
+from .scripts import script
 
-SCRIPT = ROOT / "docs" / "make_api.py"
-
-
-def maker():
-    spec = importlib.util.spec_from_file_location("make_api", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+MAKER = script("docs/make_api.py")
 
 
 def test_pages_are_up_to_date() -> None:
     """Else: make docs."""
-    stale = [path.name for path, text in maker().pages().items() if path.read_text() != text]
+    stale = [path.name for path, text in MAKER.pages().items() if path.read_text() != text]
     assert not stale
 
 
@@ -31,7 +23,7 @@ def test_the_interface_is_on_them() -> None:
 
 
 def test_signatures_and_entries() -> None:
-    make = maker()
+    make = MAKER
 
     def fit(a: int, *rest: str, b: str = "x", **more: float) -> list[int]:
         """Fit.

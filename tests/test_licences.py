@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import tomllib
 from email.message import Message
 from pathlib import Path
@@ -11,15 +10,12 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from .places import ROOT
+from .scripts import script
 
 
 @pytest.fixture(scope="module")
 def licences() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("licences", ROOT / ".ci" / "licences.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script(".ci/licences.py")
 
 
 def installed(name: str, licence: str, *requires: str) -> SimpleNamespace:

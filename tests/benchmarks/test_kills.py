@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import random
-import sys
 import time
 from pathlib import Path
-from types import ModuleType
 
 from .. import needs
 from ..commands import _import_all
-from ..places import ROOT
-
-
-def script() -> ModuleType:
-    path = ROOT / "benchmarks" / "bench_kills.py"
-    spec = importlib.util.spec_from_file_location("bench_kills", path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+from ..scripts import script
 
 
 def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path: Path) -> None:
     needs.linux("processes and what they leave")
-    kills = script()
+    kills = script("benchmarks/bench_kills.py")
     _import_all()
     # The second is timed: the first may have had kernels to compile.
     for folder in ("first", "whole"):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,22 +13,13 @@ from bubblefit.solvers import registry
 
 from ..commands import in_process
 from ..cylinder_cases import Formula
-from ..places import EXAMPLES, ROOT
+from ..places import EXAMPLES
+from ..scripts import script
 
 EXAMPLE = EXAMPLES / "bend-valmex7318" / "project.toml"
 
 
-def script() -> ModuleType:
-    path = ROOT / "benchmarks" / "reproduction" / "bending.py"
-    spec = importlib.util.spec_from_file_location("reproduction_bending", path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-bending = script()
+bending = script("benchmarks/reproduction/bending.py")
 CARDS = ("uniaxial", "bubble 1", "bubble 2", "bubble 3", "bubble 4")
 CYLINDERS = tuple(
     bending.Cylinder(f"{diameter:g} mm, {1e3 * pressure:g} kPa", diameter, pressure)

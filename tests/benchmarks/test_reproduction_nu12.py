@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import pytest
 
-from ..places import ROOT
+from ..scripts import script
 
 
 def test_figure_4_2() -> None:
@@ -17,10 +15,7 @@ def test_figure_4_2() -> None:
     most 0.0070 off; with dead pressure, as the published profiles show Marc's to be, they are
     within 0.0005 (docs/how-to/studies.md). The published numbers carry three decimals.
     """
-    path = ROOT / "benchmarks" / "reproduction" / "nu12_figure_4_2.py"
-    spec = importlib.util.spec_from_file_location("nu12_figure_4_2", path)
-    figure = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(figure)
+    figure = script("benchmarks/reproduction/nu12_figure_4_2.py")
     ours = figure.ratios()
     most, slope = figure.compare(ours)
     assert most < 0.0075

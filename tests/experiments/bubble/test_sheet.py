@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,8 +27,8 @@ from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...places import ROOT
 from ...projects import small
+from ...scripts import script
 
 PRESSURES = (0.02, 0.09, 0.19)
 EDGE = Outline.circle(100.0)
@@ -62,17 +60,7 @@ def test_modes_and_a_measured_rim_of_an_ellipse():
         measured_sheet(sheet, Outline(200.0, 160.0, 30.0), fields)
 
 
-def uneven_test():
-    """benchmarks/uneven_test.py, which is no package."""
-    path = ROOT / "benchmarks" / "uneven_test.py"
-    spec = importlib.util.spec_from_file_location("uneven_test", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["uneven_test"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-UNEVEN = uneven_test()
+UNEVEN = script("benchmarks/uneven_test.py")
 
 
 def project(folder: Path, sheet: str, **what: float) -> Path:

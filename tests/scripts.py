@@ -1,0 +1,21 @@
+"""Scripts of the repository that are in no package, as modules: benchmarks, .ci, docs."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from types import ModuleType
+
+from .places import ROOT
+
+
+def script(place: str) -> ModuleType:
+    """The module of a file below the root, such as "benchmarks/bench_kills.py"."""
+    path = ROOT / place
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Where a dataclass looks for its names, and pickle for its functions.
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
