@@ -22,10 +22,10 @@ LENGTH, SEAM_WIDTH, SEAM_LAYERS = 3000.0, 40.0, 3
 DEFLECTION, FRAMES = 240.0, 60
 #: Equal increments of pressure on inflation.
 INFLATION = 10
-#: Sides around the tube over mm of an element. The collar lies on the few sides at the top of the
-#: tube, and how deep it dents them is most of what goes wrong with coarse ones: with sides of 25 mm
-#: the load of the first millimetres was 3 % off that of fine meshes, with half of that 1 %.
-AROUND = 0.5
+#: Sides around the tube over mm of an element. How deep the collar dents the round tube at first is
+#: what goes wrong with long ones, at its top and its sides alike (shorter ones at the top alone do
+#: not help): with sides of 25 mm the load of the first millimetres was 3 % off that of fine meshes.
+AROUND = 0.4
 #: Elements next to collar and supports: mm along the axis over mm elsewhere, and mm beyond the
 #: edge of the collar or to either side of a support in which they are that small. With half of it
 #: the collar's mouth, whose edge is round with 10 mm, took hold of the wall row by row: the load
@@ -54,7 +54,7 @@ def inflated_cylinder(
     ----------
     diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge.
     thickness : mm of one layer; the seam has three.
-    size : mm of an element; around the tube half of that, and along it a quarter next to collar and
+    size : mm of an element; around the tube 0.4 of that, and along it a quarter next to collar and
         supports.
     collar : `usual_collar` unless given.
     deflections : mm; 60 equal ones to 240 mm unless given, each an increment.

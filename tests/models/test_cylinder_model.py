@@ -142,8 +142,8 @@ def test_the_thesis_case(symmetry):
     seam = np.isin(np.arange(len(model.mesh.quads)), model.mesh.element_sets["seam"])
     np.testing.assert_array_equal(model.thickness, np.where(seam, 3 * 0.81, 0.81))
     volume = model.copies * enclosed_volume(model.mesh.points, model.mesh.quads)
-    assert len(model.mesh.node_sets["mid_span"]) == {4: 17, 1: 32}[model.copies]
-    # Thirty-two corners around, those at the seam closer together, and yet the circle's area.
+    assert len(model.mesh.node_sets["mid_span"]) == {4: 21, 1: 40}[model.copies]
+    # Forty corners around, those at the seam closer together, and yet the circle's area.
     assert volume == pytest.approx(np.pi * 75.0**2 * 3000, rel=1e-12)
     assert model.diameter == pytest.approx(150.0, rel=1e-12)
     moved = model.mesh.points * [1.1, 1.1, 1.0] + [0.0, 40.0, 0.0]
