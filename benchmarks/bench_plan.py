@@ -27,7 +27,7 @@ from bubblefit.identification.information import Asked, information_of, summary
 from bubblefit.identification.propagation import POINTS, PRIOR
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.present_tests import Present, present_tests, solver_maker
+from bubblefit.studies.present_tests import Present, present_tests
 from known_solution import known_project
 
 QUADS = 192  # of the whole disk
@@ -57,7 +57,7 @@ def case(
     project = replace(project, tests={test.name: known})
     setup = prepare_fit(project, [known])
     card = MaterialCard(HypoelasticLaw(beta, 0.24, np.array(RANGE)), 0.81, "known")
-    present, make = present_tests(setup, card), solver_maker(setup)
+    present, make = present_tests(setup, card), setup.make_leading
     offered = {}
     for name, kind in kinds().items():
         if hasattr(kind, "candidates"):

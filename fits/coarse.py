@@ -11,8 +11,7 @@ from ..experiments.base import PreparedTest, Weighting
 from ..experiments.refinable import Refinable
 from ..identification.comparison import Comparison
 from ..identification.problem import FitProblem
-from ..solvers.base import DifferentiatingSolver, Solver
-from .setup import SURROGATE, FitSetup
+from .setup import FitSetup
 from .start import StartRecord
 
 #: Edges of quads of the full mesh are those of the coarse one times it.
@@ -25,11 +24,7 @@ def coarse_problem(setup: FitSetup) -> FitProblem | None:
     Tests whose kind knows no coarser mesh, or whose mesh is coarse already, stay as they are; None
     where all do.
     """
-    leads = isinstance(setup.make_solver(), DifferentiatingSolver)
-
-    def make(name: str | None = None) -> Solver:
-        return setup.make_solver(name or (None if leads else SURROGATE))
-
+    make = setup.make_leading
     pairs = list(zip(setup.tests, setup.weightings, strict=True))
     coarse = [_coarse(test, make, weighting) for test, weighting in pairs]
     if not any(coarse):

@@ -92,6 +92,11 @@ class FitSetup:
         """A new solver as the project names it, or another by name, with the project's settings."""
         return make_solver(self.project, name)
 
+    def make_leading(self, name: str | None = None) -> Solver:
+        """As `make_solver` where that one gives derivatives, else what leads it."""
+        solver = self.make_solver(name)
+        return solver if isinstance(solver, DifferentiatingSolver) else self.make_solver(SURROGATE)
+
     def own(self, test: PreparedTest) -> tuple[Comparison, ...]:
         """The comparisons of one test with its own objective."""
         return test.comparisons(self.make_solver, Weighting())

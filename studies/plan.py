@@ -21,7 +21,7 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..notes import Note, NoteKind
 from .planned import NOW, WORST, Plan, Planned
-from .present_tests import Present, present_tests, solver_maker
+from .present_tests import Present, present_tests
 from .series import card_of, card_words, fitted_card, thickness_notes
 
 #: Told how many of how many analyses are done, and of what.
@@ -76,7 +76,7 @@ def plan(
     asked = Asked(present.problem.unknowns, present.law, present.point.unknowns,
                   _ends(project, material, present, strain))  # fmt: skip
     before = present.information
-    make = solver_maker(setup)
+    make = setup.make_leading
     offered = {
         name: kind.candidates(
             Planning(

@@ -8,18 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import SolverFailure
-from ..experiments.base import MakeSolver
 from ..experiments.candidates import Precision
 from ..experiments.notes import strains_of
-from ..fits.setup import SURROGATE, FitSetup
+from ..fits.setup import FitSetup
 from ..identification.given_law import evaluate_law, problem_at
 from ..identification.information import Array, information
 from ..identification.noise import Noise
 from ..identification.problem import Evaluation, FitProblem
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..solvers.base import Solver
-from ..solvers.registry import solver_named
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
     SolverFailure : they cannot be run with it.
     """
     law = _law(setup, card)
-    make = solver_maker(setup)
+    make = setup.make_leading
     comparisons = tuple(
         comparison
         for test, weighting in zip(setup.tests, setup.weightings, strict=True)
@@ -86,13 +83,3 @@ def _law(setup: FitSetup, card: MaterialCard) -> HypoelasticLaw:
     if card.law.form != setup.law.form:
         return card.law
     return replace(setup.law, beta=card.law.beta, nu12=card.law.nu12)
-
-
-def solver_maker(setup: FitSetup) -> MakeSolver:
-    """Makes solvers that differentiate: the project's, else what leads it."""
-
-    def make(name: str | None = None) -> Solver:
-        solver = setup.make_solver(name)
-        return solver_named(SURROGATE) if solver.external else solver
-
-    return make
