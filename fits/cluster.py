@@ -13,71 +13,22 @@ import time
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 from ..errors import BubblefitError, InputError
 from ..solvers.announcements import Announcement, announce, pass_on
+from ..solvers.scheduler import ANSWER_S, connected
 from . import cluster_worker
 from .cluster_worker import NotJoined
 from .workers import Task
 
 log = logging.getLogger(__name__)
-CONNECT_S = 5.0
-#: s between two looks at who is there, for an answer to that, and to an event.
-LOOK_S, ANSWER_S, WAIT_S = 1.0, 4.0, 0.5
+#: s between two looks at who is there, and to an event.
+LOOK_S, WAIT_S = 1.0, 0.5
 #: s for the result of a task that has ended to come here.
 FETCH_S = 30.0
 #: Workers that may die of a task before it is given up.
 DEATHS = 3
-#: Of Dask; some have a level of their own.
-LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
-EXTRA = "Dask is not installed; pip install 'bubblefit[cluster]'"
-
-
-def check(address: str) -> None:
-    """That a scheduler answers; raises InputError."""
-    with connected(address):
-        pass
-
-
-@contextmanager
-def connected(address: str) -> Iterator[Any]:
-    """A client of the scheduler.
-
-    Raises
-    ------
-    InputError : nobody answers there, or Dask is not installed.
-    """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(None, "--scheduler", EXTRA) from None
-    with _silence():
-        try:
-            client = Client(address, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
-            problem = f"no Dask scheduler answers at {address} ({error or type(error).__name__})"
-            advice = "start one (dask scheduler), or give the address that it prints"
-            raise InputError(None, "--scheduler", f"{problem}; {advice}") from None
-        try:
-            yield client
-        finally:
-            client.close(timeout=ANSWER_S)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Dask logs every lost connection, with tracebacks; all of it is said in our words."""
-    loggers = [logging.getLogger(name) for name in LOGGERS]
-    before = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, before, strict=True):
-            logger.setLevel(level)
 
 
 def run_tasks(

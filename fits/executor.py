@@ -46,7 +46,7 @@ class Executor:
         InputError : no scheduler answers, or Dask is not installed.
         """
         if self.scheduler is not None:
-            from .cluster import check
+            from ..solvers.scheduler import check
 
             check(self.scheduler)
 

@@ -13,9 +13,10 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import BubblefitError, InputError
+from .scheduler import CONNECT_S, dask
 
-#: s, for the scheduler to answer; and between two words that it is waited for.
-CONNECT_S, LOOK_S = 5.0, 1.0
+#: s between two words that it is waited for.
+LOOK_S = 1.0
 _clients: dict[tuple[str, int], Any] = {}
 
 
@@ -33,10 +34,8 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
     BubblefitError : the scheduler does not answer.
     """
     place = _place(address)
-    from distributed import Semaphore
-
     try:
-        semaphore = Semaphore(count, f"bubblefit licences of {name}", *place())
+        semaphore = dask().Semaphore(count, f"bubblefit licences of {name}", *place())
         semaphore.register()
         while not semaphore.acquire(LOOK_S):
             waiting()
@@ -61,15 +60,11 @@ def _place(address: str) -> Callable[[], tuple[Any, Any]]:
 
     The client raises OSError where nobody answers.
     """
-    try:
-        from distributed import Client, get_worker
-    except ImportError:
-        problem = "Dask is not installed; pip install 'bubblefit[cluster]'"
-        raise InputError(None, "--scheduler", problem) from None
+    distributed = dask()
 
     def place() -> tuple[Any, Any]:
         try:
-            worker = get_worker()
+            worker = distributed.get_worker()
             return worker.scheduler, worker.loop
         except ValueError:
             pass
@@ -77,7 +72,8 @@ def _place(address: str) -> Callable[[], tuple[Any, Any]]:
         key = address, os.getpid()
         client = _clients.get(key)
         if client is None or client.status != "running":
-            client = _clients[key] = Client(address, timeout=CONNECT_S, set_as_default=False)
+            client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+            _clients[key] = client
         return client.scheduler, client.loop
 
     return place

@@ -18,12 +18,13 @@ import bubblefit as bf
 import cloudpickle
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.fits import cluster, cluster_worker
+from bubblefit.fits import cluster_worker
 from bubblefit.fits.executor import Executor
 from bubblefit.fits.start import StartRecord
 from bubblefit.solvers import licence_leases, licences
 from bubblefit.solvers.announcements import Announcement, announce, hearing
 from bubblefit.solvers.process import run_process
+from bubblefit.solvers.scheduler import check
 
 from .. import counted_program, needs
 from ..commands import in_process
@@ -323,7 +324,7 @@ def test_without_a_scheduler_the_command_ends_at_once(
 
 def test_without_dask_the_extra_is_named(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    said = complaint(cluster.check, NOBODY)
+    said = complaint(check, NOBODY)
     assert said == "--scheduler: Dask is not installed; pip install 'bubblefit[cluster]'"
 
 
