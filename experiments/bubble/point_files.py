@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import re
 import string
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...data.fields import QUANTITIES as FIELD
@@ -28,7 +28,8 @@ class PointFiles:
     """Measured displacements: files in the order of the pressures, and how they are read.
 
     recorded : which of their frames are taken, and at which pressures; None where the pressures are
-    the project's own, one a frame.
+    the project's own, one a frame. correlation : how they were measured, in words, by the keys of
+    [bubble.data.points.correlation].
     """
 
     files: tuple[Path, ...]
@@ -36,6 +37,7 @@ class PointFiles:
     format: str | None = None
     registration: RegistrationOptions | None = None
     recorded: RecordedFrames | None = None
+    correlation: Mapping[str, str] = field(default_factory=dict)
 
 
 def measured_files(
@@ -96,6 +98,7 @@ def _points(points: PointsSection, place: Place) -> PointFiles:
         options,
         named_format(place, "data.points.format", "frame", points.format),
         registration_options(points.registration, place, LENGTH_UNITS[unit]),
+        correlation=points.correlation.model_dump(exclude_none=True),
     )
 
 
@@ -135,12 +138,12 @@ def _named(pattern: str, index: int) -> str:
     ValueError : braces that hold something else, a width of more than two digits.
     """
     name = ""
-    for text, field, spec, conversion in string.Formatter().parse(pattern):
+    for text, inside, spec, conversion in string.Formatter().parse(pattern):
         name += text
-        if field is None:
+        if inside is None:
             continue
-        if field != "index" or conversion or not re.fullmatch(r"\d{0,2}d?", spec or ""):
-            raise ValueError(field)
+        if inside != "index" or conversion or not re.fullmatch(r"\d{0,2}d?", spec or ""):
+            raise ValueError(inside)
         name += format(index, spec or "")
     return name
 

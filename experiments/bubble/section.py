@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
 from ...sections import LengthUnit, Number, Positive, Section
+from .correlation_section import CorrelationSection
 from .filter_section import FilterSection
 from .outline_section import EllipseSection
 from .pressure_section import PressureSection
@@ -59,6 +60,7 @@ class PointsSection(Section):
     pressure: PressureSection | None = None
     registration: RegistrationSection | None = None
     filter: FilterSection | None = None
+    correlation: CorrelationSection = CorrelationSection()
 
 
 class DataSection(Section):

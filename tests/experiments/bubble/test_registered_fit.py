@@ -22,6 +22,7 @@ SHIFT = np.array([3.0, -4.0, 600.0])
 #: kPa.
 SHOWN = [22, 59, 97, 132, 186, 251, 300]
 LAST = 'length_unit = "mm"\n'
+CAMERA = '[bubble.data.points.correlation]\ncamera = "two of 5 <MP>"\n'
 LOG = "[bubble.data.points.pressure.log]\nfile = 'valve.csv'\nrate = 0.5\noffset = 5\n"
 REGISTRATION = "[bubble.data.points.registration]\n"
 
@@ -34,7 +35,7 @@ def seen(tmp_path_factory):
     log = np.column_stack([5.0 + 2.0 * np.arange(len(SHOWN)), SHOWN])
     np.savetxt(folder / "valve.csv", log, "%g", ",", header="time (s),p (kPa)", comments="")
     text = re.sub("files = .*", 'files = ["frame_*.csv"]', text)
-    return folder, text.replace(LAST, LAST + LOG + REGISTRATION), known
+    return folder, text.replace(LAST, LAST + LOG + CAMERA + REGISTRATION), known
 
 
 def project_of(seen, name: str, more: str = ""):
@@ -61,8 +62,9 @@ def test_moduli_are_those_of_the_right_frame(seen):
     np.testing.assert_allclose(said["origin_mm"], SHIFT, atol=0.02)
     page = (folder / "out" / "report.html").read_text()
     assert "registration.png" in page and "found by symmetry" in page
-    # What the camera was nobody said; what was made of its frames is known.
+    # What the lens was nobody said; what was made of the frames is known.
     record = page[page.index("Image correlation: ") : page.index("Files of the folder")]
+    assert '<td>camera</td><td class="text">two of 5 &lt;MP&gt;</td>' in record
     assert '<td>lens and aperture</td><td class="text">not given</td>' in record
     assert '<td>coordinates</td><td class="text">registered on the rim</td>' in record
     assert f'<td>images evaluated</td><td class="text">{len(SHOWN)}</td>' in record
