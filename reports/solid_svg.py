@@ -13,7 +13,7 @@ from .shades import COLOURS, classes, ends
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT, MARGIN = 570.0, 360.0, 16.0
+WIDTH, HEIGHT, MARGIN = 570.0, 430.0, 12.0
 #: Of the width, for the colour bar and its numbers; the surface stands in the rest.
 BAR = 112.0
 #: From where it is seen at first, degrees: turned about z, and raised over the horizon.
@@ -55,7 +55,7 @@ def scale_of(points: Array) -> float:
     """Of the picture, so that it fits however it is turned."""
     flat = points.reshape(-1, 3)
     radius = float(np.linalg.norm(flat - middle_of(points), axis=1).max()) or 1.0
-    return (HEIGHT / 2 - MARGIN) * 1.3 / radius
+    return (min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / radius
 
 
 def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:

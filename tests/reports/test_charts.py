@@ -172,9 +172,12 @@ def test_numbers_of_a_colour_bar_have_room() -> None:
     assert maps_drawn.RIGHT - 8 >= need and BAR - 8 >= need
 
 
-def test_a_surface_stands_clear_of_its_colour_bar() -> None:
-    """However it is turned about its axis."""
+def test_a_surface_is_whole_and_clear_of_its_colour_bar() -> None:
+    """However it is turned, from straight above, too."""
     turn = np.linspace(0, 2 * np.pi, 25)
     rim = np.column_stack([100 * np.cos(turn), 100 * np.sin(turn), 0 * turn])[None]
     assert CENTRE[0] + scale_of(rim) * 100 <= solids_drawn.WIDTH - BAR
     assert CENTRE[0] >= scale_of(rim) * 100
+    assert CENTRE[1] >= scale_of(rim) * 100
+    # And as large as that allows.
+    assert scale_of(rim) * 100 > 0.9 * min(CENTRE)
