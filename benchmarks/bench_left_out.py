@@ -21,70 +21,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
+import valmex_tests
 from bubblefit.experiments.base import PreparedTest, Weighting
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup, prepare_fit
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.studies.folds import best_of
 from bubblefit.studies.held_out import held_out
+from valmex_tests import DATA, FABRIC, FEW, FIT, bubble
 
-HERE = Path(__file__).resolve().parent.parent
-DATA = HERE.parent / "shared" / "data" / "bubble"
-FEW = (0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 19)
 STRAIN = 0.06
 PUBLISHED = 1.86
 
-HEAD = """\
-[fabric]
-name = "VALMEX 7318"
-thickness = 0.81
-thickness_change = "incompressible"
-
-[units]
-modulus = "GPa"
-pressure = "bar"
-
-[law]
-form = "{form}"
-strain_range = {ends}
-
-[law.bounds]
-E1 = [0.01, 3.0]
-E2 = [0.01, 2.0]
-G12 = [0.0005, 0.2]
-"""
-TEST = """
-[[bubble]]
-name = "test {test}"
-radius = 100.0
-pressures = {pressures}
-elements = {elements}
-symmetry = "full"
-objective = "mm"
-
-[bubble.sheet]
-modes = {modes}
-
-[bubble.data.points]
-pattern = "grid/test{test}_{{index:02d}}.csv"
-indices = {frames}
-flag_column = "flag"
-"""
-STRIPS = """
-[[strips]]
-name = "strips"
-width = 25.0
-grip_distance = 75.0
-increments = 25
-
-[strips.data]
-polynomials = "{curves}"
-"""
 #: Logarithmic strains (warp, fill, shear) that bubbles, and strips, reach.
 ENDS, ENDS_OF_STRIPS = [0.13, 0.13, 0.13], [0.18, 0.232, 0.883]
-CURVES = HERE / "examples" / "joint-valmex7318" / "curves.csv"
-FIT = "\n[fit]\nstarts = 1\nseed = 1\njobs = 1\nmax_analyses = 80\n"
 
 
 class InMillimetres(FitSetup):
@@ -99,17 +49,16 @@ def project(
     data: Path, form: str, modes: int, elements: int, frames: Sequence[int], strips: bool
 ) -> Project:
     """The three tests, perhaps with the strips."""
-    table = pd.read_csv(data / "grid_pressures.csv")
-    pressures = [float(table["p_bar"][k]) for k in frames]
-    said = {"pressures": pressures, "elements": elements, "modes": modes, "frames": list(frames)}
-    tests = "".join(TEST.format(test=test, **said) for test in (1, 2, 3))
+    names = {f"test {test}": test for test in (1, 2, 3)}
+    tests = "".join(
+        bubble(name, test, data, frames, elements, modes) for name, test in names.items()
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
-        ends = ENDS_OF_STRIPS if strips else ENDS
-        also = STRIPS.format(curves=CURVES) if strips else ""
-        path.write_text(HEAD.format(form=form, ends=ends) + tests + also + FIT)
-        bubbles = [f"test {test}" for test in (1, 2, 3)]
-        return read_project(path, data=dict.fromkeys(bubbles, data))
+        law = f'form = "{form}"\nstrain_range = {ENDS_OF_STRIPS if strips else ENDS}\n'
+        also = valmex_tests.strips(25) if strips else ""
+        path.write_text(FABRIC + law + tests + also + FIT.format(starts=1))
+        return read_project(path, data=dict.fromkeys(names, data))
 
 
 def law_of_others(

@@ -16,86 +16,31 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import valmex_tests
 from bubblefit.experiments.bubble.sheet_report import fitted_model
 from bubblefit.fits.fit import fit
 from bubblefit.fits.project import read_project
 from bubblefit.fits.result import Fit
 from bubblefit.meshes.location import sampling_matrix
+from valmex_tests import DATA, FABRIC, FEW, FIT, bubble
 
-HERE = Path(__file__).resolve().parent.parent
-DATA = HERE.parent / "shared" / "data" / "bubble"
-CURVES = HERE / "examples" / "joint-valmex7318" / "curves.csv"
-FRAMES = (0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 19)
 STRAIN = 0.06
 
-PROJECT = """\
-[fabric]
-name = "VALMEX 7318"
-thickness = 0.81
-thickness_change = "incompressible"
-
-[units]
-modulus = "GPa"
-pressure = "bar"
-
-[law]
-{law}
-
-[law.bounds]
-E1 = [0.01, 3.0]
-E2 = [0.01, 2.0]
-G12 = [0.0005, 0.2]
-
-[[bubble]]
-name = "bubble"
-radius = 100.0
-pressures = {pressures}
-elements = {elements}
-objective = "mm"
-
-[bubble.sheet]
-modes = {modes}
-
-[bubble.data.points]
-pattern = "grid/test{test}_{{index:02d}}.csv"
-indices = {frames}
-flag_column = "flag"
-{strips}
-[fit]
-starts = {starts}
-seed = 1
-jobs = 1
-max_analyses = 80
-"""
 ALONE = 'form = "quadratic"\nstrain_range = [0.13, 0.13, 0.13]'
 JOINT = """\
 form = "spline"
 strain_range = [0.18, 0.232, 0.883]
 knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0.232],\
  shear = [0.0, 0.1, 0.3, 0.6, 0.883] }"""
-STRIPS = f"""
-[[strips]]
-width = 25.0
-grip_distance = 75.0
-
-[strips.data]
-polynomials = "{CURVES}"
-"""
 
 
 def fitted(test: int, data: Path, elements: int, modes: int, starts: int, strips: bool) -> Fit:
     """The fit of one test."""
-    table = pd.read_csv(data / "grid_pressures.csv")
-    text = PROJECT.format(
-        law=JOINT if strips else ALONE,
-        pressures=[float(table["p_bar"][k]) for k in FRAMES],
-        frames=list(FRAMES),
-        elements=elements,
-        modes=modes,
-        starts=starts,
-        test=test,
-        strips=STRIPS if strips else "",
+    law = JOINT if strips else ALONE
+    own = bubble("bubble", test, data, FEW, elements, modes) + (
+        valmex_tests.strips() if strips else ""
     )
+    text = f"{FABRIC}{law}\n{own}{FIT.format(starts=starts)}"
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         path.write_text(text)
