@@ -111,6 +111,20 @@ def test_a_shorter_span_is_stiffer(quarter) -> None:
     assert bend(model).load[-1] > 1.3 * quarter[1].load[-1]
 
 
+def test_the_first_millimetres_hardly_hang_on_the_mesh() -> None:
+    """A short tube of 200 mm with elements of 25 mm beside one of 12 mm.
+
+    140.5 and 220.1 N at 6 and 9 mm are those of 12 mm (6,464 quads; a minute). Here they are 0.9
+    and 0.7 % less; with sides of 25 mm around the tube they would be 5.5 and 4.1 % less.
+    """
+    model = inflated_cylinder(
+        200.0, 0.1, 0.81, 25.0, 900.0, supports=RigidSupports(600.0), deflections=[6.0, 9.0]
+    )  # fmt: skip
+    model = replace(model, increments=[3.0, 6.0, 9.0])
+    history = bend(model, HypoelasticLaw.linear(600.0, 300.0, 30.0))
+    assert history.load[1:] == pytest.approx([140.5, 220.1], rel=0.012)
+
+
 def test_derivatives_are_refused(quarter) -> None:
     with pytest.raises(InputError, match="takes no parameters"):
         MembraneSolver().run_with_sensitivity(quarter[0], LAW)
@@ -174,7 +188,7 @@ def test_the_inflated_frame_is_the_closed_form_away_from_caps(law: HypoelasticLa
     """No seam; radius and strains in the middle of a short cylinder, finer and finer."""
     strain = capped_strain(law, PRESSURE, 75.0, 0.81)
     errors = []
-    for size in (30.0, 15.0):
+    for size in (50.0, 25.0):
         model = inflated_cylinder(
             150.0, PRESSURE, 0.81, size, length=900.0, seam_width=0.0,
             supports=RigidSupports(500.0), collar=Collar(240.0, 60.0), deflections=[0.5],
