@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import valmex_tests
-from bubblefit.experiments.base import PreparedTest, Weighting
+from bubblefit.experiments.fittable import PreparedTest, Weighting
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup, prepare_fit
 from bubblefit.materials.law import HypoelasticLaw

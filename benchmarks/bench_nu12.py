@@ -16,11 +16,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from bubblefit.experiments.base import PreparedTest
 from bubblefit.experiments.biaxial.candidates import candidates as biaxial_candidates
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.candidates import Planning
+from bubblefit.experiments.fittable import PreparedTest
 from bubblefit.experiments.strips.candidates import candidates
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.fits.schema import UnknownSection, UnknownsSection

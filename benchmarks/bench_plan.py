@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import MakeSolver, Weighting
+from bubblefit.experiments.base import MakeSolver
 from bubblefit.experiments.bubble.sources import KnownSolution
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.experiments.candidates import Candidate, Planning
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.experiments.registry import kinds
 from bubblefit.fits.project import Project
 from bubblefit.fits.setup import prepare_fit

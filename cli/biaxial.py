@@ -58,10 +58,10 @@ def command(
     """
     from .. import __version__
     from ..data.biaxial.ratios import plain_ratio
-    from ..experiments.base import Output
     from ..experiments.biaxial.evaluated import lines_of, numbers_of, write_tables
     from ..experiments.biaxial.evaluation import evaluate_test
     from ..experiments.biaxial.test import BiaxialTest
+    from ..experiments.exhibit import Output
     from ..fits.project import read_project
     from ..fits.store import Store
     from ..materials.designers.linear import Minimise, Options

@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.base import FittableTest
+from bubblefit.experiments.fittable import FittableTest
 from bubblefit.fits.law import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from PIL import Image

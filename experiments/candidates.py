@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import MakeSolver, Place, PreparedTest
+from .base import MakeSolver, Place
+from .fittable import PreparedTest
 
 if TYPE_CHECKING:
     from ..materials.law import HypoelasticLaw

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
-from .base import Masks
+from .fittable import Masks
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..materials.card import MaterialCard, thickness_difference
 from ..notes import Note, NoteKind, as_note
 from ..solvers.base import History, instability
-from .base import RunRecord
+from .predicted import RunRecord
 
 Array = NDArray[np.float64]
 

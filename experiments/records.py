@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import SolverFailure
 from ..notes import as_note
 from ..solvers.base import History
-from .base import Predicted, RunRecord
+from .predicted import Predicted, RunRecord
 
 
 def record_of(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from .base import MakeSolver, Weighting
+from .base import MakeSolver
+from .fittable import Weighting
 
 if TYPE_CHECKING:
     from ..identification.comparison import Comparison

@@ -14,7 +14,7 @@ from ..materials.certainty import positive
 if TYPE_CHECKING:
     from ..materials.card import MaterialCard
     from ..materials.law import HypoelasticLaw
-    from .base import RunRecord
+    from .predicted import RunRecord
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from .. import __version__
-from ..experiments.base import Exhibit, FittableTest, Output
 from ..experiments.doubts import Judgement
+from ..experiments.exhibit import Exhibit, Output
+from ..experiments.fittable import FittableTest
 from ..reports import Report, Section, Table, write_report
 from ..writing import write_text
 from .doubts import judge

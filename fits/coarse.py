@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..errors import InputError
-from ..experiments.base import PreparedTest, Weighting
+from ..experiments.fittable import PreparedTest, Weighting
 from ..experiments.refinable import Refinable
 from ..identification.comparison import Comparison
 from ..identification.problem import FitProblem

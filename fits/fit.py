@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import NoFeasibleStart, SolverFailure
-from ..experiments.base import FittableTest
+from ..experiments.fittable import FittableTest
 from ..identification.problem import FitProblem
 from .best import BestFit, best_fit
 from .budget import with_certainty

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..experiments.base import RunRecord
+from ..experiments.predicted import RunRecord
 from .start import EvaluationRecord, StartRecord
 
 log = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiments.base import Exhibit
+from ..experiments.exhibit import Exhibit
 from ..identification.bands import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..experiments.base import Exhibit, Output
+from ..experiments.exhibit import Exhibit, Output
 from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
 from ..reports import Report, Section, Table, percent, write_report
 from ..writing import replacing

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..experiments.base import Predicted, PredictedOutcome, PredictedRun, band_of
+from ..experiments.predicted import Predicted, PredictedOutcome, PredictedRun, band_of
 from ..experiments.registry import kind_named
 from ..notes import Note, as_note, marks
 from ..notes import lines as note_lines

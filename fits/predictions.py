@@ -11,8 +11,9 @@ from typing import Any
 
 from ..content import digest_of
 from ..errors import InputError, SolverFailure
-from ..experiments.base import Predicted, PredictedRun, RunRecord, Test
+from ..experiments.base import Test
 from ..experiments.notes import notes_of_record, other_thickness
+from ..experiments.predicted import Predicted, PredictedRun, RunRecord
 from ..experiments.records import record_of
 from ..experiments.registry import kind_named
 from ..experiments.spread import laws_around

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import InputError
-from ..experiments.base import Findings, FittedTest, Output, PreparedTest
 from ..experiments.doubts import Judgement
+from ..experiments.exhibit import Output
+from ..experiments.fittable import Findings, FittedTest, PreparedTest
 from ..identification.chi_square import NoiseTest, noise_tests
 from ..identification.noise import Misfit, misfits
 from ..identification.posterior import Posterior

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..experiments.base import RunRecord
+from ..experiments.predicted import RunRecord
 from ..notes import Note, NoteKind
 from ..writing import replacing
 from .store import Store

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from ..content import digest_of
 from ..errors import InputError
-from ..experiments.base import FittableTest, Masks, PreparedTest, Weighting
+from ..experiments.fittable import FittableTest, Masks, PreparedTest, Weighting
 from ..identification.comparison import Comparison
 from ..identification.methods import FitOptions
 from ..identification.problem import FitProblem

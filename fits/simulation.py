@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SolverFailure
-from ..experiments.base import CardRun, Output, Simulation, Test
+from ..experiments.base import CardRun, Simulation, Test
+from ..experiments.exhibit import Output
 from ..experiments.notes import notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..materials.card import MaterialCard

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import NoFeasibleStart
-from ..experiments.base import Masks
+from ..experiments.fittable import Masks
 from ..fits.law import law_of
 from ..fits.setup import FitSetup
 from ..identification.feasibility import feasible_start

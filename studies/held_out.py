@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..experiments.base import FittedTest, MakeSolver, Masks, PreparedTest, Weighting
+from ..experiments.base import MakeSolver
+from ..experiments.fittable import FittedTest, Masks, PreparedTest, Weighting
 from ..experiments.notes import beyond, strains_of, unstable_words
 from ..fits.best import LEAST_STRAIN
 from ..identification.blocks import Blocks

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import SolverFailure
-from ..experiments.base import CardRun, Output, Shown
+from ..experiments.base import CardRun
+from ..experiments.exhibit import Output, Shown
 from ..experiments.registry import kind_named
 from ..fits.store import RESULT, Store
 from ..notes import NOTES, NOTES_ARE, write_notes
@@ -25,7 +26,7 @@ from ..writing import replacing
 from .law_words import conclusion, noise, table_of
 
 if TYPE_CHECKING:
-    from ..experiments.base import PreparedTest
+    from ..experiments.fittable import PreparedTest
     from .laws import LawComparison
 
 COMPARISON = "comparison.csv"

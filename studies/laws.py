@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..experiments.base import FittableTest
+from ..experiments.fittable import FittableTest
 from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..experiments.base import Masks, PreparedTest
 from ..experiments.divisible import Divisible
+from ..experiments.fittable import Masks, PreparedTest
 from ..experiments.notes import strains_of
 from ..fits.best import LEAST_STRAIN
 from ..fits.result import Fit

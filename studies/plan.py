@@ -10,8 +10,9 @@ from typing import cast
 import numpy as np
 
 from ..errors import InputError, SolverFailure
-from ..experiments.base import FittableTest, MakeSolver, Place, PreparedTest, Weighting
+from ..experiments.base import MakeSolver, Place
 from ..experiments.candidates import Candidate, Plannable, Planning
+from ..experiments.fittable import FittableTest, PreparedTest, Weighting
 from ..experiments.notes import beyond, strains_of, unstable_words
 from ..experiments.registry import kinds
 from ..fits.project import Project

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
-from ..experiments.base import FittableTest
+from ..experiments.fittable import FittableTest
 from ..fits.best import BestFit, best_fit
 from ..fits.budget import with_certainty
 from ..fits.project import Project

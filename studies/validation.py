@@ -8,7 +8,7 @@ from typing import cast
 
 from .. import __version__
 from ..errors import InputError
-from ..experiments.base import FittableTest, PreparedTest
+from ..experiments.fittable import FittableTest, PreparedTest
 from ..fits.fit import Event
 from ..fits.project import Project
 from ..fits.result import Fit

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.base import CardRun, Output, Simulation, Studied
+from bubblefit.experiments.base import CardRun, Simulation, Studied
+from bubblefit.experiments.exhibit import Output
 from bubblefit.fits.schema import FitSection
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip import strip_mesh

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import RunRecord
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
+from bubblefit.experiments.predicted import RunRecord
 from bubblefit.fits.predictions import run_card
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bubblefit.data.name_numbers import number_in_name
 from bubblefit.errors import InputError
-from bubblefit.experiments.base import Output
+from bubblefit.experiments.exhibit import Output
 from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.reports.charts import Chart, Charts, Series

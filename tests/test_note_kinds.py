@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 import pytest
 from bubblefit.cli.fit_words import lines_of
-from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder import page as cylinders
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.fits import page as fit_page
 from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import predict

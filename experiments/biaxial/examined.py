@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...reports import BiaxialPanel, Table, plot_biaxial
-from ..base import Exhibit, Output
+from ..exhibit import Exhibit, Output
 from .objective import PERCENT
 from .test import BiaxialTest
 

@@ -8,7 +8,7 @@ from ...materials.law import HypoelasticLaw
 from ...reports import BiaxialPanel, plot_biaxial
 from ...reports.biaxial_charts import biaxial_charts
 from ...writing import replacing
-from ..base import Exhibit, Output
+from ..exhibit import Exhibit, Output
 from .objective import PERCENT
 from .prepared import FittedPath
 from .tables import misfit_table, path_table

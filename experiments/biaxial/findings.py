@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...notes import Note, NoteKind
-from ..base import Findings
+from ..fittable import Findings
 from .prepared import FittedPath
 from .test import BiaxialTest
 

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from pydantic import BaseModel
 
 from ...materials.card import MaterialCard
-from ..base import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..base import CardRun, Place, Simulation, Studied
 from ..candidates import Candidate, Planning
+from ..exhibit import Output
+from ..predicted import Predicted
 from .section import BiaxialSection
 from .test import BiaxialTest, read
 

@@ -12,9 +12,11 @@ from ...data.biaxial.paths import BiaxialPath
 from ...identification.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...solvers.base import History
-from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from ..base import MakeSolver, Reach
 from ..data_files import DataFile
 from ..doubts import Doubt, Expected
+from ..exhibit import Exhibit, Output
+from ..fittable import Findings, FittedTest, Masks, Weighting
 from .doubts import doubts_of_biaxial
 from .objective import StrainObjective
 from .test import BiaxialTest, reach_of

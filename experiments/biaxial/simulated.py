@@ -16,7 +16,8 @@ from ...materials.card import MaterialCard
 from ...models.patch import elongations
 from ...reports import BiaxialPanel, plot_biaxial
 from ...writing import replacing
-from ..base import CardRun, Output, Simulation
+from ..base import CardRun, Simulation
+from ..exhibit import Output
 from ..notes import STRAINS, strains_of
 from .objective import PERCENT
 from .test import BiaxialTest

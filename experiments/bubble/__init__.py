@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...materials.card import MaterialCard
-from ..base import CardRun, Output, Place, Simulation, Studied
+from ..base import CardRun, Place, Simulation, Studied
 from ..candidates import Candidate, Planning
+from ..exhibit import Output
 from .doubts.names import NAMES
 from .section import BubbleSection
 from .test import BubbleTest, read

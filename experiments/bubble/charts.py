@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...reports import Chart, Charts, Series, dots, line
 from ...reports.cuts import node_cut, point_cut
-from ..base import FittedTest
+from ..fittable import FittedTest
 from .findings import objective_of
 from .objective import displacement_offset
 

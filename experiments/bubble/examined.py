@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...reports import Table, plot_rises
-from ..base import Exhibit, Output, Shown
+from ..exhibit import Exhibit, Output, Shown
 from .registration import registration_picture, registration_table
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ...reports import plot_heights, plot_profiles
 from ...reports.content import Part
-from ..base import Exhibit, Findings, FittedTest, Output, Shown
+from ..exhibit import Exhibit, Output, Shown
+from ..fittable import Findings, FittedTest
 from .charts import profile_charts, residual_chart
 from .correlation_record import correlation_table
 from .findings import objective_of, recorded_of

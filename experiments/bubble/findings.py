@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ...identification.assessment import moduli_error
 from ...materials.forms.base import COMPONENTS
 from ...notes import Note, NoteKind
-from ..base import Findings, FittedTest
+from ..fittable import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
 from .point_files import PointFiles
 from .recorded import RecordedFrames

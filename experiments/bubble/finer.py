@@ -14,7 +14,8 @@ from ...identification.comparison import Comparison
 from ...meshes.facet_reading import FacetReading
 from ...meshes.mesh import Mesh
 from ...meshes.smooth_reading import SmoothReading
-from ..base import MakeSolver, Weighting
+from ..base import MakeSolver
+from ..fittable import Weighting
 from .objective import FieldObjective, FieldTarget
 from .places import reading_of
 from .prepared import PreparedBubble

@@ -13,7 +13,8 @@ from ...models.bubble import BubbleModel
 from ...reports import plot_profiles
 from ...solvers.base import History
 from ...writing import replacing
-from ..base import CardRun, Output, Simulation, Studied
+from ..base import CardRun, Simulation, Studied
+from ..exhibit import Output
 from ..notes import STRAINS, strains_of
 from .inflated import write_series
 from .sheet_section import Sheet

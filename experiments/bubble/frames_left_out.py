@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..base import Masks
+from ..fittable import Masks
 from .objective import FieldTarget
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...reports import Maps, maps_of
-from ..base import FittedTest
+from ..fittable import FittedTest
 from .charts import kilo, source
 from .findings import objective_of
 

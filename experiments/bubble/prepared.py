@@ -16,9 +16,11 @@ from ...errors import InputError
 from ...identification.comparison import Comparison, Nuisance
 from ...materials.law import HypoelasticLaw
 from ...models.bubble import BubbleModel
-from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from ..base import MakeSolver, Reach
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
+from ..exhibit import Exhibit, Output
+from ..fittable import Findings, FittedTest, Masks, Weighting
 from .doubts import View, doubts_of
 from .findings import findings_of
 from .objective import OFFSETS, FieldObjective, FieldTarget

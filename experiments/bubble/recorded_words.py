@@ -8,7 +8,7 @@ import numpy as np
 
 from ...data.clock_offset import ClockOffset
 from ...reports import Table, plot_clock
-from ..base import Output, Shown
+from ..exhibit import Output, Shown
 from .recorded import RecordedFrames
 
 PICTURE = "clock.png"

@@ -11,7 +11,7 @@ from ...data.fields import DisplacementField
 from ...data.outline import Outline
 from ...data.registration.register import Registration
 from ...reports import Table, plot_registration
-from ..base import Output, Shown
+from ..exhibit import Output, Shown
 
 PICTURE = "registration.png"
 

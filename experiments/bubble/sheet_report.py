@@ -12,7 +12,8 @@ from ...models.bubble import BubbleModel
 from ...notes import Note, NoteKind
 from ...reports import plot_disk
 from ...writing import replacing
-from ..base import FittedTest, Output, Shown
+from ..exhibit import Output, Shown
+from ..fittable import FittedTest
 from .objective import FieldObjective
 from .sheet_section import DIRECTIONS
 

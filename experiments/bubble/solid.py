@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...reports import Shade, Solid, pack
 from ...reports.maps import Shades
-from ..base import FittedTest
+from ..fittable import FittedTest
 from .charts import kilo
 from .inflated import inflated_sheets
 from .sheet_report import fitted_model

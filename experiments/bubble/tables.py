@@ -11,7 +11,8 @@ from ...data.surfaces import write_surfaces
 from ...identification.blocks import Blocks
 from ...reports import Table
 from ...writing import replacing
-from ..base import FittedTest, Output, Shown
+from ..exhibit import Output, Shown
+from ..fittable import FittedTest
 from .findings import objective_of
 
 if TYPE_CHECKING:

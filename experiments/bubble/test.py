@@ -15,7 +15,8 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.elliptic_disk import elliptic_disk_mesh
 from ...meshes.facet_reading import Facet
 from ...models.bubble import BubbleModel, default_increments
-from ..base import MakeSolver, Place, PreparedTest, Reach, Refined
+from ..base import MakeSolver, Place, Reach, Refined
+from ..fittable import PreparedTest
 from .filter_section import facet_of
 from .increments import merge_increments
 from .outline_section import outline_of

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...materials.card import MaterialCard
-from ..base import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..base import CardRun, Place, Simulation, Studied
+from ..exhibit import Output
+from ..predicted import Predicted
 from .section import CylinderSection
 from .test import CylinderTest, read
 

@@ -20,7 +20,7 @@ from ...reports import (
     plot_gas,
 )
 from ...reports.bending_charts import bending_charts
-from ..base import Output, Shown
+from ..exhibit import Output, Shown
 from .beam import draw_beam, write_beam
 from .test import CylinderTest
 

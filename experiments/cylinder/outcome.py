@@ -12,7 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...solvers.base import BandEnd
-from ..base import Exhibit, Output, PredictedRun, band_of
+from ..exhibit import Exhibit, Output
+from ..predicted import PredictedRun, band_of
 from .measures import BendingMeasures, Point, bending_measures, loads_at
 from .record import BendingRun, run_of
 from .tables import columns_of, curve_of, terminal_table

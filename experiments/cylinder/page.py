@@ -11,7 +11,7 @@ from ...notes import marks
 from ...reports import Table, Words, percent
 from ...reports.content import Part
 from ...writing import replacing
-from ..base import Exhibit, Output, Shown
+from ..exhibit import Exhibit, Output, Shown
 from .figures import draw_figures, load_charts, tests_of, write_beams
 from .how_sure import how_sure
 from .tables import load_words, measured_table, place_names

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from ...materials.card import MaterialCard
 from ...models.cylinder import CylinderModel
 from ...solvers.base import History
-from ..base import CardRun, Output, PredictedRun, Simulation
+from ..base import CardRun, Simulation
+from ..exhibit import Output
+from ..predicted import PredictedRun
 from ..records import record_of
 from .outcome import CylinderOutcome
 from .record import Array, arrays_of, depends_on, early_end

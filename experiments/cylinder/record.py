@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...models.cylinder import CylinderModel
 from ...solvers.base import History
-from ..base import RunRecord
+from ..predicted import RunRecord
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ...data.bending_scatter import scatter
 from ...notes import marks
-from ..base import PredictedRun
+from ..predicted import PredictedRun
 from .measures import BendingMeasures
 from .record import BendingRun
 from .test import CylinderTest

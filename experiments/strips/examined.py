@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...reports import Table, plot_curves
-from ..base import Exhibit, Output
+from ..exhibit import Exhibit, Output
 from .doubts import curves_of
 from .test import StripsTest
 

@@ -9,7 +9,8 @@ import numpy as np
 from ...reports import StripCurves, plot_loads
 from ...reports.load_charts import load_charts
 from ...writing import replacing
-from ..base import Exhibit, FittedTest, Output, Shown
+from ..exhibit import Exhibit, Output, Shown
+from ..fittable import FittedTest
 from .figures import draw_bias, draw_moduli, draw_orders, load_panels
 from .prepared import FittedStrip
 from .tables import load_table, misfit_table

@@ -22,7 +22,7 @@ from ...reports import (
     write_vtu,
 )
 from ...solvers.base import History
-from ..base import FittedTest
+from ..fittable import FittedTest
 from .prepared import FittedStrip
 from .strip import Strip
 

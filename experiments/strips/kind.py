@@ -10,8 +10,10 @@ from pydantic import BaseModel
 from ...materials.card import MaterialCard
 from ...models.uniaxial import UniaxialModel
 from ...solvers.base import History
-from ..base import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..base import CardRun, Place, Simulation, Studied
 from ..candidates import Candidate, Planning
+from ..exhibit import Output
+from ..predicted import Predicted
 from .objective import Array
 from .section import StripsSection
 from .test import StripsTest, read

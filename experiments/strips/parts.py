@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import Masks
+from ..fittable import Masks
 from .strip import Strip
 
 if TYPE_CHECKING:

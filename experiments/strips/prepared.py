@@ -12,9 +12,11 @@ from ...identification.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...models.uniaxial import UniaxialModel
 from ...solvers.base import History
-from ..base import Exhibit, Findings, FittedTest, MakeSolver, Masks, Output, Reach, Weighting
+from ..base import MakeSolver, Reach
 from ..data_files import DataFile, joined
 from ..doubts import Doubt, Expected
+from ..exhibit import Exhibit, Output
+from ..fittable import Findings, FittedTest, Masks, Weighting
 from .doubts import doubts_of_strips
 from .independent import loads_alike
 from .objective import Array, LoadObjective

@@ -16,7 +16,8 @@ from ...models.uniaxial import UniaxialModel
 from ...reports import plot_loads
 from ...solvers.base import History
 from ...writing import replacing
-from ..base import CardRun, Output, Simulation
+from ..base import CardRun, Simulation
+from ..exhibit import Output
 from ..notes import STRAINS, strains_of
 from .figures import Array, Curve, draw_bias, load_panels
 from .test import StripsTest

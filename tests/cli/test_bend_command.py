@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import live_line
-from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.fits import prediction_page
 from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, write_card

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.identification import correction
 from bubblefit.solvers import process
 

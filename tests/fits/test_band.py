@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.fits import prediction_page
 from bubblefit.fits.prediction_result import Predictions
 from bubblefit.fits.predictions import RunEvent, predict

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from bubblefit import __version__
-from bubblefit.experiments.base import Exhibit
 from bubblefit.experiments.doubts import Doubt, Judgement
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.fits import check as room
 from bubblefit.fits.check import Check
 from bubblefit.reports import Report, Table

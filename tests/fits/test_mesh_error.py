@@ -10,8 +10,8 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.bubble.test import BubbleTest
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits import mesh_error
 from bubblefit.fits.budget import with_certainty
 from bubblefit.fits.mesh_error import notes_of_mesh

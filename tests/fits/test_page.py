@@ -9,7 +9,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Exhibit
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.fits import page
 from bubblefit.fits.answer import WORDS, band_words
 from bubblefit.fits.coefficients import TITLE, two_digits

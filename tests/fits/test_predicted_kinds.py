@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments import registry as kinds_of_test
-from bubblefit.experiments.base import Exhibit, Output, PredictedRun
+from bubblefit.experiments.exhibit import Exhibit, Output
+from bubblefit.experiments.predicted import PredictedRun
 from bubblefit.fits import prediction_result, predictions, project
 from bubblefit.fits.predictions import measured_tests, predict
 from bubblefit.fits.project import Project, read_project

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
-from bubblefit.experiments.base import Exhibit, RunRecord
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Exhibit
 from bubblefit.experiments.notes import notes_of_record
+from bubblefit.experiments.predicted import RunRecord
 from bubblefit.fits import executor, processes
 from bubblefit.fits.cards import chosen_cards
 from bubblefit.fits.prediction_result import Predictions

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
-from bubblefit.experiments.base import RunRecord
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
 from bubblefit.experiments.cylinder.record import run_of
+from bubblefit.experiments.predicted import RunRecord
 from bubblefit.fits.predictions import mark_of
 from bubblefit.fits.run_records import RunRecords
 from bubblefit.materials.card import MaterialCard

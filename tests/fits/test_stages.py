@@ -14,7 +14,7 @@ import pytest
 from bubblefit.cli.fit_words import lines_of
 from bubblefit.cli.progress import FitsProgress, StudyProgress
 from bubblefit.errors import InputError
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits import stages
 from bubblefit.fits.coarse import coarse_problem
 from bubblefit.fits.distinct import distinct, moduli_apart

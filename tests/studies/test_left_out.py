@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits.project import read_project
 from bubblefit.fits.result import Fit
 from bubblefit.fits.setup import FitSetup, prepare_fit

@@ -14,20 +14,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pandas as pd
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.base import (
-    CardRun,
-    Exhibit,
-    Findings,
-    FittedTest,
-    MakeSolver,
-    Masks,
-    Output,
-    Place,
-    Reach,
-    Refined,
-    Simulation,
-    Weighting,
-)
+from bubblefit.experiments.base import CardRun, MakeSolver, Place, Reach, Refined, Simulation
+from bubblefit.experiments.exhibit import Exhibit, Output
+from bubblefit.experiments.fittable import Findings, FittedTest, Masks, Weighting
 from bubblefit.identification.comparison import Comparison
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw

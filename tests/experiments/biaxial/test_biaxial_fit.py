@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits.check import check
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.fits.simulation import simulate_cards

@@ -8,9 +8,9 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.base import Weighting
 from bubblefit.experiments.biaxial.candidates import candidates
 from bubblefit.experiments.candidates import Planning, Precision
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits.result import Fit
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.materials.biaxial_response import biaxial_response

@@ -7,7 +7,7 @@ import re
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Weighting
+from bubblefit.experiments.fittable import Weighting
 from bubblefit.fits.law import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import FittedTest, Output
 from bubblefit.experiments.bubble.findings import _warnings
+from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.fittable import FittedTest
 from bubblefit.fits.project import read_project
 from bubblefit.fits.setup import prepare_fit
 from bubblefit.notes import NoteKind

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.bubble.preparation import prepare
 from bubblefit.experiments.bubble.recorded_words import (
     clock_pictures,
@@ -16,6 +15,7 @@ from bubblefit.experiments.bubble.recorded_words import (
     recorded_table,
 )
 from bubblefit.experiments.data_files import files_of
+from bubblefit.experiments.exhibit import Output
 from bubblefit.fits.project import read_project
 from bubblefit.fits.written import project_text, settings_of
 

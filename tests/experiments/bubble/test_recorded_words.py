@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.data.clock_offset import ClockOffset
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.bubble.recorded import RecordedFrames
 from bubblefit.experiments.bubble.recorded_words import (
     clock_pictures,
@@ -16,6 +15,7 @@ from bubblefit.experiments.bubble.recorded_words import (
     recorded_numbers,
     recorded_table,
 )
+from bubblefit.experiments.exhibit import Output
 
 #: Of all five frames of the film, MPa; the first of them is before the log begins.
 DOUBT = np.array([np.nan, 0.0002, 0.0004, 0.0006, 0.0008])

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from bubblefit.data.fields import DisplacementField
 from bubblefit.data.outline import Outline
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.bubble import registration
 from bubblefit.experiments.bubble.registration import (
     registration_line,
     registration_numbers,
     registration_table,
 )
+from bubblefit.experiments.exhibit import Output
 
 MOTIONS = (
     SimpleNamespace(points=9, shift=np.array([0.3, 0.4, 0.0]), angle=0.25),

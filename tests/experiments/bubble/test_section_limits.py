@@ -12,7 +12,7 @@ import pytest
 from bubblefit.data.equilibrium import Apex
 from bubblefit.data.fields import DisplacementField
 from bubblefit.data.outline import Outline
-from bubblefit.experiments.base import Fabric, Output, Place, Scales
+from bubblefit.experiments.base import Fabric, Place, Scales
 from bubblefit.experiments.bubble import examined
 from bubblefit.experiments.bubble.frame_clock import _frame_times
 from bubblefit.experiments.bubble.increments import merge_increments
@@ -23,6 +23,7 @@ from bubblefit.experiments.bubble.pressure_section import LogSection
 from bubblefit.experiments.bubble.relative import at_rest, counted_from, with_places
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
 from bubblefit.experiments.bubble.sheet_section import Sheet, SheetSection, sheet_of
+from bubblefit.experiments.exhibit import Output
 from bubblefit.meshes.disk import disk_mesh
 
 from ...complaints import complaint

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.data.outline import Outline
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.bubble import sheet_report
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.bubble.relative import with_places
 from bubblefit.experiments.bubble.sheet_section import Sheet
+from bubblefit.experiments.exhibit import Output
 from bubblefit.identification.nuisance import Nuisance
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.models.bubble import BubbleModel

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.cylinder import figures, page
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Output
 from bubblefit.reports import BendPanel
 
 from ...cylinder_cases import ENDS

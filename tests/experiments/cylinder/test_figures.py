@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.data.bending import BendingCurve
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.cylinder import figures
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
+from bubblefit.experiments.exhibit import Output
 
 from .test_page import BENT, WAY, case, run
 from .test_tables import MEASURES

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.data.bending import BendingCurve
-from bubblefit.experiments.base import Output
 from bubblefit.experiments.cylinder import figures, page
 from bubblefit.experiments.cylinder.outcome import CylinderOutcome
 from bubblefit.experiments.cylinder.record import BendingRun
+from bubblefit.experiments.exhibit import Output
 from bubblefit.notes import Note, NoteKind
 from bubblefit.reports import Table
 from bubblefit.solvers.base import BandEnd

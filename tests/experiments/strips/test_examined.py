@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.data.curves import LoadCurve
 from bubblefit.data.load_polynomials import fit_load_polynomial
-from bubblefit.experiments.base import Output
+from bubblefit.experiments.exhibit import Output
 from bubblefit.experiments.strips.examined import exhibit
 from bubblefit.experiments.strips.strip import Strip
 

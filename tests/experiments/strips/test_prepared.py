@@ -15,7 +15,8 @@ import pytest
 from bubblefit.data.curves import LoadCurve
 from bubblefit.data.load_polynomials import fit_load_polynomial
 from bubblefit.data.polynomial_order import compare_orders
-from bubblefit.experiments.base import FittedTest, Output, Weighting
+from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.fittable import FittedTest, Weighting
 from bubblefit.experiments.strips import figures
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.experiments.strips.strip import Strip

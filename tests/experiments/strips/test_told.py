@@ -13,7 +13,8 @@ import pytest
 from bubblefit.data.curves import LoadCurve
 from bubblefit.data.load_polynomials import fit_load_polynomial
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import CardRun, Output
+from bubblefit.experiments.base import CardRun
+from bubblefit.experiments.exhibit import Output
 from bubblefit.experiments.strips import simulated
 from bubblefit.experiments.strips.findings import findings_of
 from bubblefit.experiments.strips.objective import LoadObjective
