@@ -414,6 +414,7 @@ def test_init_writes_the_example(tmp_path: Path) -> None:
 def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     path = write_project(tmp_path)
     text = path.read_text().replace('solver = "formula"', 'solver = "membrane"')
+    text = text.replace("element_size = 40.0", "element_size = 75.0")
     path.write_text(text.replace("frames = 24", "deflection = 8\nframes = 2"))
     arguments = ["bend", path, "--out", "out", "--jobs", "1"]
     runs = tmp_path / "out" / "runs"
