@@ -16,6 +16,7 @@ ModulusUnit = Literal["GPa", "MPa", "Pa"]
 PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
 LengthUnit = Literal["mm", "m"]
 LoadUnit = Literal["N", "kN"]
+Name = Annotated[str, Field(min_length=1, max_length=300)]
 
 #: MPa per unit.
 MODULUS_UNITS: dict[str, float] = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}

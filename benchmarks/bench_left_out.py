@@ -21,14 +21,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import valmex_tests
 from bubblefit.experiments.fittable import PreparedTest, Weighting
 from bubblefit.fits.project import Project, read_project
 from bubblefit.fits.setup import FitSetup, prepare_fit
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.studies.folds import best_of
 from bubblefit.studies.held_out import held_out
-from valmex_tests import DATA, FABRIC, FEW, FIT, bubble
+from valmex_tests import DATA, FABRIC, FEW, FIT, bubbles, published_strips
 
 STRAIN = 0.06
 PUBLISHED = 1.86
@@ -50,13 +49,11 @@ def project(
 ) -> Project:
     """The three tests, perhaps with the strips."""
     names = {f"test {test}": test for test in (1, 2, 3)}
-    tests = "".join(
-        bubble(name, test, data, frames, elements, modes) for name, test in names.items()
-    )
+    tests = bubbles(names, data, frames, elements, modes)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         law = f'form = "{form}"\nstrain_range = {ENDS_OF_STRIPS if strips else ENDS}\n'
-        also = valmex_tests.strips(25) if strips else ""
+        also = published_strips(25) if strips else ""
         path.write_text(FABRIC + law + tests + also + FIT.format(starts=1))
         return read_project(path, data=dict.fromkeys(names, data))
 

@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import valmex_tests
 from bubblefit.experiments.bubble.sheet_report import fitted_model
 from bubblefit.fits.fit import fit
 from bubblefit.fits.project import read_project
 from bubblefit.fits.result import Fit
 from bubblefit.meshes.location import sampling_matrix
-from valmex_tests import DATA, FABRIC, FEW, FIT, bubble
+from valmex_tests import DATA, FABRIC, FEW, FIT, bubbles, published_strips
 
 STRAIN = 0.06
 
@@ -37,10 +36,9 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
 def fitted(test: int, data: Path, elements: int, modes: int, starts: int, strips: bool) -> Fit:
     """The fit of one test."""
     law = JOINT if strips else ALONE
-    own = bubble("bubble", test, data, FEW, elements, modes) + (
-        valmex_tests.strips() if strips else ""
-    )
-    text = f"{FABRIC}{law}\n{own}{FIT.format(starts=starts)}"
+    own = bubbles({"bubble": test}, data, FEW, elements, modes)
+    also = published_strips() if strips else ""
+    text = f"{FABRIC}{law}\n{own}{also}{FIT.format(starts=starts)}"
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         path.write_text(text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -58,18 +58,16 @@ polynomials = "{curves}"
 FIT = "\n[fit]\nstarts = {starts}\nseed = 1\njobs = 1\nmax_analyses = 80\n"
 
 
-def bubble(
-    name: str, test: int, data: Path, frames: Sequence[int], elements: int, modes: int
+def bubbles(
+    tests: Mapping[str, int], data: Path, frames: Sequence[int], elements: int, modes: int
 ) -> str:
-    """Of a project, with the measured pressures of the frames."""
+    """Of a project: measured tests by name, with the measured pressures of the frames."""
     table = pd.read_csv(data / "grid_pressures.csv")
     pressures = [float(table["p_bar"][k]) for k in frames]
-    return BUBBLE.format(
-        name=name, test=test, pressures=pressures, frames=list(frames), elements=elements,
-        modes=modes,
-    )  # fmt: skip
+    said = {"pressures": pressures, "frames": list(frames), "elements": elements, "modes": modes}
+    return "".join(BUBBLE.format(name=name, test=test, **said) for name, test in tests.items())
 
 
-def strips(increments: int = 100) -> str:
+def published_strips(increments: int = 100) -> str:
     """Of a project: the published strips by their load polynomials."""
     return STRIPS.format(curves=CURVES, increments=increments)

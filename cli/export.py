@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from ..materials.exports.formats import Option, options_of
 from ..notes import rows
 from ..solvers.exports import FORMATS
 from ..writing import replacing
+from .ending import tell
 from .examples import examples
 from .exits import exits
 
@@ -77,15 +77,11 @@ def command(
     for path, text in zip(paths, export.files.values(), strict=True):
         with replacing(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    if as_json:
-        said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
-        said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
-        content = {"format": name, **said}
-        click.echo(json.dumps({"files": [str(path) for path in paths], **content}, indent=1))
-        return
-    for line in export.says.lines():
-        click.echo(line)
-    click.echo(f"written to {', '.join(map(str, paths))}")
+    files = [str(path) for path in paths]
+    said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
+    said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
+    lines = [*export.says.lines(), f"written to {', '.join(files)}"]
+    tell({"files": files, "format": name, **said}, lines, as_json)
 
 
 def _targets(export: Export, out: Path | None, default: str) -> list[Path]:

@@ -17,7 +17,7 @@ from ..materials.forms.base import UNLIMITED
 from ..materials.forms.registry import form_named
 from ..materials.law import HypoelasticLaw
 from ..reading import is_file
-from ..sections import Number, Positive, Section, StrainTriple
+from ..sections import Name, Number, Positive, Section, StrainTriple
 from .store import usual_folder
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class CardSection(Section):
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Any] = Field(init=False)
 
-    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    name: Name | None = None
     file: str | None = None
     beta: list[Number] | None = None
     form: str | None = None

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 from ..sections import (
     LengthUnit,
     ModulusUnit,
+    Name,
     Number,
     Pair,
     Positive,
@@ -17,7 +18,6 @@ from ..sections import (
     StrainTriple,
 )
 
-Name = Annotated[str, Field(min_length=1, max_length=300)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 

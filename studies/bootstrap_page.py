@@ -13,7 +13,7 @@ from ..reports.bootstrap_charts import Array, bootstrap_charts
 from ..reports.bootstraps import plot_bootstrap
 from .bootstrap_record import SAMPLES
 from .bootstrapped import METHOD
-from .study_folder import FILES, write_study
+from .study_folder import FILES, write_folder
 
 if TYPE_CHECKING:
     from .bootstrapped import Bootstrap
@@ -23,12 +23,10 @@ TABLE, COEFFICIENTS, FIGURE = "bootstrap.csv", "coefficients.csv", "bootstrap.pn
 
 def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-
-    def draw() -> None:
-        plot_bootstrap(folder / FIGURE, done.strains, _best(done), done.bands, done.of_fit)
-
+    shown = (done.strains, _best(done), done.bands, done.of_fit)
+    figures = {FIGURE: lambda path: plot_bootstrap(path, *shown)}
     tables = {TABLE: done.table(), COEFFICIENTS: done.coefficients()}
-    return write_study(folder, tables, 9, draw, done.notes, _page(done), done.result)
+    return write_folder(folder, tables, figures, done.notes, _page(done), done.result, 9)
 
 
 def _best(done: Bootstrap) -> dict[str, Array]:

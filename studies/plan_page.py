@@ -9,7 +9,7 @@ from ..materials.forms.base import COMPONENTS
 from ..reports import Report, Section, Table, plot_plan
 from ..reports.named_charts import plan_charts
 from .planned import ASSUMED, words
-from .study_folder import FILES, write_study
+from .study_folder import FILES, write_folder
 
 if TYPE_CHECKING:
     from .planned import Plan, Planned
@@ -21,11 +21,10 @@ CAPTION = "1 sigma of the moduli with one more test, root mean square along each
 
 def write_plan(plan: Plan, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-
-    def draw() -> None:
-        plot_plan(folder / FIGURE, *_shown(plan), WITHOUT)
-
-    return write_study(folder, {TABLE: plan.table()}, 6, draw, plan.notes, _page(plan), plan.result)
+    figures = {FIGURE: lambda path: plot_plan(path, *_shown(plan), WITHOUT)}
+    return write_folder(
+        folder, {TABLE: plan.table()}, figures, plan.notes, _page(plan), plan.result, 6
+    )
 
 
 def _shown(plan: Plan) -> tuple[list[str], dict[str, list[float]]]:

@@ -11,7 +11,7 @@ from ..reports import Report, Section, Table
 from ..reports.likelihoods import ProfilePanel, plot_likelihoods
 from ..reports.profile_charts import profile_charts
 from .profiled import METHOD
-from .study_folder import FILES, write_study
+from .study_folder import FILES, write_folder
 
 if TYPE_CHECKING:
     from .profiled import Profile, Profiles
@@ -21,12 +21,9 @@ TABLE, FIGURE = "profile.csv", "profile.png"
 
 def write_profiles(found: Profiles, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-
-    def draw() -> None:
-        plot_likelihoods(folder / FIGURE, _panels(found), THRESHOLD)
-
-    return write_study(
-        folder, {TABLE: found.table()}, 9, draw, found.notes, _page(found), found.result
+    figures = {FIGURE: lambda path: plot_likelihoods(path, _panels(found), THRESHOLD)}
+    return write_folder(
+        folder, {TABLE: found.table()}, figures, found.notes, _page(found), found.result, 9
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +17,11 @@ from ..fits.project import Project
 from ..fits.store import usual_folder
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, write_notes
+from ..notes import Note
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from ..writing import replacing, write_text
-from .study_page import write_study_page
+from .study_folder import write_folder
+from .study_page import study_page
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -196,10 +195,6 @@ def write_study(
     ------
     OutputError : the folder cannot be written.
     """
-    with replacing(folder / f"{name}.csv") as path:
-        table.to_csv(path, index=False, lineterminator="\n")
-    draw(folder / f"{name}.png")
-    write_notes(folder, notes)
-    page = (title or name, said, table, f"{name}.csv", notes, f"{name}.png", charts)
-    write_study_page(folder, *page)
-    write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")
+    file, figure = f"{name}.csv", f"{name}.png"
+    page = study_page(title or name, said, table, file, notes, figure, charts)
+    write_folder(folder, {file: table}, {figure: draw}, notes, page, result)

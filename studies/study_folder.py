@@ -18,31 +18,34 @@ from ..writing import replacing, write_text
 FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
 
 
-def write_study(
+def write_folder(
     folder: Path,
     tables: Mapping[str, pd.DataFrame],
-    digits: int,
-    draw: Callable[[], object],
+    figures: Mapping[str, Callable[[Path], object]],
     notes: Sequence[Note],
     page: Report,
     result: Mapping[str, Any],
+    digits: int | None = None,
 ) -> Path:
     """Write everything; the page's path.
 
     Parameters
     ----------
-    tables : by the names of their files. digits : significant ones of their numbers.
-    draw : makes the picture.
+    tables : by the names of their files. figures : what draws each, by the name of its file.
+    digits : significant ones of the tables' numbers, all unless given.
 
     Raises
     ------
     OutputError : a file cannot be written.
     """
-    (folder / RESULT).unlink(missing_ok=True)
+    if (folder / RESULT).exists():  # what is half written has none
+        (folder / RESULT).unlink()
+    form = None if digits is None else f"%.{digits}g"
     for name, table in tables.items():
         with replacing(folder / name) as path:
-            table.to_csv(path, index=False, float_format=f"%.{digits}g", lineterminator="\n")
-    draw()
+            table.to_csv(path, index=False, float_format=form, lineterminator="\n")
+    for name, draw in figures.items():
+        draw(folder / name)
     write_notes(folder, notes)
     written = write_report(folder, page)
     write_text(folder / RESULT, json.dumps(result, indent=1) + "\n")

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..fits.citation import citation
-from ..fits.store import RESULT
-from ..notes import NOTES, NOTES_ARE, Note
-from ..reports import Charts, Listing, Picture, Report, Section, Table, write_report
+from ..notes import Note
+from ..reports import Charts, Listing, Picture, Report, Section, Table
+from .study_folder import FILES
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def write_study_page(
-    folder: Path,
+def study_page(
     title: str,
     said: Sequence[str],
     table: pd.DataFrame,
@@ -24,21 +22,15 @@ def write_study_page(
     notes: Sequence[Note],
     figure: str | None = None,
     charts: Sequence[Charts] = (),
-) -> Path:
-    """Write page.json and report.html; figure : a picture in the folder, which
-    stands in the page unless charts do.
-
-    said : the lines of the terminal.
-
-    Raises
-    ------
-    OutputError : they cannot be written.
+) -> Report:
+    """The page. said : the lines of the terminal. figure : a picture in the folder, which stands in
+    the page unless charts do.
     """
     from pandas.api.types import is_numeric_dtype
 
     words = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     shown = Table("The numbers", list(table.columns), table.to_numpy(object).tolist(), text=words)
-    report = Report(
+    return Report(
         title=title,
         warnings=[note.line for note in notes],
         sections=[
@@ -50,8 +42,6 @@ def write_study_page(
         files=[
             (table_file, "the table"),
             *([(figure, "picture of the charts")] if figure else []),
-            (NOTES, NOTES_ARE),
-            (RESULT, "all numbers of this page, for programs"),
+            *FILES,
         ],
     )
-    return write_report(folder, report)

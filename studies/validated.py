@@ -137,8 +137,9 @@ class Validation:
 
     def write(self, folder: Path) -> None:
         """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
+        from ..reports import write_report
         from ..reports.named_charts import held_out_charts
-        from .study_page import write_study_page
+        from .study_page import study_page
 
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
@@ -146,7 +147,7 @@ class Validation:
         title = f"{self.title}: does a fit foretell what it was not given?"
         charts = held_out_charts(*self._shown(), "Errors at what a fit was not given, and was")
         said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_study_page(folder, *said, charts=[charts])
+        write_report(folder, study_page(*said, charts=[charts]))
         Store(folder).finish(self.result)
 
 

@@ -141,9 +141,9 @@ class WeightStudy:
     def write(self, folder: Path) -> None:
         """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
         from ..fits.store import Store
-        from ..reports import plot_weights
+        from ..reports import plot_weights, write_report
         from ..reports.weights_charts import weights_charts
-        from .study_page import write_study_page
+        from .study_page import study_page
 
         with replacing(folder / TABLE) as path:
             self.table().to_csv(path, index=False, float_format="%.9g")
@@ -164,5 +164,5 @@ class WeightStudy:
         write_notes(folder, self.notes)
         title = f"{self.title}: the weight of {self.counted}"
         said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_study_page(folder, *said, FIGURE, weights_charts(*shown))
+        write_report(folder, study_page(*said, FIGURE, weights_charts(*shown)))
         Store(folder).finish(self.result)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...data.biaxial.table import LoadUnit, StrainUnit
-from ...sections import Number, Positive, Section
+from ...sections import Name, Number, Positive, Section
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -51,7 +51,7 @@ class BiaxialSection(Section):
     measured strain, in %.
     """
 
-    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    name: Name | None = None
     weight: Weight = 1.0
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
-from ...sections import LengthUnit, Number, Positive, Section
+from ...sections import LengthUnit, Name, Number, Positive, Section
 from .correlation_section import CorrelationSection
 from .filter_section import FilterSection
 from .outline_section import EllipseSection
@@ -27,7 +27,7 @@ class KnownSolutionSection(Section):
     elements: Elements | None = None
     increments: list[Positive] | None = None
     symmetry: Symmetry | None = None
-    solver: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    solver: Name | None = None
 
 
 class ColumnsSection(Section):
@@ -87,7 +87,7 @@ class NuisanceSection(Section):
 class BubbleSection(Section):
     """[[bubble]]: a clamped disk, inflated."""
 
-    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    name: Name | None = None
     weight: Positive = 1.0
     radius: Positive | None = None
     ellipse: EllipseSection | None = None

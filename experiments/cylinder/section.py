@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...sections import Number, Positive, Section
+from ...sections import Name, Number, Positive, Section
 from ..channels import ChannelSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
@@ -49,7 +49,7 @@ class MeasuredSection(Section):
 class CylinderSection(Section):
     """[[cylinder]]: inflated, laid on two supports, bent by a collar."""
 
-    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    name: Name | None = None
     diameter: Positive
     pressure: Positive
     length: Positive | None = None

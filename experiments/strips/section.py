@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...sections import Positive, Section
+from ...sections import Name, Positive, Section
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -73,7 +73,7 @@ class WeightsSection(Section):
 class StripsSection(Section):
     """[[strips]]: cut strips pulled along warp, fill and across the yarns, as one test."""
 
-    name: Annotated[str, Field(min_length=1, max_length=300)] | None = None
+    name: Name | None = None
     width: Positive | None = None
     grip_distance: Positive | None = None
     bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0

@@ -155,10 +155,12 @@ def test_any_size_gives_a_sound_well_shaped_mesh(
     check_sound(mesh, length, diameter, seam, symmetry)
 
 
-@pytest.mark.parametrize(("around", "count"), [(1.0, 16), (0.5, 40), (0.25, 72)])
-def test_sides_around_the_tube_are_as_long_as_asked_for(around, count):
+@pytest.mark.parametrize(
+    ("size", "around", "count"), [(30.0, 1.0, 16), (25.0, 0.5, 40), (25.0, 0.25, 72)]
+)
+def test_sides_around_the_tube_are_as_long_as_asked_for(size, around, count):
     """40, not 32, of half of 25 mm: 32 would be 17 % longer, 40 are 6 % shorter."""
-    mesh = cylinder_mesh(LENGTH, DIAMETER, 25.0 if around < 1 else 30.0, 0.0, "full", around=around)
+    mesh = cylinder_mesh(LENGTH, DIAMETER, size, 0.0, "full", around=around)
     ring = mesh.points[mesh.node_sets["mid_span"], :2]
     ring = ring[np.argsort(np.arctan2(*ring.T))]
     assert len(ring) == count
