@@ -17,21 +17,22 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
-# this file a second time, as a module without a package.
-import bubblefit.solvers.calculix.frd_format
-import bubblefit.solvers.marc.t19_format  # noqa: F401
+import bubblefit.solvers.marc.t19_format
 
 if TYPE_CHECKING:
-    from .fits.fit import fit
-    from .fits.predictions import predict
-    from .fits.project import Project, read_project
-    from .fits.result import Fit
-    from .fits.simulation import simulate
     from .materials.card import MaterialCard, read_card
-    from .studies.bootstrap import bootstrap
-    from .studies.plan import plan
-    from .studies.profile import profile
+    from .project.project import Project, read_project
+    from .runs.bootstrap import bootstrap
+    from .runs.fit import fit
+    from .runs.plan import plan
+    from .runs.predictions import predict
+    from .runs.profile import profile
+    from .runs.result import Fit
+    from .runs.simulation import simulate
+
+# meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
+# this file a second time, as a module without a package.
+
 
 __version__ = "0.2.0"
 __all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predict", "profile",

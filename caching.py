@@ -16,17 +16,17 @@ ROOT = Path(__file__).parent
 #: Everything that compiled functions call: an edit of one must reach the compiled code of all,
 #: while numba's own cache looks only at the file a function stands in.
 KERNELS = (
-    "materials/point_moduli.py",
-    "materials/point_ratio.py",
+    "materials/point_law.py",
+    "materials/point_law.py",
     "materials/point_law.py",
     "materials/wrinkles.py",
-    "materials/relaxation.py",
+    "materials/wrinkles.py",
     "materials/law.py",
-    "materials/biaxial_response.py",
-    "meshes/volume.py",
+    "materials/responses.py",
+    "meshes/mesh.py",
     "solvers/membrane/kernel.py",
     "solvers/membrane/sensitivity.py",
-    "solvers/membrane/sheet_sensitivity.py",
+    "solvers/membrane/sensitivity.py",
 )
 
 

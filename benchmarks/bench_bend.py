@@ -19,13 +19,16 @@ from dataclasses import replace
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.cylinder import CylinderModel
-from bubblefit.models.inflated import InflatedModel
+from bubblefit.meshes.cylinder_model import CylinderModel, InflatedModel, inflated_cylinder
 from bubblefit.solvers.base import History, Solver
-from bubblefit.solvers.calculix import cylinder_analysis, cylinder_bending
+from bubblefit.solvers.calculix import (
+    cylinder as cylinder_bending,
+)
+from bubblefit.solvers.calculix import (
+    cylinder_results as cylinder_analysis,
+)
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.membrane.cylinder import closed_membrane_of
+from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits

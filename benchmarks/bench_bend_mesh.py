@@ -16,7 +16,7 @@ from typing import Any
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.cylinder.measures import initial_stiffness
+from bubblefit.experiments.cylinder.predicted import initial_stiffness
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 

@@ -18,12 +18,11 @@ from typing import Any
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.budget import with_certainty
-from bubblefit.fits.project import Project
-from bubblefit.identification.assessment import moduli_error
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.inference.assessment import moduli_error
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import Project
+from bubblefit.runs.best import with_certainty
 from known_solution import known_project
 
 #: The lines to uncomment: quads of the full disk, load steps in kPa beside the pressures.

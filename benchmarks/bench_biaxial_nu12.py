@@ -13,14 +13,13 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.data.biaxial.paths import BiaxialPath
-from bubblefit.fits.schema import UnknownSection, UnknownsSection
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.identification.assessment import certainty
-from bubblefit.identification.methods.lm import LevenbergMarquardt
-from bubblefit.identification.verdicts import verdicts
-from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.inference.assessment import certainty, verdicts
+from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.project.schema import UnknownSection, UnknownsSection
+from bubblefit.readers.biaxial import BiaxialPath
+from bubblefit.runs.setup import FitSetup, prepare_fit
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 #: %, as the example has them: noise, and what the loading that is compared leaves of strain.

@@ -13,10 +13,10 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
-from bubblefit.studies import bootstrap as study
-from bubblefit.studies.bootstrap import bootstrap
+from bubblefit.project.project import read_project
+from bubblefit.runs import bootstrap as study
+from bubblefit.runs.bootstrap import bootstrap
+from bubblefit.runs.fit import fit
 
 HERE = Path(__file__).resolve().parent.parent
 DATA = HERE.parent / "shared" / "data" / "bubble"

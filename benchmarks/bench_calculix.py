@@ -14,11 +14,11 @@ import time
 import numpy as np
 from bench_analysis import seconds
 from bubblefit.errors import SolverFailure
-from bubblefit.fits.start import run_start
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.runs.starts import run_start
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from known_solution import known_model_and_law, known_project, known_setup, objectives_of

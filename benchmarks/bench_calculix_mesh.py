@@ -13,8 +13,8 @@ import sys
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from known_solution import known_model_and_law

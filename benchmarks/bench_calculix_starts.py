@@ -11,9 +11,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from bubblefit.fits.start import run_start
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.runs.starts import run_start
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from known_solution import known_project, known_setup, objectives_of
 from threadpoolctl import threadpool_limits

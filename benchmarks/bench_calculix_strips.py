@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from threadpoolctl import threadpool_limits

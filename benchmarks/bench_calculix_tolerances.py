@@ -14,8 +14,8 @@ from types import ModuleType
 
 import numpy as np
 from bench_calculix_strips import LAW, bias
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import bubble, strip
 from bubblefit.solvers.calculix.solver import CalculixSolver

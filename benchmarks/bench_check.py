@@ -13,11 +13,11 @@ import sys
 import time
 
 import numpy as np
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
-from bubblefit.data.registration.fields import register_fields
 from bubblefit.experiments.bubble.doubts import View, doubts_of
-from bubblefit.experiments.doubts import Expected
+from bubblefit.experiments.bubble.registration import register_fields
+from bubblefit.experiments.kinds import Expected
+from bubblefit.meshes.disk import Outline
+from bubblefit.readers.fields import DisplacementField
 from scipy.spatial.transform import Rotation
 
 RADIUS = 100.0

@@ -23,9 +23,9 @@ from typing import Any
 
 import cloudpickle
 import numpy as np
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.start import StartRecord
-from bubblefit.solvers.announcements import hearing
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.starts import StartRecord
+from bubblefit.solvers.base import hearing
 from known_solution import known_project, known_setup
 
 #: s, of one run; and for how many s there are runs for a worker.

@@ -1,7 +1,7 @@
 """Starts coarse to fine beside starts on the full mesh: the same optima, and how much less time.
 
 Both ways in one run, in this one process, in processor time. Every distinct optimum of the full way
-is looked for among those of the other; optima are told apart as a fit does it (`fits/distinct.py`).
+is looked for among those of the other; optima are told apart as a fit does it (`runs/fit.py`).
 
 Usage: bench_coarse.py [STARTS] [PROJECT [DATA]]. STARTS of the example with a known solution (50),
 or of another project, whose measured data lie in the folder DATA.
@@ -16,13 +16,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bubblefit.fits import stages
-from bubblefit.fits.coarse import CoarseToFine, coarse_problem
-from bubblefit.fits.distinct import SAME_MODULI, distinct, moduli_apart
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.project import Project, read_project
-from bubblefit.fits.setup import FitSetup
-from bubblefit.fits.start import StartRecord, run_start
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs import fit as stages
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.fit import SAME_MODULI, distinct, moduli_apart
+from bubblefit.runs.setup import CoarseToFine, FitSetup, coarse_problem
+from bubblefit.runs.starts import StartRecord, run_start
 from known_solution import known_project, known_setup
 
 

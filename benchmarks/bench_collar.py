@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 from bench_bend import LAW, THICKNESS
-from bubblefit.models.bending import inflated_cylinder
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.solvers import rigid
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from numpy.typing import NDArray

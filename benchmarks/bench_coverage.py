@@ -15,16 +15,14 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-from bubblefit.data.fields import DisplacementField
 from bubblefit.experiments.bubble.prepared import PreparedBubble
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.best import best_fit
-from bubblefit.fits.budget import with_certainty
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.fits.start import StartRecord
-from bubblefit.identification.bands import bands_of
-from bubblefit.identification.methods.lm import LevenbergMarquardt
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.inference.posterior import bands_of
+from bubblefit.readers.fields import DisplacementField
+from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.starts import StartRecord
 from known_solution import known_project
 
 FINE, NOISE, FACET = 7200, 0.02, 2.5

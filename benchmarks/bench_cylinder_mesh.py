@@ -17,7 +17,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 from bubblefit.materials.card import MaterialCard
-from bubblefit.studies.refinement import refine
+from bubblefit.runs.refinement import refine
 from known_solution import known_model_and_law
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bend-valmex7318" / "project.toml"

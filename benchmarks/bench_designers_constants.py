@@ -12,8 +12,7 @@ from pathlib import Path
 
 import bubblefit as bf
 from bubblefit.errors import InputError
-from bubblefit.materials.designers.of_law import constants_of_law
-from bubblefit.materials.designers.rows import spread_of
+from bubblefit.materials.designers import constants_of_law, spread_of
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bend-valmex7318" / "project.toml"
 SHEAR = 0.05

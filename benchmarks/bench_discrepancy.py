@@ -15,16 +15,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from bubblefit.data.fields import DisplacementField
-from bubblefit.experiments.bubble.places import mirrored
+from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.bubble.prepared import PreparedBubble
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.best import best_fit
-from bubblefit.fits.budget import with_certainty
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.fits.start import StartRecord
-from bubblefit.identification.methods.lm import LevenbergMarquardt
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.readers.fields import DisplacementField
+from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.starts import StartRecord
 from known_solution import known_project
 from scipy.interpolate import CloughTocher2DInterpolator
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 from bench_increments import LAW, PRESSURES
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports import curves
+from bubblefit.materials.exports import base as curves
 from bubblefit.materials.responses import trellis_angle, trellis_curve
 from bubblefit.materials.tables import modulus_tables
 from known_solution import known_model_and_law

@@ -2,7 +2,7 @@
 
 Usage: bench_facets.py [QUADS ...]. A sheet raised by 4 mm, computed on 3,072 quads without noise,
 is compared with models of fewer quads, whose nodes have the measured surface, at the true law: read
-between their nodes as flat quads, and as fits read them (`meshes/smooth_reading.py`). What the
+between their nodes as flat quads, and as fits read them (`meshes/reading.py`). What the
 moduli would make of the difference follows from the derivatives there, by least squares, slack
 taken for known.
 """
@@ -14,9 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.location import sampling_matrix
-from bubblefit.meshes.smooth_reading import SmoothReading
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.meshes.reading import SmoothReading
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from uneven_test import RANGE, Uneven, model
 

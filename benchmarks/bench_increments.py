@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 from bubblefit.cli.main import main as bubblefit_command
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane import factorisation, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

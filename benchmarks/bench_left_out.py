@@ -21,12 +21,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.fittable import PreparedTest, Weighting
-from bubblefit.fits.project import Project, read_project
-from bubblefit.fits.setup import FitSetup, prepare_fit
+from bubblefit.experiments.kinds import PreparedTest, Weighting
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.folds import best_of
-from bubblefit.studies.held_out import held_out
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.compare import best_of
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.validation import held_out
 from valmex_tests import DATA, FABRIC, FEW, FIT, bubbles, published_strips
 
 STRAIN = 0.06

@@ -27,8 +27,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import cloudpickle
 import counted_program
-from bubblefit.fits.executor import Executor
-from bubblefit.solvers.announcements import hearing
+from bubblefit.runs.executor import Executor
+from bubblefit.solvers.base import hearing
 from bubblefit.solvers.licences import licensed
 from counted_program import CountedSolver, seen
 

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.materials.biaxial_response import biaxial_response
-from bubblefit.materials.designers.ratios import RATIOS, shares
+from bubblefit.materials.designers import RATIOS, shares
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.runs.validation import validate
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.validation import validate
 
 NU, THICKNESS = 0.24, 0.8
 #: MPa: G12, E2 at 1:1, what it gains, E1 at 1:1, what it gains.

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bubblefit.fits.start import run_start
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import bias_strip
+from bubblefit.meshes.strip_models import bias_strip
+from bubblefit.runs.starts import run_start
 from bubblefit.solvers.base import History
 from bubblefit.solvers.marc.deck import TOLERANCE
 from bubblefit.solvers.marc.solver import MarcSolver

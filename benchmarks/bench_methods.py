@@ -11,9 +11,9 @@ import sys
 import time
 
 import numpy as np
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.start import StartRecord
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.starts import StartRecord
 from known_solution import known_project, known_setup
 
 #: Name, how, and what is remarkable about it.

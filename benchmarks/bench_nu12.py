@@ -19,15 +19,13 @@ import numpy as np
 from bubblefit.experiments.biaxial.candidates import candidates as biaxial_candidates
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.bubble.prepared import PreparedBubble
-from bubblefit.experiments.candidates import Planning
-from bubblefit.experiments.fittable import PreparedTest
+from bubblefit.experiments.kinds import Planning, PreparedTest
 from bubblefit.experiments.strips.candidates import candidates
 from bubblefit.experiments.strips.prepared import PreparedStrips
-from bubblefit.fits.schema import UnknownSection, UnknownsSection
-from bubblefit.fits.setup import FitSetup
-from bubblefit.identification.assessment import certainty
-from bubblefit.identification.methods.lm import LevenbergMarquardt
-from bubblefit.identification.verdicts import verdicts
+from bubblefit.inference.assessment import certainty, verdicts
+from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.project.schema import UnknownSection, UnknownsSection
+from bubblefit.runs.setup import FitSetup
 from known_solution import known_project, known_setup
 
 RIGHT, FROM = 0.24, 0.1

@@ -15,20 +15,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import MakeSolver
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.experiments.candidates import Candidate, Planning
-from bubblefit.experiments.fittable import Weighting
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.experiments.kinds import Candidate, MakeSolver, Planning, Weighting
 from bubblefit.experiments.registry import kinds
-from bubblefit.fits.project import Project
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.information import Asked, information_of, summary
-from bubblefit.identification.propagation import POINTS, PRIOR
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.linear import POINTS, PRIOR, Asked, information_of, summary
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.present_tests import Present, present_tests
+from bubblefit.project.project import Project
+from bubblefit.runs.plan import Present, present_tests
+from bubblefit.runs.setup import prepare_fit
 from known_solution import known_project
 
 QUADS = 192  # of the whole disk

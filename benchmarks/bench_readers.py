@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bubblefit.data.fields import read_fields
+from bubblefit.readers.fields import read_fields
 from bubblefit.tests.dic_exports import EXPORTS
 
 

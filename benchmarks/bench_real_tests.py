@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bubblefit.experiments.bubble.sheet_report import fitted_model
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
-from bubblefit.fits.result import Fit
-from bubblefit.meshes.location import sampling_matrix
+from bubblefit.experiments.bubble.findings import fitted_model
+from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.project.project import read_project
+from bubblefit.runs.fit import fit
+from bubblefit.runs.result import Fit
 from valmex_tests import DATA, FABRIC, FEW, FIT, bubbles, published_strips
 
 STRAIN = 0.06

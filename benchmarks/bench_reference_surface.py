@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
+from bubblefit.project.project import read_project
+from bubblefit.runs.fit import fit
 from uneven_test import Uneven, errors, project_text, write_test
 
 PRESSURES = (0.02, 0.05, 0.09, 0.14, 0.19, 0.24)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.start import StartRecord
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.starts import StartRecord
 from known_solution import known_project, known_setup
 
 FOUND = 1e-6

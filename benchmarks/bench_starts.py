@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.setup import FitSetup
-from bubblefit.fits.start import EvaluationRecord, StartRecord, run_start
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.starts import ProposedStarts, RandomStarts, SobolStarts, Starts
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import ProposedStarts, RandomStarts, SobolStarts, Starts
+from bubblefit.runs.setup import FitSetup
+from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 from known_solution import known_project, known_setup
 
 ELEMENTS, EARLIER_SEED, EARLIER, SAME, OTHER = 48, 99, 5, 0.01, 1.3

@@ -12,9 +12,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import Project, read_project
-from bubblefit.identification.assessment import certainty
+from bubblefit.inference.assessment import certainty
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.fit import fit
 
 HERE = Path(__file__).resolve().parent.parent
 DATA = HERE.parent / "shared" / "data" / "uniaxial"

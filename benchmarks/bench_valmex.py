@@ -15,7 +15,7 @@ from typing import Any
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.fits.project import Project
+from bubblefit.project.project import Project
 
 ROOT = Path(__file__).resolve().parent.parent
 PUBLISHED = {1: 1.55, 2: 1.66, 3: 1.70}

@@ -18,11 +18,10 @@ from pathlib import Path
 from types import FrameType
 
 import bubblefit as bf
-from bubblefit.fits.best import best_fit
-from bubblefit.fits.budget import with_certainty
-from bubblefit.fits.result import Fit
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.fits.start import run_start
+from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.result import Fit
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.starts import run_start
 
 ROOT = Path(bf.__file__).resolve().parent
 KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.project import Project, read_project
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.fits.start import EvaluationRecord
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.starts import EvaluationRecord
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "bubble-known-solution"
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
-from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 RADIUS, THICKNESS = 100.0, 0.81

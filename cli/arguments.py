@@ -77,7 +77,7 @@ def with_checks(command: Command, decorators: Sequence[Decorator]) -> Command:
 
 def solver_choice(command: Command) -> Command:
     """The options that pick a solver; the command is given them as one dict, `solver_given`."""
-    from ..solvers.overrides import ANY, command_line
+    from ..solvers.registry import ANY, command_line
 
     known = command_line()
 

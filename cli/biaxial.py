@@ -57,16 +57,15 @@ def command(
     same tests by `bubblefit fit`, and made into such constants by `bubblefit export`.
     """
     from .. import __version__
-    from ..data.biaxial.ratios import plain_ratio
-    from ..experiments.biaxial.evaluated import lines_of, numbers_of, write_tables
-    from ..experiments.biaxial.evaluation import evaluate_test
+    from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of, write_tables
     from ..experiments.biaxial.test import BiaxialTest
-    from ..experiments.exhibit import Output
-    from ..fits.project import read_project
-    from ..fits.store import Store
-    from ..materials.designers.linear import Minimise, Options
+    from ..experiments.kinds import Output
+    from ..materials.designers import Minimise, Options
     from ..notes import lines as note_lines
     from ..notes import write_notes
+    from ..project.project import read_project
+    from ..readers.biaxial import plain_ratio
+    from ..runs.folder import Store
 
     read = read_project(project, data_folders(data))
     chosen = read.chosen(list(tests) or "biaxial", fitted=True)

@@ -72,7 +72,7 @@ def command(over: str, samples: int, seed: int | None, card: str | None, **optio
     optimum, a hundred times. Writes percentile bands of the moduli beside those of the fit:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
-    from ..studies.bootstrap import bootstrap
+    from ..runs.bootstrap import bootstrap
 
     path: Path = options["project"]
     project = read_to_refit(path, options)

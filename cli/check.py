@@ -45,8 +45,8 @@ def command(
     turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
     the output folder. Exit code 2 where a fit would not begin.
     """
-    from ..fits.check import check
-    from ..fits.project import read_project
+    from ..project.project import read_project
+    from ..runs.check import check
 
     found = check(read_project(project, data_folders(data)), tests or None, trust)
     folder = out or folder_beside(project, "check")

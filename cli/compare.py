@@ -43,8 +43,8 @@ def command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any
     a folder for each form, into the output folder.
     """
     from ..notes import lines as note_lines
-    from ..studies.law_words import lines_of
-    from ..studies.laws import STARTS, compare_laws
+    from ..reports.law_page import lines_of
+    from ..runs.compare import STARTS, compare_laws
 
     path: Path = options["project"]
     folder: Path = options["out"] or folder_beside(path, "compared")

@@ -9,12 +9,11 @@ from typing import Any
 import click
 import numpy as np
 
-from ..data.frame_files import frame_files
-from ..data.frames import FrameOptions, read_frames
-from ..data.spheres import Sphere, fit_sphere, points_of
-from ..data.tables import write_table
 from ..errors import InputError, OutputError
-from ..sections import LENGTH_UNITS
+from ..readers.frames import FrameOptions, frame_files, read_frames
+from ..readers.sections import LENGTH_UNITS
+from ..readers.spheres import Sphere, fit_sphere, points_of
+from ..readers.tables import write_table
 from ..writing import replacing
 from .ending import tell
 from .examples import examples
@@ -144,7 +143,7 @@ def _lines(result: dict[str, Any]) -> list[str]:
 def _write(
     out: Path, rows: Sequence[dict[str, Any]], names: Sequence[str], found: Sequence[Sphere]
 ) -> None:
-    from ..reports import plot_spheres
+    from ..reports.sphere import plot_spheres
 
     with replacing(out) as path:
         write_table(path, list(rows[0]), [list(row.values()) for row in rows])

@@ -12,10 +12,9 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from ..solvers.bars import diagnose
 from ..solvers.base import Diagnosis
-from ..solvers.diagnosis import diagnose
-from ..solvers.overrides import command_line
-from ..solvers.registry import solver_names
+from ..solvers.registry import command_line, solver_names
 from .examples import examples
 from .exits import exits
 

@@ -9,8 +9,7 @@ import click
 
 from ..errors import InputError, OutputError
 from ..materials.card import read_card
-from ..materials.exports.base import Export
-from ..materials.exports.formats import Option, options_of
+from ..materials.exports.base import Export, Option, options_of
 from ..notes import rows
 from ..solvers.exports import FORMATS
 from ..writing import replacing

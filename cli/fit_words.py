@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fits.few_strains import answers
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
+from ..runs.result import answers
 from .ending import written_to
 
 if TYPE_CHECKING:
-    from ..fits.result import Fit
+    from ..runs.result import Fit
 
 #: What a modulus is of.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
@@ -35,9 +35,9 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit) -> list[str]:
     """A table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
-    from ..fits.determined import sigma_words
-    from ..identification.bands import LEVEL
-    from ..reports import percent
+    from ..inference.posterior import LEVEL
+    from ..reports.fit_page import sigma_words
+    from ..reports.html import percent
 
     sure = fit.best.certainty
     of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
@@ -82,7 +82,7 @@ def test_lines(fit: Fit) -> list[str]:
 
 def sure_lines(fit: Fit) -> list[str]:
     """Unknowns beside the moduli, and what each test pins down."""
-    from ..fits.determined import sigma_words
+    from ..reports.fit_page import sigma_words
 
     lines = [
         f"{verdict.name}: {verdict.words}"

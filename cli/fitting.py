@@ -34,8 +34,8 @@ from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 
 if TYPE_CHECKING:
-    from ..fits.project import Project
-    from ..fits.result import Fit
+    from ..project.project import Project
+    from ..runs.result import Fit
 
 
 def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -89,9 +89,9 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
     KeyboardInterrupt : after saying how to go on.
     """
-    from ..fits.fit import fit
-    from ..fits.logged import timed
-    from ..fits.store import usual_folder
+    from ..runs.fit import fit
+    from ..runs.folder import usual_folder
+    from ..runs.starts import timed
 
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))

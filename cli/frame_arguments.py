@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from ..data.frames import QUANTITIES
 from ..errors import InputError, OutputError
-from ..sections import LENGTH_UNITS
+from ..readers.frames import QUANTITIES
+from ..readers.sections import LENGTH_UNITS
 from .arguments import Command, Decorator, with_options
 
 

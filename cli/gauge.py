@@ -11,14 +11,16 @@ from typing import Any
 
 import click
 
-from ..data.frame_files import frame_files
-from ..data.frames import QUANTITIES, FrameOptions, read_frames
-from ..data.gauge import virtual_strain_gauge
-from ..data.gauge_loads import PairedLoads, loads_at_frames
-from ..data.gauge_table import GaugeTable
 from ..errors import InputError
+from ..experiments.strips.gauge import (
+    GaugeTable,
+    PairedLoads,
+    loads_at_frames,
+    virtual_strain_gauge,
+)
 from ..notes import lines as note_lines
-from ..sections import LENGTH_UNITS
+from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
+from ..readers.sections import LENGTH_UNITS
 from .ending import tell
 from .examples import examples
 from .exits import exits

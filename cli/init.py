@@ -81,7 +81,7 @@ def command(folder: Path, example: str | None, own: bool, **given: Any) -> None:
 
 
 def _write_own(folder: Path, said: dict[str, Any]) -> None:
-    from ..fits.new_project import writable_kinds, write_project
+    from ..project.new_project import writable_kinds, write_project
     from ..writing import write_text
 
     path = folder / PROJECT

@@ -19,8 +19,8 @@ from rich.progress import (
 )
 
 from ..caching import kernels_are_compiled
-from ..fits.analyses import Step
-from ..solvers.announcements import Announcement, hearing
+from ..runs.simulation import Step
+from ..solvers.base import Announcement, hearing
 from .events import EVENTS
 
 PLAIN_EVERY_S = 60.0

@@ -12,8 +12,8 @@ import click
 from ..errors import InputError, OutputError
 
 if TYPE_CHECKING:
-    from ..fits.project import Project
     from ..materials.card import MaterialCard
+    from ..project.project import Project
 
 #: Where click keeps what was typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
@@ -44,7 +44,7 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 def folder_beside(project: Path, suffix: str) -> Path:
     """The usual output folder of what is no fit: out/NAME-`suffix`."""
-    from ..fits.store import usual_folder
+    from ..runs.folder import usual_folder
 
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")
@@ -77,7 +77,7 @@ def read_with_solver(
     ------
     InputError : in the project, or an option of a solver that does not run.
     """
-    from ..fits.project import read_project
+    from ..project.project import read_project
 
     return with_solver(read_project(path, data, need_data), given)
 

@@ -77,7 +77,7 @@ def command(
     Predicts one standard deviation of E1, E2 and G12 for tests that could be made, from
     derivatives at the fit's card, and ranks them. Writes plan.csv, report.html and result.json.
     """
-    from ..studies.plan import plan
+    from ..runs.plan import plan
 
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))

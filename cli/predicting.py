@@ -27,9 +27,9 @@ from .options import command_line, with_solver
 from .progress import RunsProgress
 
 if TYPE_CHECKING:
-    from ..fits.prediction_result import Predictions
-    from ..fits.project import Project
     from ..materials.card import MaterialCard
+    from ..project.project import Project
+    from ..runs.predictions import Predictions
 
 
 def prediction_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -74,7 +74,7 @@ def run_predictions(
         --fail-above could be about.
     KeyboardInterrupt : after saying how to go on.
     """
-    from ..fits.predictions import measured_tests, predict
+    from ..runs.predictions import measured_tests, predict
 
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):

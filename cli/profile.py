@@ -71,7 +71,7 @@ def command(moduli: tuple[str, ...], strain: str | None, card: str | None, **opt
     goes on until the data contradict or a bound is met. Writes profile.csv, profile.png,
     report.html and result.json.
     """
-    from ..studies.profile import profile
+    from ..runs.profile import profile
 
     path: Path = options["project"]
     project = read_to_refit(path, options)

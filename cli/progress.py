@@ -6,11 +6,11 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from ..fits.start import EvaluationRecord, Stage, StartRecord
+from ..runs.starts import EvaluationRecord, Stage, StartRecord
 from .live_line import CountProgress
 
 if TYPE_CHECKING:
-    from ..fits.predictions import RunEvent
+    from ..runs.predictions import RunEvent
 
 
 class NamedProgress(CountProgress):

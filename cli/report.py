@@ -38,10 +38,10 @@ def command(folders: tuple[Path, ...], kind: str, out: Path | None) -> None:
     """
     import tempfile
 
-    from ..fits.unfinished import page_of_folder
     from ..reports.beside import beside
     from ..reports.html import PAGE, write_page
     from ..reports.pdf import print_page
+    from ..reports.unfinished import page_of_folder
 
     if len(folders) > 2:
         raise InputError(None, "FOLDER", f"give one folder or two, not {len(folders)}")

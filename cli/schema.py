@@ -24,7 +24,7 @@ def command(out: Path | None) -> None:
 
     Editors complete and check a project whose first line names it: #:schema project.schema.json
     """
-    from ..fits.json_schema import schema_text
+    from ..project.schema import schema_text
     from ..writing import write_text
 
     if out is None:

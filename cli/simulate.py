@@ -53,9 +53,9 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, run its tests (of a kind, or those named) with the cards, tell."""
-    from ..fits.cards import chosen_cards
-    from ..fits.kept_analyses import KeptAnalyses
-    from ..fits.simulation import simulate_cards
+    from ..project.cards import chosen_cards
+    from ..runs.folder import KeptAnalyses
+    from ..runs.simulation import simulate_cards
 
     path: Path = options["project"]
     data = data_folders(options["data"])

@@ -14,8 +14,8 @@ from .examples import examples
 from .predicting import prediction_options, run_predictions
 
 if TYPE_CHECKING:
-    from ..fits.project import Project
     from ..materials.card import MaterialCard
+    from ..project.project import Project
 
 #: Stands for the project's file: a project in the folder where the command runs.
 HERE = Path("simulate bend")
@@ -96,11 +96,11 @@ def simulate_bend(
 
 def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
     """A project of one cylinder; complaints name the option instead of a key."""
-    from ..experiments.base import Fabric, Place, Scales
+    from ..experiments.kinds import Fabric, Place, Scales
     from ..experiments.registry import kind_named
-    from ..fits.project import Project
-    from ..fits.schema import FitSection, LawSection
-    from ..section_errors import first_error
+    from ..project.project import Project
+    from ..project.schema import FitSection, LawSection
+    from ..readers.sections import first_error
     from ..solvers.registry import solver_settings
 
     kind = kind_named("cylinder")

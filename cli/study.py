@@ -54,7 +54,7 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def run_study(name: str, study: Callable[..., Any], options: dict[str, Any], **given: Any) -> None:
     """Read the project, run the study, write its folder, tell."""
-    from ..fits.kept_analyses import KeptAnalyses
+    from ..runs.folder import KeptAnalyses
 
     path: Path = options["project"]
     project = read_with_solver(
@@ -118,7 +118,7 @@ def study_mesh(what: What, levels: int, factor: int, coarser: int | None, **opti
     convergence and Richardson's limit. A level whose analysis fails is named and left out; when
     fewer than two end well the exit code is 4.
     """
-    from ..studies.refinement import refine
+    from ..runs.refinement import refine
 
     study = functools.partial(refine, what=what, levels=levels, factor=factor, coarser=coarser)
     run_study(what if what == "increments" else "mesh", study, options)
@@ -143,6 +143,6 @@ def study_nu12(values: tuple[float, ...], **options: Any) -> None:
     values. A value whose analysis fails is named and left out; when the card's own fails, or all
     others do, the exit code is 4.
     """
-    from ..studies.poisson import NU12, vary_nu12
+    from ..runs.poisson import NU12, vary_nu12
 
     run_study("nu12", functools.partial(vary_nu12, values=values or NU12), options)

@@ -13,17 +13,11 @@ from .ending import tell, written_to
 from .examples import examples
 from .exits import resumable
 from .fitting import fit_options, settings_given
-from .options import (
-    command_line,
-    data_folders,
-    folder_beside,
-    read_with_solver,
-    result_folder,
-)
+from .options import command_line, data_folders, folder_beside, read_with_solver, result_folder
 from .progress import FitsProgress
 
 if TYPE_CHECKING:
-    from ..fits.project import Project
+    from ..project.project import Project
 
 
 @click.command(
@@ -70,9 +64,9 @@ def command(
     result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
     over the weight of a kind of test: weights.csv, weights.png, result.json.
     """
-    from ..fits.cards import chosen_cards
     from ..notes import lines as note_lines
-    from ..studies.validation import STARTS, TESTS, judge_cards, validate
+    from ..project.cards import chosen_cards
+    from ..runs.validation import STARTS, TESTS, judge_cards, validate
 
     path: Path = options["project"]
     _one_of(path, {"--card": cards, "--leave": leave, "--weights": weights})
@@ -115,7 +109,7 @@ def _one_of(path: Path, given: Mapping[str, object]) -> None:
 def _weights(counted: str, forms: Sequence[str], options: Mapping[str, Any]) -> None:
     """The study of the weight of a kind of test."""
     from ..notes import lines as note_lines
-    from ..studies.weights import STARTS, weight_study
+    from ..runs.weights import STARTS, weight_study
 
     path = options["project"]
     _one_of(path, {"--form": forms, "--weights": counted})

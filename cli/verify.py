@@ -9,7 +9,8 @@ from pathlib import Path
 
 import click
 
-from ..studies.verification import SUBJECTS, Number, numbers
+from ..runs.verification import SUBJECTS, numbers
+from ..runs.verification.number import Number
 from .examples import examples
 from .exits import WORSE, exits
 

@@ -16,8 +16,8 @@ from typing import Any, cast
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.fittable import FittableTest
-from bubblefit.fits.law import law_of
+from bubblefit.experiments.kinds import FittableTest
+from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from PIL import Image
 from scipy.interpolate import CloughTocher2DInterpolator

@@ -10,8 +10,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from ..errors import InputError, PlugInFailure
-from ..plugins import Group, PlugIn, names_with, plug_in_named, plug_ins
-from .base import Kind
+from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
+from .kinds import Kind
 
 GROUP: Group = "bubblefit.tests"
 #: What a plug-in's kind must have to be one.

@@ -25,10 +25,12 @@ from ..errors import InputError
 from .forms.base import (
     COMPONENTS,
     EVEN,
+    RATIO_ENDS,
     SHEAR,
     UNLIMITED,
     Form,
     held_strain,
+    map_in_range,
     modulus_rows,
     pieces_of,
     ratio_map,
@@ -278,3 +280,56 @@ def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignor
         ):  # fmt: skip
             pk2[i], stiffness[i], strain[i], stress[i] = np.nan, np.nan, np.nan, np.nan
     return pk2, stiffness, strain, stress
+
+
+def law_slopes(
+    law: HypoelasticLaw, parameters: Sequence[str], thickness: float
+) -> tuple[Array, Array]:
+    """Derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling` (3, np).
+
+    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm, of a sheet that is
+    `thickness` mm thick); by any other they are zero.
+    """
+    of_beta = map_in_range(law.form, law.strain_range.tolist())
+    rows = np.zeros((*of_beta.shape[:3], len(parameters)))
+    coupling, gains = np.zeros((3, len(parameters))), ratio_map(law.form)
+    for j, name in enumerate(parameters):
+        if name.startswith("beta_"):
+            place = int(name.removeprefix("beta_"))
+            rows[..., j], coupling[1:, j] = of_beta[..., place], gains[:, place]
+        elif name == "nu12":
+            coupling[0, j] = 1.0
+        elif name == "thickness":
+            # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
+            # (its stress is another, but nothing that takes this derivative is told of stress).
+            rows[..., j] = of_beta @ law.beta / thickness
+            coupling[1:, j] = law.coupling[1:] / thickness
+    return rows, coupling
+
+
+#: How far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
+DEFINITE = 1.02
+
+
+def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Array:
+    """(n, size): the law is positive definite in a pull along either yarn where rows @ beta >= 0.
+
+    That is E1 E2 > (nu12 E2)^2. A fabric that is pulled contracts, so that the modulus across is
+    that at zero strain, and the condition is linear: E1(0) > nu12^2 E2(eps2) in a pull along the
+    fill, E1(eps1) > nu12^2 E2(0) along the warp. Moduli that go with the load ratio are those of
+    the pull, and those of equal loads without strain, where every path begins.
+    """
+    share = DEFINITE * nu12**2
+    none, most = RATIO_ENDS
+
+    def rows(name: str, strain: ArrayLike, ratio: float) -> Array:
+        return modulus_rows(form, name, strain, strain_range, ratio)
+
+    warp, fill = (form.grid(k, strain_range[k]) for k in range(2))
+    return np.vstack(
+        [
+            rows("E1", [0.0], none) - share * rows("E2", fill, most),
+            rows("E1", warp, most) - share * rows("E2", [0.0], none),
+            rows("E1", [0.0], EVEN) - share * rows("E2", [0.0], EVEN),
+        ]
+    )

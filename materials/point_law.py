@@ -17,10 +17,289 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..caching import compiled
-from .point_moduli import increment_modulus
-from .point_ratio import mean_ratio
+from .forms.base import EVEN
+
+# The tangent modulus of one increment at one integration point, compiled.
+#
+# `pieces` (3, P, 5) is a law's three moduli as piecewise cubics, as `forms.base.pieces_of` writes
+# them: by component 0 (E1 of eps1), 1 (E2 of eps2) and 2 (G12 of gamma12, even in it) the upper
+# end of each piece and its four coefficients, highest power of the strain first. Below zero strain
+# and beyond the last end a modulus is held.
+#
+# The modulus of an increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F
+# its integral. So a bar has the exact stress in any number of increments, a modulus that jumps
+# gives a stress that does not, and d(stress)/d(strain) is the modulus at the END of the increment.
 
 Array = NDArray[np.float64]
+
+#: An increment of strain across the end of a piece is not divided by where it is smaller.
+TINY = 1e-12
+
+
+@compiled()
+def _place(pieces: Array, component: int, x: float) -> int:
+    """The piece that holds at x; the last one beyond the range, the first below zero."""
+    k, last = 0, pieces.shape[1] - 1
+    while k < last and x > pieces[component, k, 0]:
+        k += 1
+    return k
+
+
+@compiled()
+def _means(a: float, b: float) -> tuple[float, float, float]:
+    """Means of x^3, x^2 and x between a and b."""
+    total, squares = a + b, a * a + b * b
+    return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
+
+
+@compiled()
+def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) -> float:
+    third, second, first = _means(a, b)
+    value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
+    return value + pieces[component, k, 3] * first + pieces[component, k, 4]
+
+
+@compiled()
+def point_modulus(pieces: Array, component: int, x: float) -> float:
+    """The modulus at the strain x."""
+    size = abs(x) if component == 2 else x
+    held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
+    k = _place(pieces, component, held)
+    value = pieces[component, k, 1] * held + pieces[component, k, 2]
+    return (value * held + pieces[component, k, 3]) * held + pieces[component, k, 4]
+
+
+@compiled()
+def _integral(pieces: Array, component: int, low: float, high: float) -> float:
+    """Integral of the modulus from low to high, the sum over the pieces on the way."""
+    total, start = 0.0, 0.0
+    if low < 0.0:
+        total += (min(high, 0.0) - low) * pieces[component, 0, 4]
+    for k in range(pieces.shape[1]):
+        end = pieces[component, k, 0]
+        a, b = max(low, start), min(high, end)
+        if b > a:
+            total += (b - a) * _mean_of_piece(pieces, component, k, a, b)
+        start = end
+    if high > start:
+        total += (high - max(low, start)) * point_modulus(pieces, component, start)
+    return total
+
+
+@compiled()
+def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
+    """As `increment_modulus`, for an increment that leaves a piece."""
+    change = x - x_old
+    if abs(change) < TINY:
+        return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
+    if component == 2 and x * x_old < 0.0:
+        whole = _integral(pieces, 2, 0.0, abs(x)) + _integral(pieces, 2, 0.0, abs(x_old))
+    elif component == 2:
+        a, b = abs(x), abs(x_old)
+        whole = _integral(pieces, 2, min(a, b), max(a, b))
+    else:
+        whole = _integral(pieces, component, min(x, x_old), max(x, x_old))
+    mean = whole / abs(change)
+    ahead = (point_modulus(pieces, component, x) - mean) / change
+    behind = (mean - point_modulus(pieces, component, x_old)) / change
+    return mean, ahead, behind
+
+
+@compiled()
+def increment_modulus(
+    pieces: Array, component: int, x: float, x_old: float
+) -> tuple[float, float, float]:
+    """Mean modulus from x_old to x, and its derivatives by x and by x_old.
+
+    These are (E(x) - mean)/(x - x_old) and (mean - E(x_old))/(x - x_old). Inside one piece all
+    three are polynomials of both strains, so that nothing cancels however small the increment.
+    """
+    a, b, sign = x_old, x, 1.0
+    if component == 2 and x <= 0.0 and x_old <= 0.0:
+        a, b, sign = -x_old, -x, -1.0
+    end = pieces[component, pieces.shape[1] - 1, 0]
+    # A strain that is not a number fails these comparisons, and the mean is not a number.
+    if component != 2 and a <= 0.0 and b <= 0.0:
+        return pieces[component, 0, 4], 0.0, 0.0
+    if a >= end and b >= end:
+        return point_modulus(pieces, component, end), 0.0, 0.0
+    low, high = min(a, b), max(a, b)
+    k = _place(pieces, component, high)
+    start = pieces[component, k - 1, 0] if k > 0 else 0.0
+    if not (low >= start and high <= pieces[component, k, 0]):
+        return _across(pieces, component, x, x_old)
+    third, second, first = (
+        pieces[component, k, 1], pieces[component, k, 2], pieces[component, k, 3]
+    )  # fmt: skip
+    mean = _mean_of_piece(pieces, component, k, a, b)
+    ab, aa, bb = 2.0 * a * b, a * a, b * b
+    ahead = third * (0.25 * (aa + ab + 3.0 * bb)) + second * ((a + 2.0 * b) * (1.0 / 3.0))
+    behind = third * (0.25 * (3.0 * aa + ab + bb)) + second * ((2.0 * a + b) * (1.0 / 3.0))
+    return mean, sign * (ahead + 0.5 * first), sign * (behind + 0.5 * first)
+
+
+@compiled()
+def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
+    third, second, first = _means(a, b)
+    weights[k, 0] += share * third
+    weights[k, 1] += share * second
+    weights[k, 2] += share * first
+    weights[k, 3] += share
+
+
+@compiled()
+def _add_way(
+    pieces: Array, component: int, low: float, high: float, whole: float, weights: Array
+) -> None:
+    """Add what the way from low to high, part of one of the length `whole`, has of each piece."""
+    start = 0.0
+    if low < 0.0:
+        _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
+    for k in range(_place(pieces, component, high) + 1):
+        end = pieces[component, k, 0]
+        a, b = max(low, start), min(high, end)
+        if b > a:
+            _add(weights, k, (b - a) / whole, a, b)
+        if high > end and k == pieces.shape[1] - 1:
+            _add(weights, k, (high - max(low, end)) / whole, end, end)
+        start = end
+
+
+@compiled()
+def by_pieces(
+    pieces: Array, component: int, x: float, x_old: float, weights: Array
+) -> tuple[int, int]:
+    """Derivative of the mean modulus by the coefficients of each piece, into weights (P, 4).
+
+    Returns the first piece on the way and the one after the last; the others are not written.
+    """
+    a, b, whole = x_old, x, abs(x - x_old)
+    if component == 2 and x * x_old >= 0.0:
+        a, b = abs(x_old), abs(x)
+    if whole < TINY:
+        a = b = 0.5 * (a + b)
+    low, high = min(a, b), max(a, b)
+    k = _place(pieces, component, high)
+    start = pieces[component, k - 1, 0] if k > 0 else 0.0
+    if low >= start and high <= pieces[component, k, 0]:
+        weights[k, 0], weights[k, 1], weights[k, 2] = _means(a, b)
+        weights[k, 3] = 1.0
+        return k, k + 1
+    turns = component == 2 and low < 0.0  # the shear changes its sign
+    first = 0 if turns else _place(pieces, component, low)
+    stop = max(k, _place(pieces, component, -low)) + 1 if turns else k + 1
+    for i in range(first, stop):
+        weights[i] = 0.0
+    if whole < TINY:
+        held = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
+        _add(weights, stop - 1, 1.0, held, held)
+    elif turns:
+        _add_way(pieces, 2, 0.0, high, whole, weights)
+        _add_way(pieces, 2, 0.0, -low, whole, weights)
+    else:
+        _add_way(pieces, component, low, high, whole, weights)
+    return first, stop
+
+
+# The load ratio of one increment at one integration point, compiled.
+#
+# Stresses s1, s2 along warp and fill have the normalised load ratios
+#
+#     gamma1 = s1 / sqrt(s1^2 + s2^2) = cos(angle),    gamma2 = s2 / sqrt(s1^2 + s2^2) = sin(angle),
+#
+# an angle from 0 (only the warp carries) to a right angle (only the fill does). They are ratios of
+# tension: a yarn that is pressed beside one that is pulled counts as one without load, where both
+# are pressed the ratios are those of |s2| : |s1| (so they stay continuous), and without any stress
+# the ratio is 1:1.
+#
+# An increment takes the ratio of its MEAN stress, (s_old + s_new)/2, so that a path on which the
+# stresses grow in proportion has constant moduli in any number of increments, and the error on
+# others goes with the square of the increment. s_new depends on the moduli and they on it: the
+# angle is the root of one equation, which there always is, because the angle of the mean stress is
+# between 0 and a right angle whatever the moduli.
+
+RIGHT = 0.5 * math.pi
+#: Steps to the angle; half the range each, where Newton's leave it.
+ROUNDS = 60
+#: Radians.
+ROUNDING = 1e-15
+
+
+@compiled()
+def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
+    """The angle of the load ratio of two stresses, and its derivatives by them."""
+    square = warp * warp + fill * fill
+    if warp > 0.0 or fill > 0.0:
+        if warp <= 0.0:
+            return RIGHT, 0.0, 0.0
+        if fill <= 0.0:
+            return 0.0, 0.0, 0.0
+        if square == 0.0:
+            return math.atan2(fill, warp), 0.0, 0.0
+        return math.atan2(fill, warp), -fill / square, warp / square
+    if square == 0.0:
+        return 0.5 * RIGHT, 0.0, 0.0
+    # A stress that is not a number gives an angle that is none.
+    return math.atan2(-warp, -fill), fill / square, -warp / square
+
+
+@compiled()
+def mean_ratio(
+    warp: float, fill: float, coupling: Array, old0: float, old1: float, dh0: float, dh1: float
+) -> tuple[float, float, float, float, float, float]:
+    """The load ratio of an increment's mean stress, and how the stress depends on itself by it.
+
+    warp, fill : E1, E2 at 1:1, MPa; old0, old1 : stress at the start; dh0, dh1 : strain increment.
+
+    Returns gamma1 and gamma2 less those at 1:1; u (2), half the derivative of the stress by the
+    angle; w (2), such that a change r of the stress at a fixed ratio is a change r + u (w . r) of
+    it altogether. gamma1 is not a number where a modulus, or 1 - nu12 nu21, is not positive on
+    the way.
+    """
+    nu = coupling[0]
+    angle = load_angle(old0, old1)[0]
+    low, high = 0.0, RIGHT
+    u0 = u1 = w0 = w1 = turn = cosine = sine = 0.0
+    for _ in range(ROUNDS):
+        cosine, sine = math.cos(angle), math.sin(angle)
+        e1, e2 = warp + coupling[1] * (cosine - EVEN), fill + coupling[2] * (sine - EVEN)
+        if not (e1 > 0.0 and e2 > 0.0):
+            return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
+        nu_nu = nu * nu * e2 / e1
+        if not 1.0 - nu_nu > 1e-3:
+            return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
+        inv = 1.0 / (1.0 - nu_nu)
+        d11, d22 = e1 * inv, e2 * inv
+        d12 = nu * d22
+        # By the angle: E1 loses what its ratio loses, E2 gains what its ratio gains.
+        by1, by2 = -coupling[1] * sine, coupling[2] * cosine
+        inv2 = inv * inv
+        d11_by = (inv - nu_nu * inv2) * by1 + nu * nu * inv2 * by2
+        d22_by = -nu_nu * inv2 * (e2 / e1) * by1 + inv2 * by2
+        u0 = 0.5 * (d11_by * dh0 + nu * d22_by * dh1)
+        u1 = 0.5 * (nu * d22_by * dh0 + d22_by * dh1)
+        mean0 = old0 + 0.5 * (d11 * dh0 + d12 * dh1)
+        mean1 = old1 + 0.5 * (d12 * dh0 + d22 * dh1)
+        at, w0, w1 = load_angle(mean0, mean1)
+        turn = 1.0 - (w0 * u0 + w1 * u1)
+        off = at - angle
+        if abs(off) <= ROUNDING or not off == off:
+            break
+        if off > 0.0:
+            low = angle
+        else:
+            high = angle
+        ahead = angle + off / turn if turn > 0.0 else -1.0
+        if not (low < ahead < high):
+            # The ends are angles of their own, where one yarn carries all.
+            ahead = at if (at == 0.0 or at == RIGHT) and low <= at <= high else 0.5 * (low + high)
+        if abs(ahead - angle) <= ROUNDING:
+            break
+        angle = ahead
+    if not turn > 0.0:
+        return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
+    return cosine - EVEN, sine - EVEN, u0, u1, w0 / turn, w1 / turn
+
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities.
 SLOPES = 19

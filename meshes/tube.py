@@ -1,17 +1,29 @@
-"""Half of a tube along z as a grid of quads, and the half disk that closes its end.
+"""The cylinder of the bending test: a tube with a seam, closed by flat caps.
 
-Angles go from the bottom (y < 0) by the side x > 0 to the top.
+Axes: z along the cylinder, y up (the collar pushes along -y), x sideways; the origin is the middle
+of the axis. The seam lies at the bottom, on the supports (thesis section 6.2). The planes of
+symmetry of three-point bending are x = 0, the vertical one through the axis, and z = 0, mid-span.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Real
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import divided_quarter_disk
-from .mirror import snapped, with_mirror_image
+from ..errors import InputError
+from .disk import divided_quarter_disk
+from .mesh import Mesh, snapped, with_mirror_image
+
+# Half of a tube along z as a grid of quads, and the half disk that closes its end.
+#
+# Angles go from the bottom (y < 0) by the side x > 0 to the top.
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -77,3 +89,326 @@ def with_cap(
     number[~rim] = len(points) + np.arange(np.count_nonzero(~rim))
     inner = np.column_stack([flat[~rim], np.full(np.count_nonzero(~rim), end)])
     return np.concatenate([points, inner]), np.concatenate([quads, number[pattern]]), len(quads)
+
+
+#: mm of element size for each mm away from a refined zone: neighbours differ by less than half.
+GROWTH = 0.35
+#: Points at which the wanted density of rows is looked at, for each row.
+SAMPLES = 20
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Small elements around a place on the axis, and a row of nodes exactly there.
+
+    Parameters
+    ----------
+    name : of the node set that holds the row.
+    position : mm from the middle, 0 or more.
+    reach : mm to either side in which the elements are small; beyond, they grow.
+    size : mm along the axis.
+
+    Raises
+    ------
+    InputError : a name that is not letters, digits and _; lengths that are negative or no numbers.
+    """
+
+    name: str
+    position: float
+    reach: float
+    size: float
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name.isidentifier()):
+            problem = f"expected a name of letters, digits and _, got {self.name!r}"
+            raise InputError(None, "refinements", problem)
+        for field in ("position", "reach"):
+            if not 0 <= getattr(self, field) < math.inf:
+                problem = f"expected 0 mm or more, got {getattr(self, field)!r}"
+                raise InputError(None, f"refinements.{self.name}.{field}", problem)
+        if not 0 < self.size < math.inf:
+            problem = f"expected a length above 0 mm, got {self.size!r}"
+            raise InputError(None, f"refinements.{self.name}.size", problem)
+
+
+def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Array:
+    """Positions of rows from 0 to `end`, `size` apart and closer at the refinements.
+
+    Parameters
+    ----------
+    end, size : mm.
+
+    Returns
+    -------
+    (rows,) mm, increasing, with 0, `end` and the position of every refinement among them.
+
+    Raises
+    ------
+    InputError : a refinement beyond the end, or nearer than half its size to the end or another.
+    """
+    places = sorted({0.0, float(end)} | {float(r.position) for r in refinements})
+    for r in refinements:
+        if r.position > end:
+            problem = f"{r.position:g} mm lies beyond the end, {end:g} mm from the middle"
+            raise InputError(None, f"refinements.{r.name}.position", problem)
+        gap = min(abs(p - r.position) for p in places if p != r.position)
+        if gap < 0.5 * r.size:
+            problem = (
+                f"{r.position:g} mm is {gap:.3g} mm from the end, the middle or another row, less"
+                f" than half an element of {r.size:g} mm; move it or make it the same place"
+            )
+            raise InputError(None, f"refinements.{r.name}.position", problem)
+    pieces = [_between(a, b, size, refinements) for a, b in pairwise(places)]
+    return np.concatenate([[0.0], *pieces])
+
+
+def _between(start: float, end: float, size: float, refinements: Sequence[Refinement]) -> Array:
+    """Rows after `start` up to `end`: equal parts of the integral of the wanted density."""
+    finest = min([size, *(r.size for r in refinements)])
+    count = max(SAMPLES, math.ceil(SAMPLES * (end - start) / finest))
+    z = np.linspace(start, end, count + 1)
+    wanted = np.full(len(z), float(size))
+    for r in refinements:
+        beyond = np.maximum(np.abs(z - r.position) - r.reach, 0.0)
+        wanted = np.minimum(wanted, r.size + GROWTH * beyond)
+    density = 1 / wanted
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(z))])
+    parts = max(1, round(total[-1]))
+    places = np.interp(np.linspace(0.0, total[-1], parts + 1)[1:], total, z)
+    places[-1] = end
+    return np.asarray(places)
+
+
+Masks = dict[str, NDArray[np.bool_]]
+
+MAX_ELEMENTS = 1_000_000
+#: Core divisions of a cap, at least: eight quads around half of the tube.
+FEWEST = 2
+#: How much longer than asked for a side around the tube may be: where a whole number does not go
+#: around, rather more quads than longer ones.
+LONGEST = 1.05
+#: Half of the seam in sides, at least: with less the cap's quads next to it are bad.
+NARROWEST = 0.25
+#: Directions of the warp yarn that are symmetric in both planes.
+CAP_WARP = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+OTHER_SETS = ("body", "seam", "caps", "symmetry_x", "symmetry_z")
+
+
+def cylinder_mesh(
+    length: float,
+    diameter: float,
+    size: float,
+    seam_width: float = 0.0,
+    symmetry: Literal["quarter", "full"] = "quarter",
+    refinements: Sequence[Refinement] = (),
+    cap_warp: Literal["x", "y"] = "x",
+    around: float = 1.0,
+) -> Mesh:
+    """Mesh the middle surface of a cylinder with flat caps.
+
+    The nodes of the tube lie a little further out than the radius, so that its cross-sections and
+    the caps, which are polygons, have the area of the circle, and the cylinder its volume.
+
+    Parameters
+    ----------
+    length, diameter : mm, of the whole cylinder before inflation.
+    size : mm, of an element.
+    seam_width : mm around the tube, centred at the bottom; its edges are rows of nodes.
+    symmetry : the quarter x, z >= 0, or the whole: the quarter mirrored twice.
+    refinements : places along the half z >= 0 with smaller elements (supports, collar).
+    cap_warp : axis that the warp yarn of the caps follows.
+    around : sides around the tube, in sizes: a whole number of quads, a multiple of eight, goes
+        around it, at most 5 % longer where the seam lets them. The caps' quads are as large.
+
+    Returns
+    -------
+    Mesh : normals out of the cylinder; `warp` is z on the tube and as given on the caps. Element
+        sets, which share no quad: `body`, `seam` (where there is one), `caps`. Node sets: the
+        nodes of each of them, `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`,
+        `bottom_line` and `side_line` (along the tube: highest, lowest, at y = 0), `cap_centres`,
+        by the name of each refinement its row of nodes, on the whole cylinder at z and -z, and
+        NAME_bottom, the lowest of them; on a quarter also `symmetry_x` (nodes on x = 0, where
+        u_x = 0) and `symmetry_z` (on z = 0).
+
+    Raises
+    ------
+    InputError : lengths that are not positive, elements larger than the radius or too many of
+        them, a seam too narrow for them or wider than a quarter of the tube, refinements that do
+        not fit or share a name.
+    """
+    _check(length, diameter, size, seam_width, symmetry, cap_warp, around)
+    radius = 0.5 * diameter
+    z = rows(0.5 * length, size, refinements)
+    n = max(FEWEST, math.ceil(math.pi * radius / (4 * LONGEST * around * size)))
+    if 8 * n * (len(z) - 1) + 3 * n * n > MAX_ELEMENTS:
+        problem = f"{size:g} mm gives more than {MAX_ELEMENTS} elements a half; make them larger"
+        raise InputError(None, "size", problem)
+    angle = angles(n, 0.5 * seam_width / radius)
+    points, quads, grid = tube_grid(angle, z, of_equal_area(angle, radius))
+    points, quads, tube = with_cap(points, quads, grid, angle, n)
+
+    seam = np.zeros(len(quads), bool)
+    if seam_width:
+        seam[:tube] = np.tile(angle[1:] <= 0.5 * seam_width / radius * (1 + NEAR), len(z) - 1)
+    cap = np.arange(len(quads)) >= tube
+    elements: Masks = {"body": ~seam & ~cap, "caps": cap} | ({"seam": seam} if seam_width else {})
+    nodes = {name: np.isin(np.arange(len(points)), quads[m]) for name, m in elements.items()}
+    nodes |= _lines(len(points), grid, points, z, refinements)
+    if symmetry == "full":
+        for axis in (0, 2):
+            points, quads, source = with_mirror_image(points, quads, axis)
+            nodes = {name: mask[source] for name, mask in nodes.items()}
+            elements = {name: np.tile(mask, 2) for name, mask in elements.items()}
+    else:
+        nodes |= {"symmetry_x": points[:, 0] == 0, "symmetry_z": points[:, 2] == 0}
+    warp = np.where(elements["caps"][:, None], CAP_WARP[cap_warp], (0.0, 0.0, 1.0))
+    return Mesh(
+        points,
+        quads,
+        {name: np.flatnonzero(mask) for name, mask in nodes.items()},
+        {name: np.flatnonzero(mask) for name, mask in elements.items()},
+        warp,
+    )
+
+
+def _check(
+    length: float,
+    diameter: float,
+    size: float,
+    seam_width: float,
+    symmetry: str,
+    cap_warp: str,
+    around: float,
+) -> None:
+    lengths = {"length": length, "diameter": diameter, "size": size, "seam_width": seam_width}
+    for name, value in lengths.items():
+        number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or value < 0 or (value == 0 and name != "seam_width"):
+            least = "0 mm or more" if name == "seam_width" else "a length above 0 mm"
+            raise InputError(None, name, f"expected {least}, got {value!r}")
+    if not size <= 0.5 * min(diameter, length):
+        problem = f"expected at most the radius and half the length, got {size:g} mm"
+        raise InputError(None, "size", problem)
+    if not 0 < around <= 1:
+        raise InputError(None, "around", f"expected above 0 and at most 1, got {around!r}")
+    if seam_width > math.pi * diameter / 4:
+        problem = f"{seam_width:g} mm is more than a quarter of the tube's circumference"
+        raise InputError(None, "seam_width", problem)
+    if 0 < seam_width < 2 * NARROWEST * around * size:
+        problem = (
+            f"{seam_width:g} mm is too narrow for elements of {size:g} mm; make them"
+            f" {seam_width / (2 * NARROWEST * around):g} mm or smaller"
+        )
+        raise InputError(None, "seam_width", problem)
+    for name, choice, choices in (
+        ("symmetry", symmetry, ("quarter", "full")),
+        ("cap_warp", cap_warp, tuple(CAP_WARP)),
+    ):
+        if choice not in choices:
+            raise InputError(None, name, f"expected {' or '.join(choices)}, got {choice!r}")
+
+
+def _lines(
+    count: int, grid: Numbers, points: Array, z: Array, refinements: Sequence[Refinement]
+) -> Masks:
+    """Node sets of the tube's rows and of the caps' centres."""
+    middle = grid.shape[1] // 2
+    members = {
+        "ends": grid[-1],
+        "mid_span": grid[0],
+        "bottom_line": grid[:, 0],
+        "side_line": grid[:, middle],
+        "top_line": grid[:, -1],
+        "cap_centres": np.flatnonzero((points[:, :2] == 0).all(axis=1)),
+    }
+    for r in refinements:
+        row = grid[int(np.argmin(np.abs(z - r.position)))]
+        fresh = {r.name: row, f"{r.name}_bottom": row[:1]}
+        if not fresh.keys().isdisjoint({*members, *OTHER_SETS}):
+            raise InputError(None, "refinements", f"{r.name!r} is the name of another node set")
+        members |= fresh
+    return {name: np.isin(np.arange(count), nodes) for name, nodes in members.items()}
+
+
+def merged(points: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes at one place made one."""
+    _, first, inverse = np.unique(
+        np.round(points, 6), axis=0, return_index=True, return_inverse=True
+    )
+    return points[first], inverse.ravel()[quads]
+
+
+def block(surface: np.ndarray, first: int) -> np.ndarray:
+    """Quads of a grid of points (rows, columns, 3) numbered from `first`."""
+    rows, columns = surface.shape[:2]
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel() + first
+    return np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=1)
+
+
+def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
+    """Blocks joined, outward seen from the middle of the surface; sets by plane and pole."""
+    starts = np.cumsum([0] + [b.shape[0] * b.shape[1] for b in blocks])
+    points = np.concatenate([b.reshape(-1, 3) for b in blocks])
+    quads = np.concatenate([block(b, s) for b, s in zip(blocks, starts, strict=False)])
+    points, quads = merged(points, quads)
+    p = points[quads]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    inward = np.einsum("mk,mk->m", normal, p.mean(axis=1)) < 0
+    quads[inward] = quads[inward, ::-1]
+    sets = {
+        f"symmetry_{n}": np.flatnonzero(np.abs(points[:, k]) < 1e-6) for k, n in enumerate("xyz")
+    }
+    return Mesh(points, quads, sets)
+
+
+def sphere_octant(n: int, radius: float) -> Mesh:
+    """3 n^2 facets of a cube blown up, in x, y, z >= 0."""
+    side = np.tan(np.linspace(0, np.pi / 4, n + 1))
+    a, b = np.meshgrid(side, side, indexing="ij")
+    cube = np.stack([np.ones_like(a), a, b], axis=-1)
+    patch = radius * cube / np.linalg.norm(cube, axis=2, keepdims=True)
+    return surface_mesh([np.roll(patch, k, axis=2) for k in range(3)])
+
+
+def half_tube(across: int, along: int, radius: float, length: float, caps: bool = True) -> Mesh:
+    """x >= 0 half of a tube along z from 0 to length, at `length` a flat cap (or nothing).
+
+    `across` facets (a multiple of 4) around the half circle; set "end" at z = length, "foot" on
+    the lowest line.
+    """
+    angle = np.linspace(-np.pi / 2, np.pi / 2, across + 1)
+    circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    circle[[0, -1], 0] = 0.0
+    z = np.linspace(0, length, along + 1)
+    side = np.empty((across + 1, along + 1, 3))
+    side[..., :2], side[..., 2] = circle[:, None], z
+    blocks = [side]
+    if caps:
+        quarter, c = across // 4, 0.5 * radius
+        up = np.linspace(-c, c, across - 2 * quarter + 1)
+        out = np.linspace(0, c, quarter + 1)
+        core = np.concatenate(
+            [
+                np.stack([out, np.full_like(out, -c)], axis=1),
+                np.stack([np.full_like(up, c), up], axis=1)[1:-1],
+                np.stack([out, np.full_like(out, c)], axis=1)[::-1],
+            ]
+        )
+        share = np.linspace(0, 1, max(2, quarter) + 1)[None, :, None]
+        rings = circle[:, None] * (1 - share) + core[:, None] * share
+        square = np.stack(np.meshgrid(out, up, indexing="ij"), axis=-1)
+        blocks += [np.dstack([flat, np.full(flat.shape[:2], length)]) for flat in (rings, square)]
+    mesh = surface_mesh(blocks)
+    p = mesh.points
+    sets = {
+        **mesh.node_sets,
+        "end": np.flatnonzero(p[:, 2] > length - 1e-6),
+        "foot": np.flatnonzero((np.abs(p[:, 0]) < 1e-6) & (p[:, 1] < -radius + 1e-6)),
+    }
+    return Mesh(p, mesh.quads, sets)
+
+
+def tube_warp(mesh: Mesh, length: float) -> np.ndarray:
+    """Warp along the tube; along x in the cap."""
+    cap = mesh.points[mesh.quads][..., 2].min(axis=1) > length - 1e-6
+    return np.where(cap[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

@@ -1,28 +1,11 @@
 """Figures, the page and VTU files."""
 
 from .beam import BeamBodies, plot_beam
-from .bending import (
-    BendLine,
-    BendPanel,
-    BendReadings,
-    plot_bending,
-    plot_bending_cases,
-    plot_gas,
-)
+from .bending import BendLine, BendPanel, BendReadings, plot_bending, plot_bending_cases, plot_gas
 from .biaxial import BiaxialPanel, plot_biaxial
 from .charts import Chart, Charts, Series, dots, line
 from .clock import plot_clock
-from .content import (
-    Download,
-    Facts,
-    Listing,
-    Picture,
-    Report,
-    Section,
-    Table,
-    Words,
-    pictures,
-)
+from .content import Download, Facts, Listing, Picture, Report, Section, Table, Words, pictures
 from .convergence import ConvergencePanel, plot_convergence
 from .curves import plot_curves
 from .html import percent, write_report

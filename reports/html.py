@@ -13,7 +13,7 @@ from typing import Any
 
 from jinja2 import FileSystemLoader
 
-from ..rendering import TEMPLATES, environment
+from ..files import TEMPLATES, environment
 from ..writing import replacing
 from .chart_svg import chart_svg
 from .content import Report

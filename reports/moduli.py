@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
-from ..identification.bands import LEVEL
+from ..inference.posterior import LEVEL
 from .style import BLACK, SKY, VERMILION, named_look, new_figure, quiet, save
 
 Array = NDArray[np.float64]

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
+from ..meshes.mesh import Mesh, log_strain_of
 from ..notes import Note
+from .membrane.kernel import reference_elements
 
 Array = NDArray[np.float64]
 
@@ -248,3 +253,124 @@ class DifferentiatingSolver(Solver, Protocol):
         The parameters are every entry of the law's beta unless given; those of `parameters_of`.
         """
         ...
+
+
+T = TypeVar("T")
+
+
+def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
+    """The entry for a model's class, or for the nearest class that it is made from.
+
+    Raises
+    ------
+    SolverFailure : there is none; says what the solver runs.
+    """
+    for kind in type(model).__mro__:
+        if kind in analyses:
+            return analyses[kind]
+    known = ", ".join(kind.__name__ for kind in analyses)
+    raise SolverFailure(f"cannot run a {type(model).__name__}, only: {known}", solver)
+
+
+# What is said while something runs, to whoever hears it: that a run waits, that a worker is gone.
+#
+# Where nobody listens it goes to the log, as a warning. A process that works for another has a
+# listener that passes it on.
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Announcement:
+    """One line, or a state that begins or is over.
+
+    words : the line. of : who is in this state, until one comes with no words; "" : it is said
+    once, and is no state.
+    """
+
+    words: str
+    of: str = ""
+
+
+Listener = Callable[[Announcement], None]
+
+
+def _log(said: Announcement) -> None:
+    if said.words:
+        log.warning("%s", said.words)
+
+
+_listener: ContextVar[Listener] = ContextVar("listener", default=_log)
+
+
+@contextmanager
+def hearing(listener: Listener) -> Iterator[None]:
+    """Whatever is announced within goes to `listener`."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)
+
+
+def announce(words: str, of: str = "") -> None:
+    """Say it to whoever listens."""
+    _listener.get()(Announcement(words, of))
+
+
+def pass_on(said: Announcement) -> None:
+    """Say what another process has announced."""
+    _listener.get()(said)
+
+
+def cell_blocks(
+    path: Path,
+    numbers: NDArray[np.int64],
+    elements: Iterable[tuple[int, NDArray[np.int64]]],
+    names: Mapping[int, tuple[str, tuple[int, ...] | None]],
+) -> list[tuple[str, NDArray[Any]]]:
+    """Runs of elements of one type, their nodes counted from 0.
+
+    Parameters
+    ----------
+    numbers : (n,) of the nodes in the file, increasing.
+    names : by the file's type: meshio's name, and its order of the nodes where it differs.
+
+    Raises
+    ------
+    InputError : a type that `names` does not have, a node that is not there.
+    """
+    cells: list[tuple[str, list[Any]]] = []
+    for kind, nodes in elements:
+        if kind not in names:
+            raise InputError(path, "elements", f"of type {kind} are not known here")
+        name, order = names[kind]
+        place = np.searchsorted(numbers, nodes)
+        place = np.minimum(place, len(numbers) - 1)
+        if (numbers[place] != nodes).any():
+            raise InputError(path, "elements", "refer to a node that is not there")
+        if not cells or cells[-1][0] != name:
+            cells.append((name, []))
+        cells[-1][1].append(place if order is None else place[list(order)])
+    return [(name, np.array(rows)) for name, rows in cells]
+
+
+def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> Array:
+    """(frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
+
+    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; x unless given.
+    """
+    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
+    slopes = reference_elements(points, quads, yarn).slopes
+    frames = []
+    for displacement in displacements:
+        gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])
+        frames.append(log_strain_of(gradient))
+    return np.array(frames)
+
+
+def extremes(strain: Array) -> tuple[Array, Array]:
+    """Least and largest of each of the last axis' components, the unstrained start included."""
+    flat = strain.reshape(-1, strain.shape[-1])
+    return np.minimum(flat.min(axis=0), 0.0), np.maximum(flat.max(axis=0), 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..materials.exports import registry
-from ..materials.exports.formats import Format
-from .calculix import export as calculix
+from ..materials.exports.base import Format
+from .calculix import library as calculix
 
 FORMATS: Mapping[str, Format] = {each.name: each for each in (*registry.FORMATS, calculix.FORMAT)}

@@ -15,11 +15,10 @@ from typing import Any, TypeVar
 
 from ..errors import LicenceDenied, SolverFailure
 from ..materials.law import HypoelasticLaw
-from .announcements import announce
-from .base import BandedSolver, DifferentiatingSolver, History, Solver
-from .licence_settings import SCHEDULER, LicenceSettings, licence_settings
+from .base import BandedSolver, DifferentiatingSolver, History, Solver, announce
 from .process import check_wanted, kept_open
 from .scratch import remove
+from .settings import SCHEDULER, LicenceSettings, licence_settings
 from .wrapped import WrappedBand, WrappedSolver
 
 T = TypeVar("T")

@@ -13,7 +13,7 @@ from ..content import digest_of
 from ..errors import BubblefitError
 from ..materials.law import HypoelasticLaw
 from .base import BandedSolver, DifferentiatingSolver, History, ProgramSolver, Solver
-from .identity import code_mark, program_mark
+from .decks import code_mark, program_mark
 from .run_cache import RunCache
 from .wrapped import WrappedBand, WrappedSolver
 

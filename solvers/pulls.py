@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from ..errors import SolverFailure
 from ..materials.law import HypoelasticLaw
-from ..models.uniaxial import UniaxialModel
+from ..meshes.strip_models import UniaxialModel
 from .membrane.solver import MembraneSolver
 
 log = logging.getLogger(__name__)

@@ -2,27 +2,112 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from ..errors import BubblefitError, InputError, SolverFailure
-from ..section_errors import first_error
+from .. import files as plugins
+from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
+from ..readers.sections import first_error
 from .base import Solver, SolverCheck
 from .calculix.settings import OFFER as CALCULIX
-from .licence_settings import SCHEDULER, licence_settings, split
 from .licences import licensed
 from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
-from .offer import Offer
 from .once import with_cache
-from .plugins import plug_in_named, plug_ins
 from .run_cache import RunCache
 from .scratch import sweep_left
-from .settings import SolverSettings, check_programs
+from .settings import (
+    SCHEDULER,
+    Offer,
+    Override,
+    SolverSettings,
+    check_programs,
+    licence_settings,
+    split,
+)
+
+#: What makes a thing a solver.
+NEEDED = ("name", "external", "progress", "identity", "run", "check")
+
+
+class PlugIn(plugins.PlugIn):
+    """One solver that another distribution offers; what is wrong with it is a `SolverFailure`."""
+
+    def make(self, **options: Any) -> Solver:
+        """A new solver from the factory that the entry point names.
+
+        Raises
+        ------
+        SolverFailure : it cannot be imported, is no factory, fails, or gives no solver; the
+            distribution is named.
+        InputError : an option that the factory does not take, or does not like.
+        """
+        factory = self.factory()
+        try:
+            inspect.signature(factory).bind(**options)
+        except TypeError as error:
+            problem = f"{error} (of {self.distribution}); see its documentation"
+            raise InputError(None, f"solver.{self.name}", problem) from None
+        except ValueError:  # compiled code tells no signature
+            pass
+        try:
+            solver = factory(**options)
+        except BubblefitError:
+            raise
+        except Exception as error:
+            raise self.solver_failure("fails when it is made", error) from error
+        if not isinstance(solver, Solver):
+            missing = [name for name in NEEDED if not hasattr(solver, name)]
+            what = f"gives no solver: {type(solver).__name__} has no {', '.join(missing)}"
+            raise self.solver_failure(what)
+        return solver
+
+    def solver_failure(self, what: str, error: BaseException | None = None) -> SolverFailure:
+        """As `failure`, for those who run analyses."""
+        return SolverFailure(str(self.failure(what, error)), self.name)
+
+    def factory(self) -> Callable[..., Any]:
+        """What the entry point names.
+
+        Raises
+        ------
+        SolverFailure : it cannot be imported, or called.
+        """
+        try:
+            factory = self.load()
+        except PlugInFailure as error:
+            raise SolverFailure(str(error), self.name) from error.__cause__
+        if not callable(factory):
+            raise self.solver_failure(f"is no factory: {self.entry.value} cannot be called")
+        return factory
+
+
+def plug_ins() -> list[PlugIn]:
+    """Every solver that is installed as a plug-in, by name; two of one name are both there."""
+    offers = plugins.plug_ins("bubblefit.solvers")
+    return [PlugIn(one.name, one.distribution, one.entry) for one in offers]
+
+
+def plug_in_named(name: str) -> PlugIn | None:
+    """The plug-in of that name, or None.
+
+    Raises
+    ------
+    SolverFailure : two distributions offer it.
+    """
+    try:
+        one = plugins.plug_in_named("bubblefit.solvers", name)
+    except PlugInFailure as error:
+        raise SolverFailure(str(error).removeprefix(f"{name}: "), name) from None
+    return None if one is None else PlugIn(one.name, one.distribution, one.entry)
+
 
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
@@ -187,3 +272,72 @@ def checked(name: str, solver: Solver) -> SolverCheck:
         if plug_in is None:
             raise
         raise plug_in.solver_failure("fails its check", error) from error
+
+
+#: Any setting of any solver, those of plug-ins among them, as KEY=VALUE.
+ANY = "solver-option"
+
+
+def command_line() -> list[Override]:
+    """The options there are, each once; its values say which are whose."""
+    found: dict[str, Override] = {}
+    values: dict[str, list[str]] = {}
+    for name, section in solver_sections().items():
+        for one in section.overrides:
+            found.setdefault(one.name, one)
+            if one.values:
+                values.setdefault(one.name, []).append(f"{one.values} ({name})")
+    return [
+        replace(one, what=f"{one.what}: {', '.join(values[one.name])}.") if one.values else one
+        for one in found.values()
+    ]
+
+
+def overridden(
+    name: str,
+    options: Mapping[str, Any],
+    given: Mapping[str, Any],
+    settings: Sequence[str] = (),
+) -> dict[str, Any]:
+    """The options of the solver `name` with what the command line says.
+
+    Parameters
+    ----------
+    options : as `registry.solver_settings` has them.
+    given : by the name of an option of `command_line`; None: not given.
+    settings : each "KEY=VALUE", the value as in a project file (text needs no quotes); paths are
+        from where we are.
+
+    Raises
+    ------
+    InputError : an option of another solver; a setting that there is not.
+    """
+    mine = {option: value for option, value in given.items() if value is not None}
+    for option in mine:
+        if option not in options:
+            raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not (key and equals):
+            raise InputError(None, f"--{ANY}", f"expected KEY=VALUE, got {setting!r}")
+        mine[key.strip()] = _checked(name, key.strip(), _value(text))
+    return {**options, **mine}
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):  # beside its own, tomllib lets these through
+        return text
+
+
+def _checked(name: str, key: str, value: Any) -> Any:
+    """A value of a solver of ours as its settings take it; that of a plug-in as it is."""
+    section = solver_sections().get(name)
+    if section is None:
+        return value
+    try:
+        return section.model_validate({key: value}).given(Path.cwd())[key]
+    except ValidationError as error:
+        found = first_error(None, error, section)
+        raise InputError(None, f"--{ANY} {found.field}", found.problem) from None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.bodies import Collar, RigidSupports
+from ..meshes.cylinder_model import Collar, RigidSupports
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]

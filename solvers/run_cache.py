@@ -21,8 +21,7 @@ from pathlib import Path
 from ..caching import cache_folder
 from ..errors import OutputError
 from ..writing import write_text
-from .announcements import announce
-from .base import History
+from .base import History, announce
 from .history_file import Damaged, from_bytes, to_bytes
 
 log = logging.getLogger(__name__)

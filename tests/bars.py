@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.base import CardRun, Simulation, Studied
-from bubblefit.experiments.exhibit import Output
-from bubblefit.fits.schema import FitSection
+from bubblefit.experiments.kinds import CardRun, Output, Simulation, Studied
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.meshes.strip import strip_mesh
+from bubblefit.meshes.strip_models import strip_mesh
+from bubblefit.project.schema import FitSection
 from bubblefit.solvers.base import History
 
 LENGTH, WIDTH, STRETCH = 40.0, 20.0, 0.1
@@ -116,7 +115,7 @@ def _said(run: CardRun) -> object:
 
 def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
     """As much of a project as studies and simulations look at."""
-    from bubblefit.fits.project import Project
+    from bubblefit.project.project import Project
 
     return Project(
         path=Path("bars.toml"),

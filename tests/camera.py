@@ -8,8 +8,8 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.fits.law import law_of
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .projects import small

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted
-from bubblefit.experiments.predicted import RunRecord
-from bubblefit.fits.predictions import run_card
+from bubblefit.experiments.kinds import RunRecord
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.volume import enclosed_volume
-from bubblefit.models.cylinder import CylinderModel
+from bubblefit.meshes.cylinder_model import CylinderModel
+from bubblefit.meshes.mesh import enclosed_volume
+from bubblefit.runs.predictions import run_card
 from bubblefit.solvers.base import BandEnd, History, Solver, SolverCheck
 
 #: Warp moduli (MPa) with which `Formula` fails, and stops half-way.

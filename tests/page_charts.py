@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bubblefit.reports import Charts
-from bubblefit.reports.charts import Chart
+from bubblefit.reports.charts import Chart, Charts
 from bubblefit.reports.page_file import read_page_data
 
 

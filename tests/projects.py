@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from bubblefit.fits.project import Project, read_project
+from bubblefit.project.project import Project, read_project
 
 from .places import KNOWN
 

@@ -54,15 +54,15 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
     put(
         house / "data/formats/riglog.py",
         "riglog.py",
-        "from bubblefit.data.registry import register_format\n\nregister_format(RIGLOG)",
+        "from bubblefit.readers.registry import register_format\n\nregister_format(RIGLOG)",
     )
     put(house / "experiments/datasheet/__init__.py", "datasheet.py", "")
     files = {path for path in house.rglob("*") if path.is_file()}
     assert len(files - before.keys()) == 3  # and none was changed
     code = f"""if True:
         import bubblefit as bf
-        from bubblefit.data.registry import format_of
-        from bubblefit.fits.law import law_of
+        from bubblefit.readers.registry import format_of
+        from bubblefit.runs.setup import law_of
         assert bf.__file__.startswith({str(house)!r})
         project = bf.read_project({str(ROOT / "examples/plug-in/project.toml")!r})
         assert list(project.tests) == ["supplier", "strips"], list(project.tests)

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.name_numbers import number_in_name
 from bubblefit.errors import InputError
-from bubblefit.experiments.exhibit import Output
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.kinds import Output
 from bubblefit.materials.card import MaterialCard, read_card, write_card
+from bubblefit.project.project import read_project
+from bubblefit.readers.names import number_in_name
+from bubblefit.readers.sections import PRESSURE_UNITS
 from bubblefit.reports.charts import Chart, Charts, Series
 from bubblefit.reports.content import Download, Facts, Listing, Report, Section, Table, Words
 from bubblefit.reports.html import write_report
-from bubblefit.sections import PRESSURE_UNITS
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.registry import solver_settings
@@ -188,7 +188,7 @@ indices = [1]
 
 
 def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
-    monkeypatch.setattr("bubblefit.data.name_numbers.SECONDS", 0.3)
+    monkeypatch.setattr("bubblefit.readers.names.SECONDS", 0.3)
     begun = time.monotonic()
     path = Path("a" * 60 + "!kPa")
     said = complaint(number_in_name, path, PRESSURE_UNITS, "(a+)+$", "kPa", "from_name")

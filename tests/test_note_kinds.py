@@ -15,19 +15,17 @@ from typing import Any, NamedTuple
 import pandas as pd
 import pytest
 from bubblefit.cli.fit_words import lines_of
-from bubblefit.experiments.cylinder import page as cylinders
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.fits import page as fit_page
-from bubblefit.fits.prediction_result import Predictions
-from bubblefit.fits.predictions import predict
-from bubblefit.fits.project import read_project
-from bubblefit.fits.simulation import simulate_cards
+from bubblefit.experiments.cylinder import report as cylinders
+from bubblefit.experiments.kinds import Exhibit
 from bubblefit.notes import FEW, Note, NoteKind, lines
-from bubblefit.reports import Charts
+from bubblefit.project.project import read_project
+from bubblefit.reports import fit_page, law_page
+from bubblefit.reports.charts import Charts
+from bubblefit.runs.poisson import vary_nu12
+from bubblefit.runs.predictions import Predictions, predict
+from bubblefit.runs.refinement import refine
+from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers import registry
-from bubblefit.studies import law_page
-from bubblefit.studies.poisson import vary_nu12
-from bubblefit.studies.refinement import refine
 from matplotlib.figure import Figure
 
 from .bars import BarTest

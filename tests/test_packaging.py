@@ -121,7 +121,7 @@ def test_documents_that_speak_of_the_thesis_link_to_it():
 
 
 def test_every_key_of_the_project_file_is_documented():
-    from bubblefit.fits.file import project_file
+    from bubblefit.project.schema import project_file
     from bubblefit.solvers.registry import solver_sections
 
     text = (ROOT / "docs" / "reference" / "project-file.md").read_text()

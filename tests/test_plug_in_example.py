@@ -15,7 +15,7 @@ import pytest
 from bubblefit.materials.forms.base import Form, pieces_of
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
@@ -173,8 +173,8 @@ def test_the_solver_refuses_what_it_cannot_do(here):
 
 
 def test_the_reader_is_found_by_content(here, tmp_path):
-    from bubblefit.data.curves import read_load_curves
-    from bubblefit.data.registry import format_names, format_of
+    from bubblefit.readers.curves import read_load_curves
+    from bubblefit.readers.registry import format_names, format_of
 
     path = PLUG_IN / "warp.rig"
     assert format_of("machine table", path).name == "riglog"
@@ -193,7 +193,7 @@ def test_the_reader_is_found_by_content(here, tmp_path):
 
 def test_the_example_is_what_its_files_say(here):
     """The files are the law's: whoever changes one has to compute them again."""
-    from bubblefit.data.curves import read_load_curves
+    from bubblefit.readers.curves import read_load_curves
 
     for direction, final in (("warp", 23.0), ("fill", 24.0)):
         (curve,) = read_load_curves(PLUG_IN / f"{direction}.rig", direction=direction)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from bubblefit.errors import PlugInFailure
-from bubblefit.plugins import names_with, plug_in_named, plug_ins
+from bubblefit.files import names_with, plug_in_named, plug_ins
 
 from .plug_ins import install
 

@@ -48,8 +48,8 @@ def faults(source: str) -> list[str]:
 #: own processes send each other through Dask, which does no other (docs/reference/security.md).
 ALLOWED = {
     "examples/solver-adapter/bubblefit_homogeneous.py": ["calls np.loadtxt"],
-    "fits/cluster.py": ["imports cloudpickle"],
-    "fits/cluster_worker.py": ["imports cloudpickle"],
+    "runs/cluster.py": ["imports cloudpickle"],
+    "runs/cluster_worker.py": ["imports cloudpickle"],
 }
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bubblefit.section_errors import dotted, first_error
-from bubblefit.sections import Section
+from bubblefit.readers.sections import Section, dotted, first_error
 from pydantic import Field, ValidationError
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from bubblefit.data.column_names import LOAD_UNITS
-from bubblefit.sections import (
+from bubblefit.readers.columns import LOAD_UNITS
+from bubblefit.readers.sections import (
     HUGE,
     LENGTH_UNITS,
     MODULUS_UNITS,

@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.project import read_project
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.project.project import read_project
 from bubblefit.solvers.membrane import kernel, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray

@@ -19,9 +19,8 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.poisson import vary_nu12
-from bubblefit.studies.ratios import Ratios
-from bubblefit.studies.verification.poisson import FIGURE
+from bubblefit.runs.poisson import Ratios, vary_nu12
+from bubblefit.runs.verification.published import FIGURE
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
 #: "Plus or minus three percent".

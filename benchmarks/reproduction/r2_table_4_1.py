@@ -11,9 +11,9 @@ u_y along the fill axis at 22 kPa.
 from __future__ import annotations
 
 import numpy as np
-from bubblefit.data.polynomials import powers
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.readers.surfaces import powers
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from dead_pressure import LOADS, Array, cut, known_bubble

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import UniaxialModel
+from bubblefit.meshes.strip_models import UniaxialModel
 from bubblefit.solvers.base import Array, History, SolverCheck
 from bubblefit.solvers.process import log_tail, run_process
 from bubblefit.solvers.scratch import run_folder

@@ -9,21 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data.biaxial.cycles import Cycle
-from ...data.biaxial.paths import BiaxialPath
-from ...data.biaxial.table import BiaxialTable
-from ...data.frames import FrameSource
 from ...errors import SolverFailure
-from ...materials.biaxial_reach import largest_load
-from ...materials.biaxial_response import biaxial_response
-from ...materials.designers.ratios import RATIOS, shares
+from ...materials.designers import RATIOS, shares
 from ...materials.law import HypoelasticLaw
-from ..candidates import Candidate, Planning, Precision
+from ...materials.responses import biaxial_response, largest_load
+from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle
+from ...readers.frames import FrameSource
+from ..kinds import Candidate, Planning, Precision
 from .objective import EXTENSOMETER, PERCENT
 from .prepared import PreparedBiaxial
-from .reading import BiaxialData
 from .section import BiaxialSection, TablesSection
-from .test import BiaxialTest
+from .test import BiaxialData, BiaxialTest
 
 Array = NDArray[np.float64]
 

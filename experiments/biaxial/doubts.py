@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...data.biaxial.paths import BiaxialPath
-from ...data.biaxial.ratios import nearest_ratio
-from ...materials.designers.ratios import shares
-from ..doubts import Doubt, Expected
+from ...materials.designers import shares
+from ...readers.biaxial import BiaxialPath, nearest_ratio
+from ..kinds import Doubt, Expected
 from .test import BiaxialTest
 
 #: Strains at the end of a path: no coated fabric ends below or above.

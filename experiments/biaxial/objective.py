@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
-from ...identification.comparison import NoiseIs
-from ...models.patch import elongations
+from ...inference.comparison import NoiseIs
+from ...meshes.strip_models import elongations
 from ...solvers.base import History
 
 Array = NDArray[np.float64]

@@ -8,15 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ...data.biaxial.paths import BiaxialPath
-from ...identification.comparison import Comparison
+from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
+from ...readers.biaxial import BiaxialPath
 from ...solvers.base import History
-from ..base import MakeSolver, Reach
-from ..data_files import DataFile
-from ..doubts import Doubt, Expected
-from ..exhibit import Exhibit, Output
-from ..fittable import Findings, FittedTest, Masks, Weighting
+from ..kinds import (
+    DataFile,
+    Doubt,
+    Exhibit,
+    Expected,
+    Findings,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Output,
+    Reach,
+    Weighting,
+)
 from .doubts import doubts_of_biaxial
 from .objective import StrainObjective
 from .test import BiaxialTest, reach_of
@@ -134,24 +142,24 @@ class PreparedBiaxial:
 
     def examine(self, out: Output) -> Exhibit:
         """Loads and cycles as they were read."""
-        from .examined import exhibit
+        from .report import exhibit_examined as exhibit
 
         return exhibit(self.test, out)
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""
-        from .findings import findings_of
+        from .report import findings_of
 
         return findings_of(self.test, self.fitted_paths(fitted))
 
     def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
         """Write paths.csv and the figure of the ratios."""
-        from .exhibit import exhibit
+        from .report import exhibit
 
         return exhibit(self.test, self.fitted_paths(fitted), fitted.law, out)
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
         """Every matched strain: part, loads, quantity, measured, modelled, difference (%)."""
-        from .tables import residual_table
+        from .report import residual_table
 
         return residual_table(self.fitted_paths(fitted))

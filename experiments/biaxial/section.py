@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...data.biaxial.table import LoadUnit, StrainUnit
-from ...sections import Name, Number, Positive, Section
+from ...readers.biaxial import LoadUnit, StrainUnit
+from ...readers.sections import Name, Number, Positive, Section
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]

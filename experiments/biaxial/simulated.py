@@ -10,15 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...data.biaxial.paths import BiaxialPath
 from ...errors import SolverFailure
 from ...materials.card import MaterialCard
-from ...models.patch import elongations
-from ...reports import BiaxialPanel, plot_biaxial
+from ...meshes.strip_models import elongations
+from ...readers.biaxial import BiaxialPath
+from ...reports.biaxial import BiaxialPanel, plot_biaxial
 from ...writing import replacing
-from ..base import CardRun, Simulation
-from ..exhibit import Output
-from ..notes import STRAINS, strains_of
+from ..kinds import STRAINS, CardRun, Output, Simulation, strains_of
 from .objective import PERCENT
 from .test import BiaxialTest
 

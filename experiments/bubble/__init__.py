@@ -6,12 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...materials.card import MaterialCard
-from ..base import CardRun, Place, Simulation, Studied
-from ..candidates import Candidate, Planning
-from ..exhibit import Output
-from .doubts.names import NAMES
+from ..kinds import Candidate, CardRun, Output, Place, Planning, Simulation, Studied
 from .section import BubbleSection
 from .test import BubbleTest, read
+
+NAMES = (
+    "length-unit", "zero-points", "repeated-frame", "z-flipped", "frame-order",
+    "deformed-coordinates", "axis-flipped", "pressure-unit", "camera-frame", "off-centre", "tilted",
+    "turned", "swapped",
+)  # fmt: skip
+
 
 __all__ = ["KIND", "BubbleKind"]
 

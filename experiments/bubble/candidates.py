@@ -9,18 +9,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data.fields import DisplacementField
-from ...data.outline import Outline
 from ...materials.law import HypoelasticLaw
-from ...models.bubble import default_increments
-from ..candidates import Candidate, Planning, Precision
-from .objective import CORRELATION
-from .places import folded
+from ...meshes.bubble_model import default_increments
+from ...meshes.disk import Outline
+from ...readers.fields import DisplacementField
+from ..kinds import Candidate, Planning, Precision
+from .objective import CORRELATION, folded
 from .prepared import PreparedBubble
+from .section import Sheet
 from .sheet import FLAT, with_sheet
-from .sheet_section import Sheet
-from .sources import KnownSolution
-from .test import BubbleTest
+from .test import BubbleTest, KnownSolution
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,17 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
-from ...identification.comparison import NoiseIs
+from ...inference.comparison import NoiseIs
+from ...meshes.mesh import Mesh
+from ...meshes.reading import FacetReading, SmoothReading
+from ...readers.fields import DisplacementField
+from ...readers.surfaces import DisplacementSurface
 from ...solvers.base import History
+from .test import BubbleTest
 
 Array = NDArray[np.float64]
 
@@ -230,3 +237,185 @@ class FieldObjective:
         """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""
         parts = self.differences(displacement, nuisance)
         return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())
+
+
+#: Of the points on the disk, and of its radius covered: less is taken for a wrong unit.
+LEAST_SHARE = 0.1
+
+
+def folded(field: DisplacementField) -> DisplacementField:
+    """A full field folded onto the quarter x, y >= 0."""
+    sign = np.where(field.points < 0, -1.0, 1.0)
+    moved = field.displacement.copy()
+    moved[:, :2] *= sign
+    return replace(field, points=np.abs(field.points), displacement=moved)
+
+
+def mirrored(field: DisplacementField) -> DisplacementField:
+    """A quarter's field mirrored to the full disk."""
+    if (field.points < -1e-9).any():
+        return field
+    points, moved = [], []
+    for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        points.append(field.points * (sx, sy))
+        moved.append(field.displacement * (sx, sy, 1))
+    xy, u = np.concatenate(points), np.concatenate(moved)
+    _, once = np.unique(np.round(xy, 6), axis=0, return_index=True)
+    z, sigma = (
+        None if value is None else np.tile(value, 4)[once] for value in (field.z, field.sigma)
+    )
+    return replace(field, points=xy[once], displacement=u[once], z=z, sigma=sigma)
+
+
+def at_nodes(
+    sources: Sequence[DisplacementField | DisplacementSurface], mesh: Mesh
+) -> list[FieldTarget]:
+    """Targets on the model's nodes, from computed fields or polynomial surfaces."""
+    nodes = mesh.points[:, :2]
+    return [
+        FieldTarget(
+            source.pressure,
+            source.evaluate(nodes)
+            if isinstance(source, DisplacementSurface)
+            else _interpolated(source, mesh),
+            at_rest=nodes,
+        )
+        for source in sources
+    ]
+
+
+def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
+    """Computed displacements at the model's nodes; exact when the meshes are the same."""
+    nodes = mesh.points[:, :2]
+    if nodes.shape == field.points.shape and np.allclose(nodes, field.points, atol=1e-9):
+        return field.displacement
+    # C1 interpolation: the data mesh is curved between its nodes, linear would cut corners.
+    whole = mirrored(field)
+    between = CloughTocher2DInterpolator(whole.points, whole.displacement)(nodes)
+    # Chords of the data's rim can leave a rim node of ours outside: it does not move anyway.
+    outside = ~np.isfinite(between).all(axis=1)
+    between[outside] = 0.0
+    between[mesh.node_sets["rim"]] = 0.0
+    return np.asarray(between)
+
+
+def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
+    """How displacements of the nodes are read at points: as the camera does, if that is known."""
+    reading = SmoothReading.of(mesh)
+    return reading if test.facet is None else FacetReading(reading, test.facet)
+
+
+def at_points(
+    test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
+) -> tuple[list[FieldTarget], int]:
+    """Targets at the measured points on the disk, and how many lie beyond its rim.
+
+    Raises
+    ------
+    InputError : next to no point lies on the disk, or all of them near its centre.
+    """
+    targets, outside = [], 0
+    reading, before = reading_of(test, mesh), None
+    for field in fields:
+        # Frames of one camera mostly have the same places.
+        if before is None or not np.array_equal(before, field.points):
+            sample, inside = reading.matrix(field.points)
+            before = field.points
+        outside += int((~inside).sum())
+        _check_scale(test, field, inside)
+        rest = field.points[inside]
+        targets.append(
+            FieldTarget(field.pressure, field.displacement[inside], sample, at_rest=rest)
+        )
+    return targets, outside
+
+
+def _check_scale(test: BubbleTest, field: DisplacementField, inside: NDArray[np.bool_]) -> None:
+    """Metres taken for millimetres, or the other way round, show in where the points lie."""
+    reach = float(np.abs(field.points).max())
+    if inside.mean() < LEAST_SHARE:
+        where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of"
+    elif reach < LEAST_SHARE * test.outline.major:
+        where = f"all points lie within {reach:.3g} mm of the centre of a disk of"
+    else:
+        return
+    at = f"{test.place.at}, data at {field.pressure * 1e3:g} kPa"
+    problem = f"{where} {test.outline.words}: are the length unit and the columns x and y right?"
+    raise InputError(test.place.path, at, problem)
+
+
+#: Decimals of a mm to which two frames give the same reference place.
+DECIMALS = 3
+#: Of a frame's places, that the frame it is counted from has to have, too.
+LEAST_SHARE_RELATIVE = 0.5
+#: In-plane displacements of an inflated sheet go with the square of its height, and this with the
+#: cube root of the pressure.
+POWER = 2.0 / 3.0
+
+
+def at_rest(fields: Sequence[DisplacementField], since: int) -> list[DisplacementField]:
+    """The fields with places in the sheet without load, where they are those of frame `since`.
+
+    That is so where the picture that all displacements are counted from was taken at the pressure
+    of this frame: nothing moves in it. How far its places have moved already is told by the next
+    frame: in-plane displacements grow with p^(2/3). Other fields are left as they are.
+    """
+    first = fields[since]
+    if first.displacement.any():
+        return list(fields)
+    other = fields[since + 1 if since + 1 < len(fields) else since - 1]
+    powers = [field.pressure**POWER for field in (first, other)]
+    moved = other.displacement[:, :2] * (powers[0] / (powers[1] - powers[0]))
+    tree = cKDTree(other.points)
+    return [replace(f, points=f.points - moved[tree.query(f.points)[1]]) for f in fields]
+
+
+def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarget]:
+    """The targets with the numbers of their places, the same place having the same in all.
+
+    nodes : (nodes, 2) mm, of the model.
+    """
+    places = [np.round(target.at(nodes), DECIMALS) + 0.0 for target in targets]
+    _, numbers = np.unique(np.concatenate(places), axis=0, return_inverse=True)
+    ends = np.cumsum([len(p) for p in places])[:-1]
+    return [
+        replace(target, places=own)
+        for target, own in zip(targets, np.split(numbers.reshape(-1), ends), strict=True)
+    ]
+
+
+def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget]:
+    """Targets, with places, less that of the frame `since`, from which the others are counted.
+
+    Raises
+    ------
+    InputError : a frame that shares too few places with it.
+    """
+    origin = targets[since]
+    assert origin.places is not None
+    relative = []
+    for k, target in enumerate(targets):
+        if k == since:
+            continue
+        assert target.places is not None
+        _, mine, its = np.intersect1d(target.places, origin.places, return_indices=True)
+        if len(mine) < LEAST_SHARE_RELATIVE * len(target.places):
+            problem = (
+                f"the frames at {1e3 * target.pressure:g} and {1e3 * origin.pressure:g} kPa share "
+                f"{len(mine)} of {len(target.places)} points; expected the same points in all"
+            )
+            raise InputError(None, "sheet.from_pressure", problem)
+        moved = target.displacement[mine] - origin.displacement[its]
+        sample = None if target.sample is None else target.sample[mine]
+        relative.append(
+            replace(
+                target,
+                displacement=moved,
+                sample=sample,
+                places=target.places[mine],
+                at_rest=None if target.at_rest is None else target.at_rest[mine],
+                frame=k,
+                since=since,
+            )
+        )
+    return relative

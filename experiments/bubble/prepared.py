@@ -8,25 +8,42 @@ from pathlib import Path
 
 import pandas as pd
 
-from ...data.fields import DisplacementField
-from ...data.frames import FrameSource
-from ...data.registration.register import Registration
-from ...data.surfaces import DisplacementSurface
 from ...errors import InputError
-from ...identification.comparison import Comparison, Nuisance
+from ...inference.comparison import Comparison, Nuisance
 from ...materials.law import HypoelasticLaw
-from ...models.bubble import BubbleModel
-from ..base import MakeSolver, Reach
-from ..data_files import DataFile, joined
-from ..doubts import Doubt, Expected
-from ..exhibit import Exhibit, Output
-from ..fittable import Findings, FittedTest, Masks, Weighting
+from ...meshes.bubble_model import BubbleModel
+from ...readers.fields import DisplacementField
+from ...readers.frames import FrameSource
+from ...readers.surfaces import DisplacementSurface
+from ..kinds import (
+    DataFile,
+    Doubt,
+    Exhibit,
+    Expected,
+    Findings,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Output,
+    Reach,
+    Weighting,
+    joined,
+)
 from .doubts import View, doubts_of
 from .findings import findings_of
-from .objective import OFFSETS, FieldObjective, FieldTarget
-from .places import at_nodes, at_points, folded
+from .objective import (
+    OFFSETS,
+    FieldObjective,
+    FieldTarget,
+    at_nodes,
+    at_points,
+    at_rest,
+    counted_from,
+    folded,
+    with_places,
+)
 from .point_files import PointFiles
-from .relative import at_rest, counted_from, with_places
+from .registration import Registration
 from .sheet import FLAT, MeasuredSheet, sheet_nuisance, with_sheet
 from .test import BubbleTest
 
@@ -75,7 +92,7 @@ class PreparedBubble:
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Frames, where no field that is constant over them is projected out."""
-        from .frames_left_out import frames_of
+        from .parts import frames_of
 
         return frames_of(self)
 
@@ -97,7 +114,7 @@ class PreparedBubble:
         ------
         InputError : data that cannot be matched.
         """
-        from .frames_left_out import kept_targets
+        from .parts import kept_targets
 
         test, model, sheet = self.test, self.model, self.test.sheet
         whole = self.targets
@@ -143,7 +160,7 @@ class PreparedBubble:
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """The same places on a finer mesh with finer increments, or on a coarser mesh."""
-        from .finer import finer_bubble
+        from .parts import finer_bubble
 
         if self.by_this_model and factor > 1:
             return self.comparisons(make_solver, weighting)
@@ -193,7 +210,7 @@ class PreparedBubble:
 
     def examine(self, out: Output) -> Exhibit:
         """Maps, heights and equilibrium of the measured fields."""
-        from .examined import exhibit
+        from .report import exhibit_examined as exhibit
 
         return exhibit(self, out)
 
@@ -203,13 +220,13 @@ class PreparedBubble:
 
     def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
         """Write cuts, heights, moduli, surfaces.csv and bubble.pvd."""
-        from .figures import exhibit
+        from .report import exhibit
 
         return exhibit(self, fitted, findings, out)
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
         """Every matched displacement component, see `tables.residual_table`."""
-        from .tables import residual_table
+        from .report import residual_table
 
         return residual_table(self, fitted)
 

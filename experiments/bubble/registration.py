@@ -1,112 +1,653 @@
-"""What is told of a registration: numbers, a table, a line, a picture."""
+"""Frames of a bubble test brought into the test's coordinates, each step found or given."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
-from ...data.fields import DisplacementField
-from ...data.outline import Outline
-from ...data.registration.register import Registration
-from ...reports import Table, plot_registration
-from ..exhibit import Output, Shown
+from ...errors import InputError
+from ...meshes.disk import Outline
+from ...readers.fields import DisplacementField
+from ...readers.frames import Frame
+from .equilibrium import apex_shape
+from .placement import (
+    LEAST,
+    UNKNOWN,
+    Placement,
+    RigidMotion,
+    all_applied,
+    axes_angle,
+    clamp_motion,
+    clamp_points,
+    in_all_quarters,
+    line_angle,
+    plane_through,
+    shifted,
+    turned,
+    without,
+)
 
-PICTURE = "registration.png"
+Array = NDArray[np.float64]
 
-#: What each choice of the plane means.
-PLANES = {
-    "clamp": "through the points beyond the rim",
-    "edge": "through the edge of the sheet",
-    "camera": "the camera's own x and y",
-}
-
-
-def registration_numbers(found: Registration) -> dict[str, Any]:
-    """For result.json."""
-    seen = [m for m in found.motions if m.points]
-    warp, rim, given = found.warp, found.rim, found.options
-    return {
-        "origin_mm": found.placement.origin.tolist(),
-        "axes": found.placement.axes.tolist(),
-        "plane": {"of": found.plane_of, "deviation_mm": found.flatness},
-        "tilt_degrees": found.placement.tilt,
-        "centre": "given" if rim is None else {"error_mm": rim.error},
-        "warp_degrees": found.warp_angle,
-        "warp": "given" if warp is None else {"error_degrees": warp.error, "clear": warp.clear},
-        "clamp_motion": {
-            "removed": bool(seen) and given.remove_clamp_motion,
-            "shift_mm": [float(np.linalg.norm(m.shift)) for m in seen],
-            "turn_degrees": [m.angle for m in seen],
-        },
-    }
+#: Even powers (of u, of v) of a shape beside the factor that vanishes at the rim.
+EVEN = ((0, 0), (2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
+ODD = ((1, 0), (0, 1), (3, 0), (2, 1), (1, 2), (0, 3))
+#: Points and frames enough to tell a centre; of more, every so many.
+POINTS, FRAMES = 2000, 4
+#: Points nearer to the rim than this share of its radius say where it is.
+NEAR = 0.8
+#: Points up to this share of the radius from a first guess of the centre are taken.
+INSIDE = 1.02
 
 
-def registration_table(found: Registration) -> Table:
-    """What was found and what was given, step by step."""
-    x, y, z = found.placement.origin
-    rim, warp = found.rim, found.warp
-    plane = f"tilted by {found.placement.tilt:.2f} degrees"
-    how = PLANES[found.plane_of]
-    if found.plane_of != "camera":
-        how += f", which deviate by {found.flatness:.2g} mm"
-    rows: list[list[object]] = [
-        ["plane of the rim", plane, how],
-        [
-            "centre of the rim, mm",
-            f"{x:.2f}, {y:.2f}, {z:.2f}",
-            "given" if rim is None else f"found where the sheet does not rise, +- {rim.error:.2g}",
-        ],
-        [
-            "warp, degrees from the camera's x",
-            f"{found.warp_angle:.2f}",
-            "given" if warp is None else _warp_words(found),
-        ],
-        ["motion of the clamp", *_motion_words(found)],
+@dataclass(frozen=True)
+class Rim:
+    """The clamped edge in the plane of the sheet.
+
+    x, y : centre, mm. angle : of the first semi-axis from x towards y, degrees (0 for a circle).
+    error : standard error of the centre, mm, from the scatter about the shape. turn_error : of an
+    angle that was found, degrees; 0 where it was not looked for.
+    """
+
+    x: float
+    y: float
+    angle: float
+    error: float
+    turn_error: float = 0.0
+
+
+def rim_of_motion(
+    surfaces: Sequence[tuple[Array, Array]],
+    semi_axes: tuple[float, float],
+    start: tuple[float, float] = (0.0, 0.0),
+    angle: float | None = None,
+) -> Rim:
+    """The rim of known size through which the sheet does not rise.
+
+    The rise of every frame is a polynomial of even and odd terms times a factor that is zero on
+    the rim, all about the centre that is looked for, and one constant (the frame's shift along
+    z). Odd terms take what the sheet is not symmetric in: they cannot move the rim.
+
+    Parameters
+    ----------
+    surfaces : reference places (n, 2) mm in the plane and rises (n,) mm along its normal, by rising
+        pressure: the last few are taken.
+    semi_axes : mm; equal for a circle. start : mm, about where the centre is.
+    angle : degrees, of the first semi-axis; found unless given where the axes differ.
+
+    Raises
+    ------
+    InputError : points that do not come near the rim all around it, too few of them.
+    """
+    free = semi_axes[0] != semi_axes[1] and angle is None
+    fixed = 0.0 if angle is None else angle
+    guess = np.array([*start, _long_axis(*surfaces[-1], semi_axes) if free else fixed])
+    few = [_on_disk(*one, guess, semi_axes) for one in surfaces[-FRAMES:]]
+
+    def left(place: Array) -> Array:
+        at = place if free else np.array([*place, fixed])
+        parts = []
+        for points, rise in few:
+            orthogonal, _ = np.linalg.qr(_terms(*_local(points, at, semi_axes)))
+            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
+        return np.concatenate(parts)
+
+    count = 3 if free else 2
+    scale = [semi_axes[0], semi_axes[0], 60.0][:count]
+    best = least_squares(left, guess[:count], x_scale=scale)
+    variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
+    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
+    error = float(np.sqrt(np.trace(covariance[:2, :2])))
+    turn = float(best.x[2]) % 180.0 if free else fixed
+    turn_error = float(np.sqrt(covariance[2, 2])) if free else 0.0
+    return Rim(float(best.x[0]), float(best.x[1]), turn, error, turn_error)
+
+
+def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
+    """About the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
+    weight = np.clip(rise, 0.0, None)
+    x, y = (points - (weight[:, None] * points).sum(axis=0) / weight.sum()).T
+    xx, yy, xy = (float((weight * a).sum()) for a in (x * x, y * y, x * y))
+    along = np.degrees(0.5 * np.arctan2(2 * xy, xx - yy))
+    return float(along if semi_axes[0] > semi_axes[1] else along + 90.0)
+
+
+def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:
+    """Coordinates (2, n) about a centre x, y and along axes turned by degrees: 1 on the rim."""
+    turn = np.radians(place[2])
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = (points - place[:2]).T
+    return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
+
+
+def _on_disk(
+    points: Array, rise: Array, place: Array, semi_axes: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Some of the points within the rim, and their rises over the largest of them."""
+    local = _local(points, place, semi_axes)
+    inside = np.hypot(*local) < INSIDE
+    least = 3 * (len(EVEN) + len(ODD) + 1)
+    if inside.sum() < least:
+        problem = f"expected at least {least} points on the disk, got {int(inside.sum())}"
+        raise InputError(None, "centre", f"{problem}; are the length unit and the radius right?")
+    _all_around(local[:, inside])
+    every = slice(None, None, -(-int(inside.sum()) // POINTS))
+    rise = rise[inside][every]
+    return points[inside][every], rise / np.abs(rise).max()
+
+
+def _terms(u: Array, v: Array) -> Array:
+    factor = 1.0 - u**2 - v**2
+    shapes = [factor * u**i * v**j for i, j in (*EVEN, *ODD)]
+    return np.stack([*shapes, np.ones_like(u)], axis=1)
+
+
+def _all_around(local: Array) -> None:
+    """Whether points come near the rim in each of eight directions."""
+    near = np.hypot(*local) > NEAR
+    around = np.unique((np.arctan2(local[1, near], local[0, near]) // (np.pi / 4)).astype(int))
+    if len(around) < 8:
+        problem = f"points come within {1 - NEAR:.0%} of the rim in {len(around)} of 8 directions"
+        raise InputError(None, "centre", f"{problem} only; give the centre")
+
+
+# The two axes about which a displacement field is symmetric: warp and fill, whatever the law.
+#
+# A disk of orthotropic fabric moves symmetrically about warp and fill. In polar components about
+# the centre, u_r and u_z then have only cosines of the angle from the warp, u_theta only sines.
+# What the sheet's first shape adds is much the same at every pressure: two frames are subtracted.
+
+#: Harmonics around the centre; the even ones above zero tell the axes.
+HARMONICS = (0, 1, 2, 3, 4)
+TELLING = (2, 4)
+RADII = np.linspace(0.1, 0.9, 9)
+ANGLES = np.radians(np.arange(0.0, 90.0, 0.05))
+#: Share of the highest frame's rise that the frame subtracted from others may have at most.
+LOW = 0.7
+#: Parts of the points that tell how sure the axes are, and the most frames that are looked at.
+PARTS, FRAMES_SYMMETRY = 4, 6
+#: Points that a part needs: four for each of its terms.
+ENOUGH = 120
+
+
+@dataclass(frozen=True)
+class Axes:
+    """angle : degrees from x towards y of one axis, 0 to 90; the other is 90 degrees from it.
+
+    error : standard error, degrees, from frame to frame and between parts of the points.
+    clear : 1 where the field is wholly symmetric about the axes, 0 where no axes are better.
+    """
+
+    angle: float
+    error: float
+    clear: float
+
+    @property
+    def off(self) -> float:
+        """How far they are turned from x and y, degrees, from -45 to below 45."""
+        return axes_angle(self.angle)
+
+
+def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
+    """The axes of the frames' even part.
+
+    Parameters
+    ----------
+    frames : about the rim's centre, in its plane, by rising pressure.
+    radius : mm.
+    """
+    costs = _costs(frames, radius)
+    together = costs.sum(axis=0)
+    best = float(ANGLES[np.argmin(together)])
+    # Frames share the noise of the one that is subtracted; parts of the points do not.
+    error = _scatter(costs, best)
+    count = min(PARTS, min(len(frame.points) for frame in frames) // ENOUGH)
+    if count > 1:
+        parts = [[_part(frame, k, count) for frame in frames] for k in range(count)]
+        by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
+        error = float(np.hypot(error, _scatter(by_part, best)))
+    total = float(together.max())
+    clear = 1.0 - float(together.min()) / total if total > 0 else 0.0
+    return Axes(float(np.degrees(best)), error, clear)
+
+
+def _costs(frames: Sequence[Frame], radius: float) -> Array:
+    """What is not symmetric (frames, angles), of each high frame less the lowest."""
+    rise = [float(np.nanmax(frame.displacement[:, 2])) for frame in frames]
+    low = [f for f, r in zip(frames, rise, strict=True) if r <= LOW * rise[-1]]
+    high = [f for f, r in zip(frames, rise, strict=True) if r > LOW * rise[-1]]
+    first = harmonics(low[0], radius) if low else 0.0
+    return np.array(
+        [_asymmetry(harmonics(frame, radius) - first) for frame in high[-FRAMES_SYMMETRY:]]
+    )
+
+
+def _part(frame: Frame, number: int, count: int) -> Frame:
+    every = slice(number, None, count)
+    return replace(frame, points=frame.points[every], displacement=frame.displacement[every])
+
+
+def _scatter(costs: Array, best: float) -> float:
+    """Standard error of the mean angle, degrees; axes repeat after 90 degrees."""
+    each = ANGLES[np.argmin(costs, axis=1)]
+    if len(each) < 2:
+        return 0.0
+    apart = np.angle(np.exp(4j * (each - best))) / 4
+    return float(np.degrees(np.sqrt((apart**2).sum() / (len(each) - 1) / len(each))))
+
+
+def harmonics(frame: Frame, radius: float) -> Array:
+    """Amplitudes (3, 5, 2, 9) mm: of u_r, u_theta, u_z, by harmonic, cosine and sine, radius."""
+    whole = np.isfinite(frame.displacement).all(axis=1) & np.isfinite(frame.points).all(axis=1)
+    x, y = frame.points[whole, :2].T / radius
+    r, angle = np.hypot(x, y), np.arctan2(y, x)
+    on = (r > 1e-6) & (r < 1.0)
+    r, angle, moved = r[on], angle[on], frame.displacement[whole][on]
+    c, s = np.cos(angle), np.sin(angle)
+    polar = np.stack([c * moved[:, 0] + s * moved[:, 1], c * moved[:, 1] - s * moved[:, 0]])
+    result = np.empty((3, len(HARMONICS), 2, len(RADII)))
+    for quantity, values in enumerate([*polar, moved[:, 2]]):
+        planar = quantity < 2
+        radial = np.concatenate([_radial(r, k, planar) for k in HARMONICS for _ in range(2)])
+        around = [f(k * angle) for k in HARMONICS for f in (np.cos, np.sin)]
+        terms = (radial.reshape(len(around), 3, -1) * np.array(around)[:, None]).reshape(-1, len(r))
+        solution, *_ = np.linalg.lstsq(terms.T, values, rcond=1e-10)
+        of_term = solution.reshape(len(HARMONICS), 2, 3)
+        for k in HARMONICS:
+            result[quantity, k] = of_term[k] @ _radial(RADII, k, planar)
+    return result
+
+
+def _radial(r: Array, k: int, planar: bool) -> Array:
+    """Powers of the radius that a smooth field's harmonic k has: (3, n)."""
+    lowest = abs(k - 1) if planar and k else k + (1 if planar else 0)
+    return np.stack([r ** (lowest + 2 * i) for i in range(3)])
+
+
+def _asymmetry(profile: Array) -> Array:
+    """What is not symmetric about an axis at each of the angles, mm^2."""
+    total = np.zeros(len(ANGLES))
+    for k in TELLING:
+        cosine, sine = np.cos(k * ANGLES)[:, None], np.sin(k * ANGLES)[:, None]
+        for quantity in range(3):
+            a, b = profile[quantity, k]
+            odd = b * cosine - a * sine if quantity != 1 else a * cosine + b * sine
+            total += (RADII * odd**2).sum(axis=1)
+    return total
+
+
+#: Standard error of the axes (degrees) above which the field does not tell them, and how clear
+#: they must be at least.
+UNSURE, CLEAR = 5.0, 0.5
+
+
+@dataclass(frozen=True)
+class WarpDirection:
+    """Where the warp lies, by the fields of all frames.
+
+    angle : degrees from x towards y, from -90 to 90. error : standard error of their mean, degrees.
+    clear : of the axes, see `symmetry.Axes`; None where an elliptic rim told the angle.
+    strains : Green-Lagrange at the centre in the highest frame less those of the lowest, warp and
+    fill.
+    """
+
+    angle: float
+    error: float
+    clear: float | None
+    strains: tuple[float, float]
+
+
+def warp_of_field(
+    frames: Sequence[Frame], radius: float, warp_is_stiff: bool = True
+) -> WarpDirection:
+    """The axis of symmetry along which the centre is strained less (warp stiff), or more.
+
+    Parameters
+    ----------
+    frames : in coordinates about the rim's centre, in its plane; by rising pressure.
+    warp_is_stiff : whether the warp is the direction that is strained less.
+
+    Raises
+    ------
+    InputError : too few points about the centre, or a field whose axes cannot be told.
+    """
+    axes = symmetry_axes(frames, radius)
+    if axes.error > UNSURE or axes.clear < CLEAR:
+        problem = (
+            f"the field does not tell warp from fill (axes at {axes.angle:.0f} +- {axes.error:.1f}"
+            f" degrees, {axes.clear:.0%} clear); give the angle"
+        )
+        raise InputError(None, "warp", problem)
+    angle = axes.angle
+    along, across = _strains(frames, radius, angle)
+    if (along > across) == warp_is_stiff:
+        angle, along, across = angle + 90.0, across, along
+    return WarpDirection(line_angle(angle), axes.error, axes.clear, (along, across))
+
+
+def warp_of_rim(
+    frames: Sequence[Frame], radius: float, rim: Rim, rim_angle: float
+) -> WarpDirection:
+    """The warp by the turn of an elliptic rim, whose first semi-axis lies at `rim_angle` from it.
+
+    A sheet whose edge is an ellipse turned to the yarns has no axes of symmetry.
+
+    Parameters
+    ----------
+    frames : as for `warp_of_field`. rim : found. rim_angle : degrees from warp towards fill.
+
+    Raises
+    ------
+    InputError : an ellipse too round to tell its turn.
+    """
+    if rim.turn_error > UNSURE:
+        problem = (
+            f"the rim is too round to tell the warp (turned by {rim.angle:.0f} +- "
+            f"{rim.turn_error:.0f} degrees); give the angle"
+        )
+        raise InputError(None, "warp", problem)
+    angle = line_angle(rim.angle - rim_angle)
+    return WarpDirection(angle, rim.turn_error, None, _strains(frames, radius, angle))
+
+
+def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
+    """At the centre along an axis at `angle` degrees and across it."""
+    strain = centre_strain(frames[-1], radius)
+    if len(frames) > 1:
+        strain = strain - centre_strain(frames[0], radius)
+    turn = np.radians(angle)
+    first, second = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    return float(first @ strain @ first), float(second @ strain @ second)
+
+
+def centre_strain(frame: Frame, radius: float) -> Array:
+    """Green-Lagrange strain (2, 2) of the surface at the centre.
+
+    Raises
+    ------
+    InputError : too few points about the centre.
+    """
+    try:
+        shape = apex_shape(frame.points[:, :2], frame.displacement, radius)
+    except InputError as error:
+        raise InputError(None, "warp", error.problem) from None
+    tangents = np.eye(3)[:2] + np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
+    return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
+
+
+def warp_of_points(first: Array, second: Array) -> float:
+    """Angle (degrees, -90 to 90) of the line through two marked points (2,) in the plane.
+
+    Raises
+    ------
+    InputError : the points are the same.
+    """
+    x, y = np.asarray(second, dtype=float) - np.asarray(first, dtype=float)
+    if np.hypot(x, y) < 1e-9:
+        raise InputError(None, "warp", "expected two different points along the warp")
+    return line_angle(float(np.degrees(np.arctan2(y, x))))
+
+
+Point = tuple[float, float, float]
+PlaneOf = Literal["found", "clamp", "edge", "camera"]
+
+#: The sheet's edge: points from this share of the rim's radius on.
+EDGE = 0.85
+#: Frames by which the centre is found: those with at least this share of the largest rise.
+HIGH = 0.5
+
+
+@dataclass(frozen=True)
+class RegistrationOptions:
+    """What is given of a registration; everything else is found.
+
+    Parameters
+    ----------
+    plane : of the rim: through points on the "clamp", through the "edge" of the sheet, the
+        "camera"'s own x and y, or "found": the clamp where it was seen, else the edge.
+    centre : (3,) of the rim in the camera's coordinates, mm.
+    rim_angle : degrees, of the first semi-axis of an ellipse from the warp towards the fill.
+    warp : degrees from the camera's x to the warp, towards the camera's y where the sheet rises
+        towards the camera's z.
+    warp_points : two marks along the warp in the camera's coordinates, mm.
+    warp_is_stiff : whether the direction strained less is the warp, where it is found.
+    remove_clamp_motion : whether the clamp's rigid motion is taken out of every frame.
+    """
+
+    plane: PlaneOf = "found"
+    centre: Point | None = None
+    rim_angle: float | None = None
+    warp: float | None = None
+    warp_points: tuple[Point, Point] | None = None
+    warp_is_stiff: bool = True
+    remove_clamp_motion: bool = True
+
+    def __post_init__(self) -> None:
+        if self.warp is not None and self.warp_points is not None:
+            problem = "expected an angle 'warp' or two points 'warp_points', not both"
+            raise InputError(None, "warp", problem)
+
+
+#: Nothing is given.
+ALL_FOUND = RegistrationOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """What was found, and how.
+
+    Parameters
+    ----------
+    placement : of the test's coordinates in the camera's.
+    plane_of : "clamp", "edge" or "camera". flatness : mm, robust deviation of its points.
+    rim : in the plane, x along the warp; its centre is the origin. None where the centre is given.
+    warp : None where its direction is given. warp_angle : degrees, as `RegistrationOptions.warp`.
+    motions : of the clamp, one a frame, in the test's coordinates.
+    options : what was given.
+    """
+
+    placement: Placement
+    plane_of: str
+    flatness: float
+    rim: Rim | None
+    warp: WarpDirection | None
+    warp_angle: float
+    motions: tuple[RigidMotion, ...]
+    options: RegistrationOptions
+
+
+def register(
+    frames: Sequence[Frame],
+    semi_axes: tuple[float, float],
+    options: RegistrationOptions = ALL_FOUND,
+) -> tuple[tuple[Frame, ...], Registration]:
+    """The frames in the test's coordinates, and what they are.
+
+    Parameters
+    ----------
+    frames : in the camera's coordinates, mm, by rising pressure; the rim must not turn by more
+        than rounding between frames, unless the clamp is seen.
+    semi_axes : of the rim, mm; equal for a circle, first the one that `rim_angle` belongs to.
+
+    Raises
+    ------
+    InputError : a step that cannot be found and must be given.
+    """
+    reference = frames[-1]
+    up = _up(reference)
+    placement, _ = plane_through(reference.points, up)
+    if options.plane == "camera":
+        placement = _camera(up)
+    placement, rim = _centred(frames, placement, semi_axes, options)
+    flatness, plane_of = 0.0, "camera"
+    if options.plane != "camera":
+        # Which points lie on the clamp, or at the edge, is known once there is a centre.
+        angle = _rim_angle(placement, rim, options)
+        places = placement.places(reference.points)
+        points, plane_of = _rim_points(places, Outline(*semi_axes, angle), options)
+        placement, flatness = plane_through(reference.points[points], up)
+        placement, rim = _centred(frames, placement, semi_axes, options)
+    moved = all_applied(placement, frames)
+    motions = _motions(moved, Outline(*semi_axes, _rim_angle(placement, rim, options)))
+    if options.remove_clamp_motion:
+        moved = tuple(without(f, m) for f, m in zip(moved, motions, strict=True))
+    angle, warp = _warp(moved, placement, semi_axes, rim, options)
+    turn = turned(angle)
+    if rim is not None:
+        rest = (rim.angle - angle) % 180.0 if rim.angle else 0.0
+        rim = Rim(0.0, 0.0, rest, rim.error, rim.turn_error)
+    full = turn.after(placement)
+    return all_applied(turn, moved), Registration(
+        full, plane_of, flatness, rim, warp, _from_camera_x(full), motions, options
+    )
+
+
+def _up(frame: Frame) -> Array:
+    moved = frame.displacement[np.isfinite(frame.displacement).all(axis=1)]
+    if not len(moved) or not np.abs(moved).max() > 0:
+        raise InputError(frame.path, "", "nothing moves in the frame of the highest pressure")
+    return np.asarray(moved.mean(axis=0))
+
+
+def _camera(up: Array) -> Placement:
+    """The camera's axes; turned about x where the sheet rises away from its z."""
+    return Placement(np.zeros(3), np.diag([1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0]))
+
+
+def _centred(
+    frames: Sequence[Frame],
+    placement: Placement,
+    semi_axes: tuple[float, float],
+    options: RegistrationOptions,
+) -> tuple[Placement, Rim | None]:
+    """The same plane with its origin in the centre of the rim."""
+    if options.centre is not None:
+        place = placement.places(np.array(options.centre, dtype=float))
+        return shifted(place[0], place[1]).after(placement), None
+    surfaces = [_surface(frame) for frame in all_applied(placement, frames)]
+    top = surfaces[-1][1].max()
+    surfaces = [one for one in surfaces if one[1].max() > HIGH * top]
+    points, rise = surfaces[-1]
+    weight = np.clip(rise, 0.0, None)
+    start = (weight[:, None] * points).sum(axis=0) / weight.sum()
+    angle = options.rim_angle
+    warp = _given_warp(placement, options)
+    if angle is not None and warp is not None:
+        angle += warp
+    elif semi_axes[0] != semi_axes[1]:
+        angle = None
+    # The first centre decides which points lie on the disk.
+    for _ in range(2):
+        rim = rim_of_motion(surfaces, semi_axes, (start[0], start[1]), angle)
+        start = np.array([rim.x, rim.y])
+    return shifted(rim.x, rim.y).after(placement), rim
+
+
+def _surface(frame: Frame) -> tuple[Array, Array]:
+    """Places (n, 2) and rises (n,) where both were correlated."""
+    whole = np.isfinite(frame.points).all(axis=1) & np.isfinite(frame.displacement).all(axis=1)
+    return frame.points[whole, :2], frame.displacement[whole, 2]
+
+
+def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptions) -> float:
+    """Degrees from the plane's x to the rim's first semi-axis; without meaning for a circle."""
+    if rim is not None:
+        return rim.angle
+    return (options.rim_angle or 0.0) + (_given_warp(placement, options) or 0.0)
+
+
+def _rim_points(
+    points: Array, outline: Outline, options: RegistrationOptions
+) -> tuple[NDArray[np.bool_], str]:
+    beyond = clamp_points(points, outline)
+    seen = beyond.sum() >= LEAST and in_all_quarters(points[beyond])
+    if options.plane == "clamp" and not seen:
+        problem = "too few points beyond the rim to lay a plane through the clamp; choose 'edge'"
+        raise InputError(None, "plane", problem)
+    if seen and options.plane != "edge":
+        return beyond, "clamp"
+    return (outline.share(points[:, :2]) > EDGE) & ~beyond, "edge"
+
+
+def _motions(frames: Sequence[Frame], outline: Outline) -> tuple[RigidMotion, ...]:
+    found = []
+    for frame in frames:
+        clamp = clamp_points(frame.points, outline)
+        found.append(clamp_motion(frame, clamp) if clamp.any() else UNKNOWN)
+    return tuple(found)
+
+
+def _given_warp(placement: Placement, options: RegistrationOptions) -> float | None:
+    """Degrees from the plane's x to the warp, where it is given."""
+    if options.warp_points is not None:
+        first, second = placement.places(np.array(options.warp_points, dtype=float))[:, :2]
+        return warp_of_points(first, second)
+    return options.warp
+
+
+def _warp(
+    frames: Sequence[Frame],
+    placement: Placement,
+    semi_axes: tuple[float, float],
+    rim: Rim | None,
+    options: RegistrationOptions,
+) -> tuple[float, WarpDirection | None]:
+    """Degrees from the plane's x to the warp."""
+    given = _given_warp(placement, options)
+    if given is not None:
+        return given, None
+    if semi_axes[0] == semi_axes[1] or options.rim_angle is None:
+        found = warp_of_field(frames, min(semi_axes), options.warp_is_stiff)
+    elif rim is None:
+        problem = "expected the warp, too, where the centre of an elliptic rim is given"
+        raise InputError(None, "warp", problem)
+    else:
+        found = warp_of_rim(frames, min(semi_axes), rim, options.rim_angle)
+    return found.angle, found
+
+
+def _from_camera_x(placement: Placement) -> float:
+    """Degrees from the camera's x, laid into the plane, to the test's x."""
+    x = placement.axes @ np.array([1.0, 0.0, 0.0])
+    return line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))
+
+
+def register_fields(
+    fields: Sequence[DisplacementField],
+    outline: Outline,
+    options: RegistrationOptions = ALL_FOUND,
+) -> tuple[tuple[DisplacementField, ...], Registration]:
+    """As `register`, of fields by rising pressure.
+
+    outline : of the rim, its angle counted from the warp. Without a measured height of the
+    reference state the sheet is taken to lie in the camera's plane.
+
+    Raises
+    ------
+    InputError : as `register`; a plane to be found without a measured height.
+    """
+    measured = all(field.z is not None for field in fields)
+    if not measured:
+        if options.plane not in ("found", "camera"):
+            problem = "the files have no height z of the reference state to lay a plane through"
+            raise InputError(None, "plane", problem)
+        options = replace(options, plane="camera")
+    semi_axes = outline.major, outline.minor
+    if not outline.round:
+        options = replace(options, rim_angle=outline.angle)
+    frames, registration = register([field.frame for field in fields], semi_axes, options)
+    moved = [
+        replace(
+            field,
+            points=frame.points[:, :2],
+            z=frame.points[:, 2] if measured else None,
+            displacement=frame.displacement,
+        )
+        for field, frame in zip(fields, frames, strict=True)
     ]
-    note = "lengths and directions in the camera's coordinates"
-    return Table("Registration", ["step", "value", "how"], rows, note)
-
-
-def registration_line(found: Registration) -> str:
-    """One line for the terminal."""
-    x, y, z = found.placement.origin
-    how = "given" if found.warp is None else f"+- {found.warp.error:.1g}"
-    return (
-        f"registration: centre {x:.2f}, {y:.2f}, {z:.2f} mm, tilt {found.placement.tilt:.2f}, warp "
-        f"{found.warp_angle:.2f} degrees ({how})"
-    )
-
-
-def _warp_words(found: Registration) -> str:
-    assert found.warp is not None
-    if found.warp.clear is None:
-        return f"found by the turn of the elliptic rim, +- {found.warp.error:.2g}"
-    stiff = "stiffer" if found.options.warp_is_stiff else "softer"
-    return (
-        f"found by symmetry ({found.warp.clear:.0%} clear), +- {found.warp.error:.2g}; the "
-        f"{stiff} of the two axes"
-    )
-
-
-def _motion_words(found: Registration) -> tuple[str, str]:
-    seen = [m for m in found.motions if m.points]
-    if not seen:
-        return "not known", "no points beyond the rim all around"
-    shift = max(float(np.linalg.norm(m.shift)) for m in seen)
-    turn = max(m.angle for m in seen)
-    removed = "removed" if found.options.remove_clamp_motion else "left in"
-    return f"{shift:.3g} mm, {turn:.2g} degrees at most", removed
-
-
-def registration_picture(
-    fields: Sequence[DisplacementField], outline: Outline, out: Output
-) -> Shown:
-    """Maps of the reference height, where it was measured, and of the highest rise."""
-    last = fields[-1]
-    maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
-    if last.z is not None:
-        maps.insert(0, ("reference height z, mm", last.z))
-    plot_registration(out.path(PICTURE), last.points, maps, outline.edge())
-    return out.name(PICTURE), "measured points in the test's coordinates, the rim, warp and fill"
+    return tuple(moved), registration

@@ -2,18 +2,336 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, StringConstraints
 
-from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS
-from ...sections import LengthUnit, Name, Number, Positive, Section
-from .correlation_section import CorrelationSection
-from .filter_section import FilterSection
-from .outline_section import EllipseSection
-from .pressure_section import PressureSection
-from .registration_section import RegistrationSection
-from .sheet_section import SheetSection
+from ...errors import InputError
+from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
+from ...meshes.reading import Facet
+from ...readers.sections import LengthUnit, Number, Positive, Section
+from ...readers.sections import Name as Name_of_sections
+from ..keys import ChannelSection
+from ..kinds import Place
+from .registration import PlaneOf, RegistrationOptions
+
+Words = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=300, pattern=r"^[^\r\n]*$"),
+]
+
+
+class CorrelationSection(Section):
+    """Words with their units, as they are to stand in a report; no result depends on them."""
+
+    software: Words | None = None
+    camera: Words | None = None
+    resolution: Words | None = None
+    lens: Words | None = None
+    field_of_view: Words | None = None
+    scale: Words | None = None
+    stereo: Words | None = None
+    exposure: Words | None = None
+    pattern: Words | None = None
+    pattern_size: Words | None = None
+    subset: Words | None = None
+    step: Words | None = None
+    strain_window: Words | None = None
+    matching: Words | None = None
+    prefilter: Words | None = None
+
+
+class FilterSection(Section):
+    """The model is read as the camera reads the fabric."""
+
+    facet: Positive
+    order: Literal[1, 2] = 1
+    smoothing: int = 1
+    step: Positive | None = None
+
+
+def facet_of(
+    section: FilterSection | None, place: Place, scale: float, symmetry: str, match: str
+) -> Facet | None:
+    """The facet of a section, in mm; None where points are read as they are.
+
+    scale : mm per unit of the project's lengths.
+
+    Raises
+    ------
+    InputError : what makes no facet; a quarter model, or surfaces that are matched.
+    """
+    if section is None:
+        return None
+    at = "data.points.filter"
+    if symmetry == "quarter":
+        problem = 'a facet reaches over the edge of a quarter; expected symmetry = "full"'
+        raise place.error(at, problem)
+    if match != "points":
+        raise place.error(at, "surfaces are matched, not points: leave this out")
+    step = None if section.step is None else section.step * scale
+    try:
+        return Facet(section.facet * scale, section.order, section.smoothing, step)
+    except InputError as error:
+        raise place.error(f"{at}.{error.field}", error.problem) from None
+
+
+class EllipseSection(Section):
+    """[bubble.ellipse]: the clamped edge is an ellipse, in place of `radius`."""
+
+    major: Positive
+    minor: Positive
+    angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
+
+
+def outline_of(section: BubbleSection, place: Place) -> Outline:
+    """The edge in mm.
+
+    Raises
+    ------
+    InputError : neither a radius nor an ellipse, or both; semi-axes the wrong way round, too far
+        apart, or below the fabric's thickness; a quarter of which the yarns are no axes.
+    """
+    length, ellipse = place.scales.length, section.ellipse
+    if section.radius is not None and ellipse is not None:
+        raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
+    if section.radius is not None:
+        outline = Outline.circle(section.radius * length)
+    elif ellipse is not None:
+        outline = Outline(ellipse.major * length, ellipse.minor * length, ellipse.angle)
+    else:
+        problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
+        raise place.error("radius", problem)
+    key = "radius" if ellipse is None else "ellipse.minor"
+    if outline.minor > outline.major:
+        problem = f"expected at most the major {outline.major:g} mm, got {outline.minor:g} mm"
+        raise place.error(key, f"{problem}; 'angle' is that of the major semi-axis")
+    if outline.major > MOST_SLENDER * outline.minor:
+        problem = f"expected at least the {MOST_SLENDER:g}th part of the major {outline.major:g} mm"
+        raise place.error(key, f"{problem}, got {outline.minor:g} mm")
+    if place.fabric.thickness >= outline.minor:
+        problem = (
+            f"expected more than the fabric's thickness {place.fabric.thickness:g} mm, got "
+            f"{outline.minor:g} mm"
+        )
+        raise place.error(key, problem)
+    if section.symmetry == "quarter" and not outline.doubly_symmetric:
+        problem = (
+            f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns: needs 'full'"
+        )
+        raise place.error("symmetry", problem)
+    return outline
+
+
+Unit = Literal["Pa", "hPa", "mbar", "kPa", "psi", "bar", "MPa"]
+Name = Annotated[str, Field(min_length=1)]
+
+
+class LogSection(Section):
+    """[bubble.data.points.pressure.log]: readings by a clock of their own."""
+
+    file: Name
+    format: str | None = None
+    comment: str = "#"
+    decimal: Literal[".", ","] | None = None
+    pressure: ChannelSection = ChannelSection()
+    time: ChannelSection = ChannelSection()
+    rate: Positive | None = None
+    times: Name | None = None
+    times_column: Name | None = None
+    time_in_name: bool | Name = False
+    offset: Number | None = None
+
+
+class PressureSection(Section):
+    """One of `from_name`, `column` and `log` says the pressures; `frames` are evenly spread."""
+
+    from_name: bool | Name = False
+    column: Name | None = None
+    unit: Unit | None = None
+    scale: Number | None = None
+    offset: Number = 0.0
+    log: LogSection | None = None
+    frames: Annotated[int, Field(ge=1, le=10000)] | None = None
+    tolerance: Positive | None = None
+
+
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Degrees = Annotated[float, Field(ge=-180, le=180)]
+
+
+class RegistrationSection(Section):
+    """The files are in the camera's coordinates; what is not given is found."""
+
+    plane: PlaneOf = "found"
+    centre: Triple | None = None
+    warp: Degrees | None = None
+    warp_points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = None
+    warp_is: Literal["stiff", "soft"] = "stiff"
+    remove_clamp_motion: bool = True
+
+
+def registration_options(
+    section: RegistrationSection | None, place: Place, scale: float
+) -> RegistrationOptions | None:
+    """What the section gives, in mm; None where the files are in the test's coordinates.
+
+    scale : mm per unit of the files' lengths.
+
+    Raises
+    ------
+    InputError : an angle and two points.
+    """
+    if section is None:
+        return None
+    marks = None
+    if section.warp_points is not None:
+        first, second = (_point(one, scale) for one in section.warp_points)
+        marks = (first, second)
+    try:
+        return RegistrationOptions(
+            plane=section.plane,
+            centre=None if section.centre is None else _point(section.centre, scale),
+            warp=section.warp,
+            warp_points=marks,
+            warp_is_stiff=section.warp_is == "stiff",
+            remove_clamp_motion=section.remove_clamp_motion,
+        )
+    except InputError as error:
+        raise place.error(f"data.points.registration.{error.field}", error.problem) from None
+
+
+def _point(given: list[float], scale: float) -> tuple[float, float, float]:
+    x, y, z = (scale * value for value in given)
+    return x, y, z
+
+
+Direction = Literal["dx", "dy", "dz"]
+DIRECTIONS: tuple[Direction, ...] = ("dx", "dy", "dz")
+FULL = "a sheet that is not doubly symmetric needs symmetry = 'full'"
+
+
+class SheetSection(Section):
+    """Flat and taut unless something is said."""
+
+    surface: Literal["flat", "measured"] = "flat"
+    degree: Annotated[int, Field(ge=2, le=14)] = 8
+    modes: Annotated[int, Field(ge=0, le=45)] = 0
+    prior: Positive | None = None
+    slack: bool = False
+    slack_prior: Positive = 0.3
+    misfit: Positive | None = None
+    rim: Literal["fixed", "measured"] = "fixed"
+    constant_field: list[Direction] = Field(default_factory=list)
+    from_pressure: Positive | None = None
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """How the sheet lay, and what of it is looked for.
+
+    measured : whether the measured z is the reference surface. degree : of the polynomial through
+    measured heights, and through the measured motion of the rim. modes : how many shapes of the
+    surface are unknowns; prior : mm, one standard deviation of each. slack : whether it is an
+    unknown in both directions; slack_prior : %, one standard deviation. misfit : mm RMS by which a
+    good model is off, against which priors are weighed. moving_rim : whether the
+    rim follows the measurement. constant : directions (0 to 2) of which a field that is the same
+    at all pressures is projected out. since : number of the frame from which displacements are
+    counted, None for the reference picture.
+    """
+
+    measured: bool = False
+    degree: int = 8
+    modes: int = 0
+    prior: float = 3.0
+    slack: bool = False
+    slack_prior: float = 0.3
+    misfit: float = 0.5
+    moving_rim: bool = False
+    constant: tuple[int, ...] = ()
+    since: int | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether anything makes up for a sheet that is not flat."""
+        return bool(self.measured or self.modes or self.constant or self.since is not None)
+
+
+def sheet_of(
+    section: SheetSection,
+    place: Place,
+    pressures: Sequence[float],
+    symmetry: str,
+    of_files: bool,
+    offset: bool,
+) -> Sheet:
+    """The section in mm; pressures are in MPa.
+
+    of_files : whether the data are measured points. offset : whether a displacement offset is an
+    unknown.
+
+    Raises
+    ------
+    InputError : what does not go together.
+    """
+    given = section.model_fields_set
+    if not of_files:
+        for key in ("surface", "rim"):
+            if getattr(section, key) == "measured":
+                raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
+    if symmetry == "quarter":
+        if section.surface == "measured":
+            raise place.error("sheet.surface", f"a measured surface: {FULL}")
+        if not doubly_symmetric(section.modes):
+            raise place.error("sheet.modes", f"{section.modes} modes: {FULL}")
+    either = section.modes or section.slack
+    for key, needs in (
+        ("prior", section.modes),
+        ("slack_prior", section.slack),
+        ("misfit", either),
+    ):
+        if key in given and not needs:
+            what = {"prior": "modes", "slack_prior": "slack", "misfit": "modes or slack"}[key]
+            raise place.error(f"sheet.{key}", f"belongs to {what}, not asked for")
+    since = _frame(section, place, pressures)
+    if since is not None and section.surface == "measured":
+        problem = "a surface measured under pressure is not without stress: use modes instead"
+        raise place.error("sheet.from_pressure", problem)
+    if offset and (since is not None or section.constant_field):
+        problem = "takes up what from_pressure and constant_field take out; use one of them"
+        raise place.error("nuisance.displacement_offset", problem)
+    if since is not None and section.constant_field:
+        problem = "takes out what from_pressure takes out already; use one of them"
+        raise place.error("sheet.constant_field", problem)
+    if section.constant_field and len(pressures) < 2:
+        raise place.error("sheet.constant_field", "nothing is left of the data of one pressure")
+    scale = place.scales.length
+    return Sheet(
+        measured=section.surface == "measured",
+        degree=section.degree,
+        modes=section.modes,
+        prior=3.0 if section.prior is None else section.prior * scale,
+        slack=section.slack,
+        slack_prior=section.slack_prior,
+        misfit=0.5 if section.misfit is None else section.misfit * scale,
+        moving_rim=section.rim == "measured",
+        constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})),
+        since=since,
+    )
+
+
+def _frame(section: SheetSection, place: Place, pressures: Sequence[float]) -> int | None:
+    if section.from_pressure is None:
+        return None
+    near = np.isclose(pressures, section.from_pressure * place.scales.pressure, rtol=1e-6)
+    if not near.any() or len(pressures) < 2:
+        problem = f"expected one of several 'pressures', got {section.from_pressure:g}"
+        raise place.error("sheet.from_pressure", problem)
+    return int(np.argmax(near))
+
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
@@ -27,7 +345,7 @@ class KnownSolutionSection(Section):
     elements: Elements | None = None
     increments: list[Positive] | None = None
     symmetry: Symmetry | None = None
-    solver: Name | None = None
+    solver: Name_of_sections | None = None
 
 
 class ColumnsSection(Section):
@@ -87,7 +405,7 @@ class NuisanceSection(Section):
 class BubbleSection(Section):
     """[[bubble]]: a clamped disk, inflated."""
 
-    name: Name | None = None
+    name: Name_of_sections | None = None
     weight: Positive = 1.0
     radius: Positive | None = None
     ellipse: EllipseSection | None = None

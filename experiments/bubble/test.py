@@ -2,28 +2,125 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...data.outline import Outline
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
-from ...meshes.elliptic_disk import elliptic_disk_mesh
-from ...meshes.facet_reading import Facet
-from ...models.bubble import BubbleModel, default_increments
-from ..base import MakeSolver, Place, Reach, Refined
-from ..fittable import PreparedTest
-from .filter_section import facet_of
-from .increments import merge_increments
-from .outline_section import outline_of
+from ...meshes.bubble_model import BubbleModel, default_increments
+from ...meshes.disk import Outline, elliptic_disk_mesh
+from ...meshes.reading import Facet
+from ..kinds import MakeSolver, Place, PreparedTest, Reach, Refined
 from .point_files import PointFiles, measured_files
-from .section import BubbleSection, Symmetry
-from .sheet_section import Sheet, sheet_of
-from .sources import KnownSolution, data_source
+from .section import (
+    BubbleSection,
+    KnownSolutionSection,
+    Sheet,
+    Symmetry,
+    facet_of,
+    outline_of,
+    sheet_of,
+)
+
+
+def merge_increments(
+    place: Place,
+    field: str,
+    extra: Sequence[float],
+    pressures: Sequence[float],
+) -> tuple[float, ...]:
+    """Load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
+
+    Raises
+    ------
+    InputError : an extra one beyond the last pressure; `field` is their key in the test's section.
+    """
+    steps = list(pressures)
+    for i, step in enumerate(extra):
+        value = step * place.scales.pressure
+        if value > pressures[-1] * (1 + 1e-9):
+            problem = f"expected a step up to the last pressure, got {step:g} beyond it"
+            raise place.error(f"{field}[{i}]", problem)
+        # 22 kPa written twice must not become two steps one rounding error apart.
+        if not np.isclose(steps, value, rtol=1e-9, atol=0.0).any():
+            steps.append(value)
+    return tuple(sorted(steps))
+
+
+@dataclass(frozen=True, eq=False)
+class KnownSolution:
+    """Data to be computed by the forward model.
+
+    beta : MPa, of the form `form`. elements : of the full disk. increments : MPa, containing the
+    pressures. solver : who computes them, the one that fits unless named.
+    """
+
+    beta: NDArray[np.float64]
+    form: str
+    elements: int
+    increments: tuple[float, ...]
+    symmetry: Literal["full", "quarter"]
+    solver: str | None = None
+
+
+def data_source(
+    section: BubbleSection,
+    place: Place,
+    pressures: Sequence[float],
+    increments: Sequence[float],
+    measured: PointFiles | None,
+) -> KnownSolution | PointFiles:
+    """What was measured, or the known solution; pressures and increments are in MPa.
+
+    Raises
+    ------
+    InputError : a folder of files for computed data, more or fewer files than pressures.
+    """
+    known, points = section.data.known_solution, section.data.points
+    if known is not None:
+        return _known(section, known, place, pressures, increments)
+    assert points is not None and measured is not None
+    found, count = len(measured.files), len(pressures)
+    # Where no data are needed, the files may not be there to be counted.
+    counted = place.need_data or found
+    if (
+        measured.recorded is None
+        and points.pressure is None
+        and counted
+        and found not in (count, 1)
+    ):
+        field = "data.points.files" if points.files is not None else "data.points.indices"
+        problem = f"expected one file for each of the {count} pressures, got {found}"
+        if points.files is not None:
+            problem += "; [bubble.data.points.pressure] says at which pressures they were recorded"
+        raise place.error(field, problem)
+    return measured
+
+
+def _known(
+    section: BubbleSection,
+    known: KnownSolutionSection,
+    place: Place,
+    pressures: Sequence[float],
+    increments: Sequence[float],
+) -> KnownSolution:
+    field = "data.known_solution"
+    if known.increments is not None:
+        increments = merge_increments(place, f"{field}.increments", known.increments, pressures)
+    return KnownSolution(
+        beta=np.array(known.beta) * place.scales.modulus,
+        form=known.form,
+        elements=known.elements or section.elements,
+        increments=tuple(increments),
+        symmetry=known.symmetry or section.symmetry,
+        solver=known.solver,
+    )
+
 
 PART = "bubble"
 NO_PRESSURES = (
@@ -151,7 +248,7 @@ class BubbleTest:
         ------
         InputError : in the data. SolverFailure : the known solution cannot be run.
         """
-        from .preparation import prepare
+        from .data import prepare
 
         return prepare(self, law, make_solver)
 

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...materials.card import MaterialCard
-from ..base import CardRun, Place, Simulation, Studied
-from ..exhibit import Output
-from ..predicted import Predicted
+from ..kinds import CardRun, Output, Place, Predicted, Simulation, Studied
 from .section import CylinderSection
 from .test import CylinderTest, read
 
@@ -34,7 +32,7 @@ class CylinderKind:
     @property
     def studied(self) -> Studied:
         """Shape when inflated, stiffness, loads, buckling."""
-        from .studied import STUDIED
+        from .predicted import STUDIED
 
         return STUDIED
 

@@ -3,17 +3,528 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from typing import Any
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ...errors import SolverFailure
 from ...materials.card import MaterialCard
-from ...models.cylinder import CylinderModel
-from ...solvers.base import History
-from ..base import CardRun, Simulation
-from ..exhibit import Output
-from ..predicted import PredictedRun
-from ..records import record_of
-from .outcome import CylinderOutcome
-from .record import Array, arrays_of, depends_on, early_end
+from ...meshes.cylinder_model import CylinderModel
+from ...meshes.mesh import Mesh, surface_strain
+from ...notes import marks
+from ...readers.bending import BendingCurve, BendingError, model_error, scatter
+from ...solvers.base import BandEnd, History
+from ..kinds import (
+    CardRun,
+    Exhibit,
+    Output,
+    PredictedRun,
+    RunRecord,
+    Simulation,
+    Studied,
+    band_of,
+    record_of,
+)
 from .test import PART, CylinderTest
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BendingRun:
+    """A run that did not fail. Frame 0 is the inflated cylinder; frames are those reached.
+
+    Parameters
+    ----------
+    deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3, of the whole cylinder.
+    inflated, bent : (nodes, 3) mm of displacement at the first and the last frame.
+    wrinkled : (frames,) share of the surface, empty where the solver does not say.
+    """
+
+    deflection: Array
+    load: Array
+    pressure: Array
+    volume: Array
+    inflated: Array
+    bent: Array
+    wrinkled: Array
+
+
+def run_of(record: RunRecord) -> BendingRun | None:
+    """The run of a record; None where it failed."""
+    return None if record.failure else BendingRun(**record.arrays)
+
+
+def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
+    """What is kept of a history, by the names of `BendingRun`.
+
+    Raises
+    ------
+    SolverFailure : no gas; fewer frames than asked for, and no word of the solver why.
+    """
+    deflection = np.array([0.0, *model.deflections])
+    reached = len(history.load)
+    if reached < len(deflection) and not early_end(model, history):
+        where = f"at {deflection[reached - 1]:g} of {deflection[-1]:g} mm"
+        raise SolverFailure(f"the results end {where}, and do not say why", "")
+    if history.cavity_pressure is None or history.cavity_volume is None:
+        raise SolverFailure("the results have no gas pressure or no volume", "")
+    run = BendingRun(
+        deflection[:reached],
+        np.asarray(history.load, dtype=float),
+        np.asarray(history.cavity_pressure, dtype=float),
+        np.asarray(history.cavity_volume, dtype=float),
+        history.displacement[0],
+        history.displacement[-1],
+        np.empty(0) if history.wrinkled is None else np.asarray(history.wrinkled, dtype=float),
+    )
+    return {field.name: getattr(run, field.name) for field in fields(run)}
+
+
+def early_end(model: CylinderModel, history: History) -> str:
+    """The solver's own word for an end before the last deflection, "" where it came so far."""
+    if len(history.load) > len(model.deflections):
+        return ""
+    return history.early
+
+
+def depends_on(model: CylinderModel) -> tuple[object, ...]:
+    """All of a model that its result depends on."""
+    mesh = model.mesh
+    return (
+        model.thickness, model.inflation, model.deflections, model.increments, model.collar,
+        model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
+    )  # fmt: skip
+
+
+#: The initial stiffness is that of a straight line through at least so many frames.
+FEWEST = 3
+#: The knee: where the slope has fallen to this part of the initial stiffness.
+KNEE = 0.5
+#: Places in each such stretch at which the slope is looked at.
+STEPS = 20
+#: A limit point: the load falls by more than this part of it afterwards.
+FALL = 0.005
+#: Wrinkled beyond the inflated state: share of the surface. The bodies press up to 0.8 % together
+#: where they touch, from the first millimetres on, long before the beam wrinkles beside the collar.
+ONSET = 0.01
+#: The curve is compared with a straight line up to this part of the load at the knee.
+STRAIGHT = 0.5
+
+Point = tuple[float, float]  # deflection in mm and load in N
+
+
+@dataclass(frozen=True)
+class BendingMeasures:
+    """Numbers of one run that ended; None where the run does not tell.
+
+    Parameters
+    ----------
+    stiffness : N/mm, initial.
+    loads : N by the name of the place where it is read.
+    knee, limit, wrinkles : (deflection, load) where the slope has halved, of the largest load
+        before the load falls, and where wrinkles appear.
+    straightness : R^2 of a straight line before buckling, and its largest deviation over the
+        load there.
+    body_strain : (eps1, eps2) largest on inflation in the body, away from seam and caps;
+        anywhere_strain : on the tube with seam, its edges and ends.
+    pressure_rise : kPa from inflated to the last frame.
+    reached : mm. error : against what was measured.
+    """
+
+    stiffness: float | None
+    loads: Mapping[str, float | None]
+    knee: Point | None
+    limit: Point | None
+    wrinkles: Point | None
+    straightness: tuple[float, float] | None
+    body_strain: tuple[float, float]
+    anywhere_strain: tuple[float, float]
+    pressure_rise: float
+    reached: float
+    error: BendingError | None
+
+    @property
+    def buckling(self) -> Point | None:
+        """The limit point, else the knee."""
+        return self.limit or self.knee
+
+    @property
+    def buckling_is(self) -> str:
+        """What the buckling load is: "limit point", "knee", or "none"."""
+        return "limit point" if self.limit else "knee" if self.knee else "none"
+
+
+def bending_measures(
+    model: CylinderModel, run: BendingRun, measured: Sequence[BendingCurve]
+) -> BendingMeasures:
+    """The numbers of a run of a model, beside what was measured."""
+    d, load, over = run.deflection, run.load, model.reading.slope_over
+    stiffness = initial_stiffness(d, load, over)
+    knee = knee_point(d, load, stiffness, over)
+    body, anywhere = inflation_strain(model.mesh, run.inflated)
+    return BendingMeasures(
+        stiffness,
+        loads_at(d, load, model.reading.places),
+        knee,
+        limit_point(d, load),
+        wrinkle_onset(run),
+        straightness(d, load, knee[1] if knee else float(load.max())),
+        body,
+        anywhere,
+        1e3 * float(run.pressure[-1] - run.pressure[0]),
+        float(d[-1]),
+        model_error(measured, d, load),
+    )
+
+
+def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, float | None]:
+    """Load (N) at places (mm) by name; None at those that the run did not reach."""
+    end = d[-1] * (1 + 1e-9)
+    return {n: float(np.interp(p, d, load)) if p <= end else None for n, p in places.items()}
+
+
+def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
+    """Slope (N/mm) of the straight line through the frames up to `over` mm."""
+    count = max(int((d <= over * (1 + 1e-9)).sum()), FEWEST)
+    if len(d) < 2:
+        return None
+    return float(np.polyfit(d[:count], load[:count], 1)[0])
+
+
+def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> Point | None:
+    """Where the slope over `over` mm first is `KNEE` of the initial stiffness."""
+    half = 0.5 * over
+    if stiffness is None or not stiffness > 0 or d[-1] < 2 * over:
+        return None
+    at = np.linspace(half, d[-1] - half, max(2, round(STEPS * (d[-1] / over - 1)) + 1))
+    slope = (np.interp(at + half, d, load) - np.interp(at - half, d, load)) / over
+    below = np.flatnonzero(slope <= KNEE * stiffness)
+    if not len(below):
+        return None
+    i = int(below[0])
+    place = float(at[i])
+    if i:  # between the two places where it is above and below
+        share = (slope[i - 1] - KNEE * stiffness) / (slope[i - 1] - slope[i])
+        place = float(at[i - 1] + share * (at[i] - at[i - 1]))
+    return place, float(np.interp(place, d, load))
+
+
+def limit_point(d: Array, load: Array) -> Point | None:
+    """The largest load, where the load falls afterwards."""
+    top = int(np.argmax(load))
+    if not load[top:].min() < (1 - FALL) * load[top]:
+        return None
+    return float(d[top]), float(load[top])
+
+
+def wrinkle_onset(run: BendingRun) -> Point | None:
+    """The first frame in which more of the surface is wrinkled than when inflated."""
+    if not len(run.wrinkled):
+        return None
+    more = np.flatnonzero(run.wrinkled > run.wrinkled[0] + ONSET)
+    return (float(run.deflection[more[0]]), float(run.load[more[0]])) if len(more) else None
+
+
+def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] | None:
+    """R^2 of a straight line up to `STRAIGHT` of the buckling load, and how far the curve is off.
+
+    The deviation is the largest, over the load where the part ends.
+    """
+    beyond = np.flatnonzero(load > STRAIGHT * buckling)
+    count = int(beyond[0]) if len(beyond) else len(d)
+    if count < FEWEST + 1:
+        return None
+    x, y = d[:count], load[:count]
+    off = y - np.polyval(np.polyfit(x, y, 1), x)
+    total = float(((y - y.mean()) ** 2).sum())
+    if not total > 0:
+        return None
+    return 1.0 - float((off**2).sum()) / total, float(np.abs(off).max() / y[-1])
+
+
+def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[Point, Point]:
+    """Largest (eps1, eps2) in the middle of the quads of the inflated tube.
+
+    First of the body without the quads that touch seam or caps, which the thick seam and the caps
+    bend; then of the whole tube with its seam.
+    """
+    strain = surface_strain(mesh, inflated)[:, :2]
+    others = np.zeros(len(mesh.points), dtype=bool)
+    for name in ("seam", "caps"):
+        if name in mesh.element_sets:
+            others[mesh.quads[mesh.element_sets[name]]] = True
+    body = mesh.element_sets["body"]
+    free = body[~others[mesh.quads[body]].any(axis=1)]
+    tube = np.concatenate([body, mesh.element_sets.get("seam", body[:0])])
+
+    def largest(quads: NDArray[np.intp]) -> Point:
+        found = strain[quads].max(axis=0)
+        return float(found[0]), float(found[1])
+
+    return largest(free if len(free) else body), largest(tube)
+
+
+CURVE = ("deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3", "wrinkled_share")
+MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetitions")
+
+
+def columns_of(m: BendingMeasures | None, places: Sequence[str]) -> Mapping[str, object]:
+    """A row of the table of runs; None where a run does not tell, or failed."""
+    error = None if m is None else m.error
+    row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
+    for name in ("knee", "limit", "wrinkles"):
+        point = (getattr(m, name) if m else None) or (None, None)
+        row |= {f"{name}_mm": point[0], f"{name}_N": point[1]}
+    row |= {f"load_at_{p.replace(' ', '_')}_N": m and m.loads[p] for p in places}
+    body = m.body_strain if m else (None, None)
+    return row | {
+        "inflation_warp_strain": body[0],
+        "inflation_fill_strain": body[1],
+        "pressure_rise_kPa": m and m.pressure_rise,
+        "rms_N": error and error.rms,
+        "rms_relative": error and error.relative,
+        "mean_error_N": error and error.mean,
+        "compared": error and error.compared,
+        "reached_mm": m and m.reached,
+    }
+
+
+def curve_of(run: BendingRun | None) -> pd.DataFrame:
+    """A run frame by frame; no rows where it failed."""
+    if run is None:
+        return pd.DataFrame({name: np.empty(0) for name in CURVE})
+    share = run.wrinkled if len(run.wrinkled) else np.full(len(run.load), np.nan)
+    values = (run.deflection, run.load, 1e3 * run.pressure, run.volume, share)
+    return pd.DataFrame(dict(zip(CURVE, values, strict=True)))
+
+
+def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
+    """Mean and scatter of the repetitions on a grid, of the tests that were measured."""
+    parts = []
+    for test in tests:
+        if test.measured:
+            s = scatter(test.measured)
+            values = ([test.name] * len(s.mean), s.deflection, s.mean, s.deviation, s.count)
+            parts.append(pd.DataFrame(dict(zip(MEASURED, values, strict=True))))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(MEASURED))
+
+
+def place_names(tests: Sequence[CylinderTest]) -> list[str]:
+    """Where loads are listed, of all tests, each once."""
+    return list(dict.fromkeys(name for test in tests for name in test.reading.places))
+
+
+def load_words(load: float | None, sigma: float | None, unit: str = "") -> str:
+    """A load (N), with one standard deviation where it is known."""
+    if load is None:
+        return "-"
+    return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
+
+
+def terminal_table(
+    runs: Sequence[PredictedRun],
+    measures: Mapping[int, BendingMeasures],
+    ended: Sequence[str],
+    sigma: Mapping[int, Mapping[str, float | None]] | None = None,
+) -> list[str]:
+    """Stiffness, buckling, loads and errors, run by run; sigma : of the loads, N, by number."""
+    spreads = sigma or {}
+    places = place_names([run.test for run in runs])
+    widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
+    compared = any(m.error is not None for m in measures.values())
+    count = 3 if any(run.wall for run in runs) else 2
+    rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
+    names = [row[:count] for row in rows]
+    wide = [max(map(len, column)) for column in zip(*names, strict=True)]
+    starts = ["  ".join(f"{n:<{w}}" for n, w in zip(row, wide, strict=True)) for row in names]
+    head = f"{starts.pop(0)}   N/mm   buckles at"
+    head += "".join(f"{p:>{w}}" for p, w in zip(places, widths, strict=True))
+    lines = [head + ("   error" if compared else "")]
+    for i, run in enumerate(runs):
+        start, m = starts[i], measures.get(i)
+        if m is None:
+            lines.append(f"{start}  {ended[i]}")
+            continue
+        at = f"{m.buckling[1]:.0f} N {m.buckling[0]:.0f} mm" if m.buckling else "-"
+        text = f"{start} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6} {at:>13}"
+        for place, width in zip(places, widths, strict=True):
+            load = m.loads.get(place)
+            text += f"{load_words(load, spreads.get(i, {}).get(place), ' N'):>{width}}"
+        if compared:
+            text += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
+        words = [ended[i]] if run.record.early else []
+        if marked := marks(run.notes):
+            words.append(f"[{', '.join(marked)}]")
+        lines.append("  ".join([text, *words]))
+    return lines
+
+
+FINISHED = "finished"
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderOutcome:
+    """Runs of cylinders with cards, in the order given, and what they say."""
+
+    runs: Sequence[PredictedRun]
+
+    @cached_property
+    def bent(self) -> Mapping[int, BendingRun]:
+        """The runs that did not fail, by number."""
+        found = {i: run_of(run.record) for i, run in enumerate(self.runs)}
+        return {i: run for i, run in found.items() if run is not None}
+
+    @cached_property
+    def measures(self) -> Mapping[int, BendingMeasures]:
+        """Their numbers."""
+        return {
+            i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
+            for i, run in self.bent.items()
+        }
+
+    @cached_property
+    def band(self) -> Sequence[BandEnd]:
+        """The ends of the band that the solver gives, first what is predicted; or none."""
+        return band_of(self.runs)
+
+    def other_end(self, number: int) -> BendingRun | None:
+        """Of the band of a run: with the same card in the same test, where it did not fail."""
+        own = self.runs[number]
+        for i, run in enumerate(self.runs):
+            if run.test is own.test and run.card == own.card and not run.predicted:
+                return self.bent.get(i)
+        return None
+
+    @cached_property
+    def spreads(self) -> Mapping[int, Array]:
+        """(frames,) N, one standard deviation of the load by what the card leaves open.
+
+        Of the runs with laws around the card's, by number; NaN where that is not known.
+        """
+        found = {}
+        for i, bent in self.bent.items():
+            around = self.runs[i].around
+            if around is not None:
+                others = [run_of(record) for record in around.records]
+                loads = [None if other is None else other.load for other in others]
+                found[i] = around.sigma(bent.load, loads)
+        return found
+
+    def sigma(self, number: int) -> dict[str, float | None]:
+        """N, of the load at each place that is read; None where it is not known."""
+        own = self.spreads.get(number)
+        if own is None:
+            return dict.fromkeys(self.measures[number].loads)
+        places = self.runs[number].test.reading.places
+        known = loads_at(self.bent[number].deflection, own, places)
+        return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
+
+    def _around(self, number: int) -> str | None:
+        """What was run around a run."""
+        around = self.runs[number].around if number in self.spreads else None
+        return None if around is None else around.words
+
+    @property
+    def unsure(self) -> Sequence[str]:
+        """What is to be said of cards of which no spread is known."""
+        cards = [run.card for run in self.runs if run.material.certainty is None]
+        names = ", ".join(dict.fromkeys(cards))
+        return [f"no spread of loads with {names}: the card does not say how sure it is"] * bool(
+            names
+        )
+
+    def ended(self, number: int) -> str:
+        """How a run ended: "finished", how far it came, or why it failed."""
+        record = self.runs[number].record
+        if record.failure:
+            return f"failed: {record.failure}"
+        if not record.early:
+            return FINISHED
+        whole, reached = self.runs[number].test.deflections[-1], self.bent[number].deflection[-1]
+        return f"stopped at {reached:g} of {whole:g} mm: {record.early}"
+
+    def error(self, number: int) -> float | None:
+        """RMS of model less reading over the largest load read; None where there is none."""
+        measures = self.measures.get(number)
+        return None if measures is None or measures.error is None else measures.error.relative
+
+    def numbers(self, number: int) -> Mapping[str, Any]:
+        """Of a run that did not fail, for result.json."""
+        m = self.measures[number]
+        names = ("warp", "fill")
+        return {
+            "reached_mm": m.reached,
+            "stiffness_N_per_mm": m.stiffness,
+            "buckling": {"is": m.buckling_is, **_point(m.buckling)},
+            "knee": _point(m.knee),
+            "limit_point": _point(m.limit),
+            "wrinkle_onset": _point(m.wrinkles),
+            "load_N": dict(m.loads),
+            "load_sigma_N": self.sigma(number),
+            "spread": self._around(number),
+            "inflation_strain": {
+                "body": dict(zip(names, m.body_strain, strict=True)),
+                "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
+            },
+            "straight_before_buckling": None
+            if m.straightness is None
+            else {"r_squared": m.straightness[0], "largest_deviation": m.straightness[1]},
+            "pressure_rise_kPa": m.pressure_rise,
+            "error": None if m.error is None else asdict(m.error),
+        }
+
+    def columns(self, number: int) -> Mapping[str, object]:
+        """A row of the table of runs."""
+        places = self.runs[number].test.reading.places
+        row = dict(columns_of(self.measures.get(number), tuple(places)))
+        if number in self.spreads:
+            sigma = self.sigma(number)
+            row |= {f"load_at_{p.replace(' ', '_')}_sigma_N": sigma[p] for p in places}
+        return row
+
+    def curve(self, number: int) -> pd.DataFrame:
+        """Frame by frame: deflection, load, gauge pressure, volume, wrinkled share."""
+        curve = curve_of(self.bent.get(number))
+        if number in self.spreads:
+            curve["load_sigma_N"] = self.spreads[number]
+        return curve
+
+    def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
+        """What a cylinder is, for result.json."""
+        return {
+            "diameter_mm": test.diameter,
+            "pressure_kPa": 1e3 * test.pressure,
+            "length_mm": test.length,
+            "seam_width_mm": test.seam_width,
+            "element_size_mm": test.size,
+            "symmetry": test.symmetry,
+            "supports": asdict(test.supports),
+            "collar": asdict(test.collar),
+            "places_mm": dict(test.reading.places),
+            "slope_over_mm": test.reading.slope_over,
+            "repetitions": len(test.measured),
+        }
+
+    def lines(self) -> Sequence[str]:
+        """A table for the terminal."""
+        ended = [self.ended(i) for i in range(len(self.runs))]
+        sigma = {i: self.sigma(i) for i in self.spreads}
+        return [*terminal_table(self.runs, self.measures, ended, sigma), *self.unsure]
+
+    def show(self, out: Output) -> Exhibit:
+        """Write figures, tables and beams."""
+        from .report import exhibit
+
+        return exhibit(self, out)
+
+
+def _point(point: Point | None) -> dict[str, float | None]:
+    return {"deflection_mm": point[0] if point else None, "load_N": point[1] if point else None}
 
 
 class CylinderPredicted:
@@ -61,3 +572,42 @@ def simulate(
         for i, run in enumerate(predicted)
     }
     return Simulation({"cards": numbers}, outcome.lines())
+
+
+def deflection_curve(model: CylinderModel, history: History) -> tuple[Array, Array]:
+    """Deflection (mm) and load (N) from the inflated cylinder to where the run ended."""
+    return np.array([0.0, *model.deflections])[: len(history.load)], history.load
+
+
+def loads(model: CylinderModel, history: History) -> dict[str, float]:
+    """Load (N) at the places where the curve is read, as far as the run went."""
+    read = loads_at(*deflection_curve(model, history), model.reading.places)
+    return {f"load at {place}, N": load for place, load in read.items() if load is not None}
+
+
+def quantities(model: CylinderModel, history: History) -> dict[str, float]:
+    """What a study of the mesh looks at; knee and limit point where the run has them."""
+    mesh, over = model.mesh, model.reading.slope_over
+    inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])
+    values = {"radius at mid-span, inflated, mm": inflated}
+    if history.cavity_volume is not None:
+        values["volume, inflated, l"] = 1e-6 * float(history.cavity_volume[0])
+    d, load = deflection_curve(model, history)
+    stiffness = initial_stiffness(d, load, over)
+    if stiffness is not None:
+        values["initial stiffness, N/mm"] = stiffness
+    values |= loads(model, history)
+    knee = knee_point(d, load, stiffness, over)
+    for name, point in (("knee", knee), ("limit", limit_point(d, load))):
+        if point is not None:
+            values[f"load at the {name} point, N"] = point[1]
+    return values
+
+
+STUDIED = Studied(
+    steps=lambda model: (*model.inflation, *model.increments),
+    quantities=quantities,
+    responses=loads,
+    response="load",
+    curve=deflection_curve,
+)

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...sections import Name, Number, Positive, Section
-from ..channels import ChannelSection
+from ...readers.sections import Name, Number, Positive, Section
+from ..keys import ChannelSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]

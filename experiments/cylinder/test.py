@@ -5,22 +5,68 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ...data.bending import BendingCurve
-from ...data.frames import FrameSource
 from ...errors import InputError
-from ...models.bending import DEFLECTION, FRAMES, LENGTH, SEAM_WIDTH, inflated_cylinder
-from ...models.bodies import Collar, RigidSupports, usual_collar
-from ...models.cylinder import CylinderModel
-from ...models.gas import Gas
-from ...models.reading import CurveReading, curve_reading
-from ..base import Place, Reach, Refined
-from ..data_files import DataFile, joined
-from .measured import read_measured
-from .section import CylinderSection
+from ...meshes.cylinder_model import (
+    DEFLECTION,
+    FRAMES,
+    LENGTH,
+    SEAM_WIDTH,
+    Collar,
+    CurveReading,
+    CylinderModel,
+    Gas,
+    RigidSupports,
+    curve_reading,
+    inflated_cylinder,
+    usual_collar,
+)
+from ...readers.bending import BendingCurve, read_bending_curves
+from ...readers.frames import FrameSource
+from ...reading import is_file
+from ..keys import channel_of, named_format
+from ..kinds import DataFile, Place, Reach, Refined, joined
+from .section import CylinderSection, MeasuredSection
+
+
+def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
+    """Every repetition in the files of a section; none where it lists none.
+
+    Raises
+    ------
+    InputError : a file that is listed twice or is not there; of a file, naming it and the line.
+    """
+    names = section.files or []
+    folder = place.data_folder
+    if folder is None:
+        folder = place.path.parent / section.folder
+    format = named_format(place, "measured.format", "machine table", section.format)
+    curves: list[BendingCurve] = []
+    for k, name in enumerate(names):
+        file, key = folder / name, f"measured.files[{k}]"
+        if Path(name) in map(Path, names[:k]):
+            raise place.error(key, f"{name!r} is listed twice; it would count double")
+        if not is_file(file):
+            if not place.need_data:
+                continue
+            raise place.error(key, f"there is no file {file}; --data DIR names another folder")
+        curves += read_bending_curves(
+            file,
+            deflection=channel_of(section.deflection),
+            load=channel_of(section.load),
+            repetition=section.repetition,
+            preload=section.preload,
+            zero=section.zero,
+            comment=section.comment,
+            decimal=section.decimal,
+            format=format,
+        )
+    return tuple(curves)
+
 
 #: The one part of the test.
 PART = "cylinder"

@@ -1,6 +1,86 @@
 """Strip tests: cut strips pulled along warp, fill and 45 degrees, loads over a gauge's length."""
 
-from ..base import Kind
-from .kind import Strips
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from pydantic import BaseModel
+
+from ...materials.card import MaterialCard
+from ...meshes.strip_models import UniaxialModel
+from ...solvers.base import History
+from ..kinds import (
+    Candidate,
+    CardRun,
+    Kind,
+    Output,
+    Place,
+    Planning,
+    Predicted,
+    Simulation,
+    Studied,
+)
+from .objective import Array
+from .section import StripsSection
+from .test import StripsTest, read
+
+
+def _end_load(model: UniaxialModel, history: History) -> dict[str, float]:
+    return {"load at the end, N": float(history.load[-1])}
+
+
+def _load_curve(model: UniaxialModel, history: History) -> tuple[Array, Array]:
+    return np.array(model.elongations), history.load
+
+
+class Strips:
+    """Cut strips pulled along warp, fill and across the yarns."""
+
+    name: str = "strips"
+    title: str = "cut strips pulled along warp, fill and 45 degrees"
+    section: type[BaseModel] = StripsSection
+    folder_key: str = "data.folder"
+    fitted: bool = True
+    predicted: Predicted | None = None
+    doubts: tuple[str, ...] = (
+        "elongation-unit", "load-unit", "preload", "after-failure", "swapped",
+    )  # fmt: skip
+    studied: Studied | None = Studied(
+        steps=lambda model: model.elongations,
+        quantities=_end_load,
+        responses=_end_load,
+        response="load",
+        curve=_load_curve,
+    )
+
+    def read(self, section: StripsSection, place: Place, name: str) -> StripsTest:
+        """The test of a section, and its load curves.
+
+        Raises
+        ------
+        InputError : naming the file and the dotted key, or a data file.
+        """
+        return read(section, place, name)
+
+    def simulate(
+        self,
+        test: StripsTest,
+        cards: Mapping[str, MaterialCard],
+        runs: Mapping[tuple[str, str], CardRun],
+        out: Output,
+        within_range: bool = False,
+    ) -> Simulation:
+        """Cards on the strips: loads.csv, loads.png, the deformed bias strips, RMS errors."""
+        from .simulated import simulate
+
+        return simulate(test, cards, runs, out, within_range)
+
+    def candidates(self, planning: Planning) -> Sequence[Candidate]:
+        """Strips along the yarns and at angles to them."""
+        from .candidates import candidates
+
+        return candidates(planning)
+
 
 KIND: Kind = Strips()

@@ -9,12 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from ...data.curves import DIRECTIONS, LoadCurve
-from ...models.uniaxial import GRIP_DISTANCE, WIDTH
-from ..candidates import Candidate, Planning, Precision
-from .independent import PLACES
-from .prepared import PreparedStrips, loads_to_match
-from .strip import Strip
+from ...meshes.strip_models import GRIP_DISTANCE, WIDTH
+from ...readers.curves import DIRECTIONS, LoadCurve
+from ..kinds import Candidate, Planning, Precision
+from .data import Strip
+from .prepared import PLACES, PreparedStrips, loads_to_match
 from .test import StripsTest
 
 #: Degrees from the pull to the warp yarn, of strips across the yarns.

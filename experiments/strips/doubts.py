@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..doubts import Doubt, Expected
-from .strip import Strip
+from ..kinds import Doubt, Expected
+from .data import Strip
 
 Array = NDArray[np.float64]
 

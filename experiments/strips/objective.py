@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from ...errors import InputError
-from ...identification.comparison import NoiseIs
+from ...inference.comparison import NoiseIs
 from ...solvers.base import History
 
 Array = NDArray[np.float64]

@@ -4,24 +4,101 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from ...identification.comparison import Comparison
+from ...inference.comparison import Comparison
+from ...inference.noise import alike
 from ...materials.law import HypoelasticLaw
-from ...models.uniaxial import UniaxialModel
+from ...meshes.strip_models import UniaxialModel
 from ...solvers.base import History
-from ..base import MakeSolver, Reach
-from ..data_files import DataFile, joined
-from ..doubts import Doubt, Expected
-from ..exhibit import Exhibit, Output
-from ..fittable import Findings, FittedTest, Masks, Weighting
+from ..kinds import (
+    DataFile,
+    Doubt,
+    Exhibit,
+    Expected,
+    Findings,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Output,
+    Reach,
+    Weighting,
+    joined,
+)
+from .data import Strip
 from .doubts import doubts_of_strips
-from .independent import loads_alike
 from .objective import Array, LoadObjective
-from .strip import Strip
 from .test import StripsTest, reach_of
+
+# How many independent loads the curves of a direction hold.
+#
+# Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not
+# a hundred measurements, and what a fit knows better for five specimens is by a factor of the root
+# of five, whatever the number of readings.
+
+#: Independent places along the curve of a specimen, where there are no two to compare: those of
+#: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_strips_certainty.py).
+PLACES = 1.25
+#: Specimens behind a polynomial of which nobody says it: as many as ISO 1421 asks for.
+SPECIMENS = 5
+#: Distances along a curve, up to its whole length, at which loads are compared: a specimen may have
+#: ten of them.
+RINGS = 8
+
+
+def loads_alike(
+    strip: Strip, loads: int, noise: float | None, specimens: int | None = None
+) -> float:
+    """How many of so many loads of a direction err as one.
+
+    noise : N, that the project gives of one load: independent of the others' where no two specimens
+    tell. specimens : as for `independent_loads`.
+    """
+    if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
+        return 1.0
+    return max(1.0, loads / independent_loads(strip, specimens))
+
+
+@lru_cache(maxsize=64)
+def independent_loads(strip: Strip, specimens: int | None = None) -> float:
+    """Of all specimens of a direction together, up to the end of the model.
+
+    Of two or more whose points are there: as many places a specimen as do not err as one, by the
+    correlation along it of what it lies beside the polynomial of all, or as the factor says by
+    which it is stiffer, whichever are fewer; times the specimens less one, which that polynomial
+    has taken up. Else `PLACES` a specimen, likewise.
+
+    Parameters
+    ----------
+    specimens : how many there are behind a polynomial, or behind points that do not tell them
+        apart; `SPECIMENS` behind a polynomial, and one of points, where nobody says it.
+    """
+    numbers = np.unique(strip.specimen_of).tolist()
+    if len(numbers) < 2 or strip.polynomial is None:
+        behind = specimens or (1 if strip.curves else SPECIMENS)
+        return PLACES * max(1, behind - 1)
+    elongation, load = strip.points
+    mean = strip.polynomial(elongation)
+    rows = [np.flatnonzero(strip.specimen_of == number) for number in numbers]
+    blocks = [load[own] - mean[own] for own in rows]
+    square = float(np.mean(np.concatenate(blocks) ** 2))
+    if not square > 0:
+        return float(len(numbers) - 1)
+    places = [elongation[own][:, None] for own in rows]
+    along = alike(blocks, places, 1.0 + 1e-9, RINGS)
+    # What a specimen that is stiffer by a factor leaves, which no distance tells.
+    by_factor = [
+        float(block @ mean[own]) ** 2 / max(float(mean[own] @ mean[own]), 1e-300)
+        for block, own in zip(blocks, rows, strict=True)
+    ]
+    together = max(along, float(np.mean(by_factor)) / square)
+    each = float(np.mean([len(block) for block in blocks])) / together
+    return (len(numbers) - 1) * max(1.0, each)
+
 
 OBJECTIVES = {
     "N": "sum of the strips' RMS errors, N",
@@ -79,7 +156,6 @@ class PreparedStrips:
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Directions, and specimens of a direction that has several."""
-        from .parts import parts_of
 
         return parts_of(self)
 
@@ -184,25 +260,25 @@ class PreparedStrips:
 
     def examine(self, out: Output) -> Exhibit:
         """The load curves as they were read."""
-        from .examined import exhibit
+        from .report import exhibit_examined as exhibit
 
         return exhibit(self.test, out)
 
     def findings(self, fitted: FittedTest) -> Findings:
         """What the best fit means for this test."""
-        from .findings import findings_of
+        from .report import findings_of
 
         return findings_of(self.test, self.fitted_strips(fitted))
 
     def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
         """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-        from .exhibit import exhibit
+        from .report import exhibit
 
         return exhibit(self.test, self.fitted_strips(fitted), fitted, out)
 
     def residuals(self, fitted: FittedTest) -> pd.DataFrame:
         """Every matched load, see `tables.residual_table`."""
-        from .tables import residual_table
+        from .report import residual_table
 
         return residual_table(self.fitted_strips(fitted))
 
@@ -215,3 +291,34 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
         raise test.place.error("data", "the load curves are not there")
     elongation = np.array(model.elongations)
     return elongation, strip.polynomial(elongation)
+
+
+def parts_of(prepared: PreparedStrips) -> Mapping[str, Mapping[str, Masks]]:
+    """By sort and name, the points that are kept without each; sorts of one part left out."""
+    test = prepared.test
+    points = test.match_by == "points"
+    counts = {d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched}
+    whole = {prepared.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
+    directions: dict[str, Masks] = {}
+    specimens: dict[str, Masks] = {}
+    for direction, count in counts.items():
+        name = prepared.part(direction)
+        directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
+        others = _without(test.strips[direction]) if points else {}
+        for which, mask in others.items():
+            specimens[f"{direction}, {which}"] = {**whole, name: mask}
+    sorts = {"directions": directions, "specimens": specimens}
+    return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
+
+
+def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
+    """Which points are not of each specimen, by its name; none of a strip of one specimen."""
+    numbers = np.unique(strip.specimen_of).tolist()
+    if len(numbers) < 2:
+        return {}
+    names = [strip.curves[number].specimen for number in numbers]
+    told = {n: f"specimen {n}" for n in names}
+    whose = strip.specimen_of
+    if len(told) < len(names):  # files may name theirs alike
+        return {f"specimen {n + 1}": whose != n for n in numbers}
+    return {told[name]: whose != n for name, n in zip(names, numbers, strict=True)}

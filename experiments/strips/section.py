@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...sections import Name, Positive, Section
+from ...readers.sections import Name, Positive, Section
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]

@@ -11,15 +11,13 @@ import pandas as pd
 
 from ...errors import SolverFailure
 from ...materials.card import MaterialCard
-from ...meshes.strain import middle_strain
-from ...models.uniaxial import UniaxialModel
-from ...reports import plot_loads
+from ...meshes.mesh import middle_strain
+from ...meshes.strip_models import UniaxialModel
+from ...reports.loads import plot_loads
 from ...solvers.base import History
 from ...writing import replacing
-from ..base import CardRun, Simulation
-from ..exhibit import Output
-from ..notes import STRAINS, strains_of
-from .figures import Array, Curve, draw_bias, load_panels
+from ..kinds import STRAINS, CardRun, Output, Simulation, strains_of
+from .report import Array, Curve, draw_bias, load_panels
 from .test import StripsTest
 
 

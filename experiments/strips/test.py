@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...materials.law import HypoelasticLaw
-from ...models.uniaxial import (
+from ...meshes.strip_models import (
     GRIP_DISTANCE,
     WIDTH,
     UniaxialModel,
@@ -20,10 +20,9 @@ from ...models.uniaxial import (
     refined_quads,
     straight_strip,
 )
-from ..base import MakeSolver, Place, Reach, Refined
-from .reading import read_strips
+from ..kinds import MakeSolver, Place, Reach, Refined
+from .data import Strip, read_strips
 from .section import Match, StripsSection, Unit
-from .strip import Strip
 
 if TYPE_CHECKING:
     from .prepared import PreparedStrips

@@ -1,1 +1,449 @@
-"""Constants that designers of membrane structures type in, and the evaluation behind them."""
+"""Linear orthotropic constants per width, in the forms that programs ask for.
+
+Inverse form, strains (change of length over length) of loads per width n (kN/m = N/mm):
+
+    eps_w = n_w / E_w - nu_w n_f / E_f,    eps_f = n_f / E_f - nu_f n_w / E_w.
+
+nu_w is how much the warp contracts when the fill is pulled (published as nu_xy beside E_x, E_y, x
+the warp), nu_f how much the fill contracts when the warp is pulled (nu12 of this program's law).
+Reciprocal constants have nu_w / E_f = nu_f / E_w. The direct form is its inverse:
+
+    n_w = A_w eps_w + A_wf eps_f,    n_f = A_fw eps_w + A_f eps_f.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError
+from ..law import HypoelasticLaw
+from ..responses import biaxial_response
+
+Array = NDArray[np.float64]
+
+#: Relative: constants whose cross terms differ by less are reciprocal.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class DesignersConstants:
+    """Stiffnesses per width in kN/m.
+
+    warp, fill : E_w, E_f. nu_warp, nu_fill : nu_w, nu_f as above. shear : G, None where it is not
+    known: a biaxial test along the yarns says nothing of it.
+    """
+
+    warp: float
+    fill: float
+    nu_warp: float
+    nu_fill: float
+    shear: float | None = None
+
+    @classmethod
+    def of_compliance(cls, compliance: ArrayLike, shear: float | None = None) -> DesignersConstants:
+        """Of eps = C n, C (2, 2) per kN/m.
+
+        Raises
+        ------
+        InputError : a diagonal that is not positive: no such constants.
+        """
+        c = np.asarray(compliance, dtype=float)
+        if not (np.isfinite(c).all() and c[0, 0] > 0 and c[1, 1] > 0):
+            problem = "a fabric would get shorter when it is pulled: these paths have no constants"
+            raise InputError(None, "constants", problem)
+        warp, fill = 1 / c[0, 0], 1 / c[1, 1]
+        return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp), shear)
+
+    @classmethod
+    def of_stiffness(cls, stiffness: ArrayLike, shear: float | None = None) -> DesignersConstants:
+        """Of n = A eps, A (2, 2) kN/m: the direct form.
+
+        Raises
+        ------
+        InputError : it has no inverse of that kind.
+        """
+        a = np.asarray(stiffness, dtype=float)
+        det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
+        if not det > 0:
+            problem = "the direct form has no inverse: these paths have no constants"
+            raise InputError(None, "constants", problem)
+        inverse = np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]]) / det
+        return cls.of_compliance(inverse, shear)
+
+    @property
+    def compliance(self) -> Array:
+        """C (2, 2) of eps = C n, per kN/m."""
+        across = -self.nu_warp / self.fill, -self.nu_fill / self.warp
+        return np.array([[1 / self.warp, across[0]], [across[1], 1 / self.fill]])
+
+    @property
+    def stiffness(self) -> Array:
+        """A (2, 2) of n = A eps, kN/m: the direct form.
+
+        Raises
+        ------
+        InputError : nu_warp nu_fill is not below 1.
+        """
+        rest = 1.0 - self.nu_warp * self.nu_fill
+        if not rest > 0:
+            problem = f"nu_warp nu_fill is {1 - rest:.3g}; expected below 1"
+            raise InputError(None, "constants", problem)
+        a = np.array([[self.warp, self.nu_warp * self.warp], [self.nu_fill * self.fill, self.fill]])
+        return np.asarray(a / rest)
+
+    @property
+    def reciprocal(self) -> bool:
+        """Whether a strain energy belongs to them."""
+        one, other = self.nu_warp / self.fill, self.nu_fill / self.warp
+        return abs(one - other) <= SAME * max(abs(one), abs(other), 1e-300)
+
+    @property
+    def stable(self) -> bool:
+        """Whether every stretch takes work: nu_warp nu_fill < 1 where they are reciprocal."""
+        c = self.compliance
+        return bool(c[0, 0] * c[1, 1] > (0.5 * (c[0, 1] + c[1, 0])) ** 2)
+
+    def strain(self, loads: ArrayLike) -> Array:
+        """(n, 2) of loads (n, 2) kN/m."""
+        return np.asarray(np.asarray(loads, dtype=float) @ self.compliance.T)
+
+
+# Constants from biaxial paths by least squares, as the trade does it.
+#
+# Of every path each yarn's strain is replaced by its regression line over the larger of the two
+# loads (through the beginning of the path), likewise the loads. Constants are then those with the
+# least sum of squares, at points evenly spread along these lines, of strains (inverse form) or of
+# loads (direct form). Two yarns of five ratios are ten strain paths; the eight without the
+# unloaded yarns of 1:0 and 0:1 are the usual choice.
+
+Minimise = Literal["strain", "load"]
+
+#: Points of a line whose squares are added.
+POINTS = 10
+#: Of the larger load's change: a yarn whose load changes by less is unloaded.
+UNLOADED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPath:
+    """The straight lines of one ratio, from its beginning.
+
+    load : (2,) kN/m and strain : (2,) by which they change to the end. residual : (2,) RMS of the
+    measured strains about their lines.
+    """
+
+    ratio: str
+    load: Array
+    strain: Array
+    residual: Array
+
+    @property
+    def unloaded(self) -> tuple[bool, bool]:
+        """Whether the load of the warp, of the fill hardly changes."""
+        least = UNLOADED * float(np.abs(self.load).max())
+        warp, fill = np.abs(self.load) < least
+        return bool(warp), bool(fill)
+
+
+def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
+    """The lines through the beginning of a path: loads (n, 2) kN/m, strains (n, 2).
+
+    Raises
+    ------
+    InputError : a load that does not change.
+    """
+    n, eps = np.asarray(load, dtype=float), np.asarray(strain, dtype=float)
+    larger = n.max(axis=1)
+    s = larger - larger[0]
+    if not float(s @ s) > 0:
+        raise InputError(None, f"ratio {ratio}", "the loads do not change along this path")
+    # With an offset of their own, as the first reading is no better than the others.
+    about = s - s.mean()
+    slopes = about @ np.column_stack([n, eps]) / float(about @ about)
+    whole = slopes * float(s.max())
+    off = (eps - eps.mean(axis=0)) - np.outer(about, slopes[2:])
+    return LinearPath(ratio, whole[:2], whole[2:], np.sqrt(np.mean(off**2, axis=0)))
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is evaluated, and how.
+
+    unloaded : with the strains of unloaded yarns (ten paths of five ratios) or without (eight).
+    reciprocal : nu_w / E_f = nu_f / E_w is asked for. minimise : squares of strains, or of loads.
+    ratios : those that count, all where it is empty.
+    """
+
+    unloaded: bool = False
+    reciprocal: bool = True
+    minimise: Minimise = "strain"
+    ratios: tuple[str, ...] = ()
+
+    def counts(self, path: LinearPath) -> tuple[bool, bool]:
+        """Which yarns of a path count."""
+        if self.ratios and path.ratio not in self.ratios:
+            return False, False
+        warp, fill = path.unloaded
+        return (self.unloaded or not warp), (self.unloaded or not fill)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Constants of some options.
+
+    paths : how many strain paths count. squares : sum of the squares of strain over them, %^2, at
+    `POINTS` of each. rms : by ratio, of the strains of both yarns, all ratios, in %.
+    """
+
+    options: Options
+    constants: DesignersConstants
+    paths: int
+    squares: float
+    rms: Mapping[str, float]
+
+
+#: The usual choice.
+USUAL = Options()
+
+
+def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluation:
+    """The constants with the least squares.
+
+    Raises
+    ------
+    InputError : paths that do not settle them.
+    """
+    matrix, right = _rows(paths, options)
+    # Columns: C_ww, C_ff, C_wf, C_fw (or A), the last two one where they are reciprocal.
+    if options.reciprocal:
+        matrix = np.column_stack([matrix[:, :2], matrix[:, 2] + matrix[:, 3]])
+    if not len(matrix) or np.linalg.matrix_rank(matrix) < matrix.shape[1]:
+        problem = "these ratios do not settle the constants: two that differ are needed at least"
+        raise InputError(None, "ratios", problem)
+    c, *_ = np.linalg.lstsq(matrix, right, rcond=None)
+    whole = np.array([[c[0], c[2]], [c[-1], c[1]]])
+    if options.minimise == "load":
+        constants = DesignersConstants.of_stiffness(whole)
+    else:
+        constants = DesignersConstants.of_compliance(whole)
+    squares, rms, count = 0.0, {}, 0
+    for path in paths:
+        off = 100.0 * np.outer(_shares(), path.strain - constants.strain(path.load))
+        which = np.array(options.counts(path))
+        squares += float((off[:, which] ** 2).sum())
+        count += int(which.sum())
+        rms[path.ratio] = float(np.sqrt(np.mean(off**2)))
+    return Evaluation(options, constants, count, squares, rms)
+
+
+def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluation | None:
+    """The constants; None where the paths do not settle them."""
+    try:
+        return evaluate(paths, options)
+    except InputError:
+        return None
+
+
+def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
+    """What every other choice gives; those that settle no constants are left out."""
+    others = [other for other in every_option(paths) if other != options]
+    found = [evaluate_or_none(paths, other) for other in others]
+    return [one for one in found if one is not None]
+
+
+def every_option(paths: Sequence[LinearPath]) -> list[Options]:
+    """The choices that laboratories make: eight or ten paths, reciprocal or not, strains or loads,
+    and the ratios about 1:1 alone where there are others."""
+    kinds: tuple[Minimise, ...] = ("strain", "load")
+    found = [
+        Options(unloaded, reciprocal, minimise)
+        for minimise, unloaded, reciprocal in product(kinds, (False, True), (True, False))
+    ]
+    there = {path.ratio for path in paths}
+    for few in (("1:1", "1:2"), ("1:1", "2:1"), ("1:1", "2:1", "1:2")):
+        if set(few) < there:
+            found.append(Options(False, True, "strain", few))
+    if not any(any(path.unloaded) for path in paths):
+        found = [o for o in found if not o.unloaded]  # they would be the same
+    return found
+
+
+def _shares() -> Array:
+    return np.arange(1, POINTS + 1) / POINTS
+
+
+def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
+    """Rows of the linear equations, and their right sides."""
+    rows, right = [], []
+    # All points of a straight line say the same: one row with the root of their squares' sum.
+    weight = float(np.sqrt((_shares() ** 2).sum()))
+    for path in paths:
+        given, wanted = path.load, path.strain
+        if options.minimise == "load":
+            given, wanted = wanted, given
+        for yarn, counts in enumerate(options.counts(path)):
+            if counts:
+                row = np.zeros(4)
+                row[yarn], row[2 + yarn] = given[yarn], given[1 - yarn]
+                rows.append(weight * row)
+                right.append(weight * wanted[yarn])
+    return np.array(rows).reshape(-1, 4), np.array(right)
+
+
+#: The five of which designers' constants are made.
+RATIOS = ("1:1", "2:1", "1:2", "1:0", "0:1")
+
+_RATIO = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$")
+
+
+def shares(ratio: str) -> tuple[float, float]:
+    """Loads along warp and fill where the larger is 1.
+
+    >>> shares("1:2"), shares("2/1")
+    ((0.5, 1.0), (1.0, 0.5))
+
+    Raises
+    ------
+    InputError : no such ratio.
+    """
+    found = _RATIO.match(ratio)
+    pair = [float(text.replace(",", ".")) for text in found.groups()] if found else [0.0]
+    if not 0 < max(pair) < math.inf:
+        problem = f"expected a load ratio such as 2:1 (warp to fill), got {ratio[:40]!r}"
+        raise InputError(None, "ratio", problem)
+    return pair[0] / max(pair), pair[1] / max(pair)
+
+
+#: Increments of the law along a path.
+STEPS = 60
+#: Strains of a shear at which G is averaged.
+SHEARS = 61
+
+
+@dataclass(frozen=True, eq=False)
+class LawConstants:
+    """A law as designers' constants.
+
+    evaluation : that was asked for, its constants with the shear stiffness; others : of the other
+    options. lost : by ratio, RMS of what the constants are off the law's own strains along the
+    path, %. largest : by ratio, the law's largest strain, %. shear : (least, largest) G per width
+    over the shear strains, kN/m.
+    """
+
+    evaluation: Evaluation
+    others: tuple[Evaluation, ...]
+    lost: Mapping[str, float]
+    largest: Mapping[str, float]
+    shear: tuple[float, float]
+
+    @property
+    def constants(self) -> DesignersConstants:
+        """What was asked for."""
+        return self.evaluation.constants
+
+    @property
+    def rms(self) -> float:
+        """Over all ratios, %."""
+        return float(np.sqrt(np.mean(np.square([*self.lost.values()]))))
+
+
+def constants_of_law(
+    law: HypoelasticLaw,
+    thickness: float,
+    lowest: float,
+    highest: float,
+    shear_strain: float,
+    options: Options = USUAL,
+    ratios: Sequence[str] = RATIOS,
+) -> LawConstants:
+    """Evaluate a law as a test of five ratios is evaluated.
+
+    Parameters
+    ----------
+    thickness : mm. lowest, highest : kN/m, of the larger load of each ratio. shear_strain : up to
+        which G is averaged.
+
+    Raises
+    ------
+    InputError : loads that do not increase, a law that does not carry them.
+    """
+    if not 0 <= lowest < highest:
+        problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
+        raise InputError(None, "loads", problem)
+    curves = {name: _curve(law, thickness, name, lowest, highest) for name in ratios}
+    lines = [line_of(name, *curve) for name, curve in curves.items()]
+    gammas = np.linspace(0.0, shear_strain, SHEARS)
+    shear = law.G12(gammas) * thickness
+    mean = float(np.trapezoid(shear, gammas) / shear_strain)
+    asked = evaluate(lines, options)
+    asked = replace(asked, constants=replace(asked.constants, shear=mean))
+    others = tuple(evaluate_others(lines, options))
+    lost, largest = {}, {}
+    for name, (load, strain) in curves.items():
+        off = (strain - strain[0]) - asked.constants.strain(load - load[0])
+        lost[name] = float(100 * np.sqrt(np.mean(off**2)))
+        largest[name] = float(100 * np.abs(strain).max())
+    return LawConstants(asked, others, lost, largest, (float(shear.min()), float(shear.max())))
+
+
+def _curve(
+    law: HypoelasticLaw, thickness: float, ratio: str, lowest: float, highest: float
+) -> tuple[Array, Array]:
+    """Loads (n, 2) kN/m of a ratio and the law's strains (n, 2)."""
+    larger = np.concatenate(
+        [np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
+         np.linspace(lowest, highest, STEPS + 1)]
+    )  # fmt: skip
+    loads = np.outer(larger, shares(ratio))
+    found = biaxial_response(law, loads, thickness)
+    if found.reached < len(larger):
+        problem = (
+            f"the law carries no more than {larger[max(found.reached - 1, 0)]:.3g} kN/m at ratio "
+            f"{ratio}: choose a lower stress range"
+        )
+        raise InputError(None, "loads", problem)
+    keep = larger >= lowest
+    return loads[keep], found.elongation[keep]
+
+
+#: The constants of an evaluation whose spread is told.
+CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
+
+
+def row_of(one: Evaluation) -> dict[str, Any]:
+    """Options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
+    c, o = one.constants, one.options
+    direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
+    return {
+        "minimise": o.minimise,
+        "reciprocal": o.reciprocal,
+        "unloaded_yarns": o.unloaded,
+        "ratios": " ".join(o.ratios) or "all",
+        "paths": one.paths,
+        "E_warp_kN_per_m": c.warp,
+        "E_fill_kN_per_m": c.fill,
+        "nu_warp": c.nu_warp,
+        "nu_fill": c.nu_fill,
+        "A_warp_kN_per_m": direct[0, 0],
+        "A_fill_kN_per_m": direct[1, 1],
+        "A_warp_fill_kN_per_m": direct[0, 1],
+        "A_fill_warp_kN_per_m": direct[1, 0],
+        "squares_percent2": one.squares,
+    }
+
+
+def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:
+    """Least and largest of each of `CONSTANTS` over the evaluations."""
+    every = [one.constants for one in evaluations]
+    return {
+        name: (min(getattr(c, name) for c in every), max(getattr(c, name) for c in every))
+        for name in CONSTANTS
+    }

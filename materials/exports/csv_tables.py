@@ -7,8 +7,7 @@ import numpy as np
 from ..card import MaterialCard
 from ..responses import trellis_angle, trellis_curve, uniaxial_curve
 from ..tables import ModulusTable, modulus_tables
-from .base import Export, Says, heading, range_remarks
-from .formats import Format, TableOptions
+from .base import Export, Format, Says, TableOptions, heading, range_remarks
 
 COLUMNS = "direction,log_strain,tangent_modulus_MPa,test_strain,test_stress_MPa"
 

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from ...errors import InputError
-from ..biaxial_reach import largest_load
 from ..card import MaterialCard
-from ..designers.linear import Evaluation, Options
-from ..designers.of_law import LawConstants, constants_of_law
-from ..designers.ratios import RATIOS, shares
-from ..designers.rows import spread_of
+from ..designers import (
+    RATIOS,
+    Evaluation,
+    LawConstants,
+    Options,
+    constants_of_law,
+    row_of,
+    shares,
+    spread_of,
+)
 from ..forms.base import UNLIMITED
-from .base import Says
-from .formats import option
+from ..responses import largest_load
+from .base import Export, Format, Says, heading, option
 
 #: Engineering shear strain up to which G is averaged where the card has no range; and the least
 #: range that is one: no test of the card's fit sheared the fabric where it ends before.
@@ -145,3 +152,100 @@ def _end_of_range(card: MaterialCard) -> float:
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
         raise InputError(None, "--highest", problem)
     return largest_load(card.law, card.thickness, [shares(ratio) for ratio in RATIOS], ends)
+
+
+# What to type into programs whose material is a form: Oasys GSA's fabric, Dlubal RFEM's membrane.
+#
+# GSA: stiffnesses per width (its reference on theory, "Fabric Material"). RFEM takes force over
+# area and a thickness: the stiffness per width over a reference thickness (Dlubal, FAQ 004396).
+
+WHICH_NU = (
+    "which of both Poisson's ratios the program means: pull a strip along the warp and compare its "
+    "width"
+)
+
+
+def _sheet(
+    card: MaterialCard, what: str, says: Says, rows: Sequence[tuple[str, str, str]]
+) -> Export:
+    lines = [f"{name:34s}{value:>14s}  {unit}" for name, value, unit in rows]
+    text = "\n".join([heading(card, what, says, "#"), *lines]) + "\n"
+    return Export({".txt": text}, says)
+
+
+def _with(says: Says, *confirm: str) -> Says:
+    return dataclasses.replace(says, confirm=(*says.confirm, *confirm))
+
+
+def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
+    """The four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
+    linear = linear_card(card, options)
+    c = linear.found.constants
+    rows = [
+        ("Warp modulus", f"{c.warp:.6g}", "kN/m"),
+        ("Weft modulus", f"{c.fill:.6g}", "kN/m"),
+        ("Poisson's ratio (warp-weft)", f"{c.nu_fill:.6g}", ""),
+        ("Shear modulus", f"{c.shear:.6g}", "kN/m"),
+    ]
+    return _sheet(card, "Fabric of Oasys GSA", _with(linear.says, WHICH_NU), rows)
+
+
+def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
+    """An orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
+    linear = linear_card(card, options)
+    c, t = linear.found.constants, card.thickness
+    assert c.shear is not None
+    rows = [
+        ("E_x (warp)", f"{c.warp / t:.6g}", "N/mm^2"),
+        ("E_y (fill)", f"{c.fill / t:.6g}", "N/mm^2"),
+        ("nu_xy (fill contracts)", f"{c.nu_fill:.6g}", ""),
+        ("nu_yx (warp contracts)", f"{c.nu_warp:.6g}", ""),
+        ("G_xy", f"{c.shear / t:.6g}", "N/mm^2"),
+        ("thickness d of the surface", f"{t:.6g}", "mm"),
+    ]
+    says = _with(linear.says, WHICH_NU, "that the surface is a membrane, x along the warp")
+    return _sheet(card, "Orthotropic membrane of Dlubal RFEM", says, rows)
+
+
+FORMATS = (
+    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
+    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
+)
+
+
+COLUMNS = (
+    "chosen", "minimise", "reciprocal", "unloaded_yarns", "ratios", "paths", "E_warp_kN_per_m",
+    "E_fill_kN_per_m", "nu_warp", "nu_fill", "A_warp_kN_per_m", "A_fill_kN_per_m",
+    "A_warp_fill_kN_per_m", "G_kN_per_m", "squares_percent2",
+)  # fmt: skip
+
+
+def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
+    """Inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
+    linear = linear_card(card, options)
+    rows = []
+    for number, one in enumerate(evaluations(linear)):
+        row = {
+            "chosen": "yes" if number == 0 else "",
+            "G_kN_per_m": linear.found.constants.shear,
+            **row_of(one),
+        }
+        rows.append(",".join(_text(row[name]) for name in COLUMNS))
+    meaning = (
+        "# nu_warp: contraction of the warp when the fill is pulled (nu_xy beside E_x, x the "
+        "warp); nu_fill: of the fill when the warp is pulled (nu12 of the card's law)"
+    )
+    head = heading(card, "Constants per width", linear.says, "#")
+    return Export(
+        {".csv": "\n".join([head, meaning, ",".join(COLUMNS), *rows]) + "\n"}, linear.says
+    )
+
+
+def _text(value: Any) -> str:
+    """As the table has it: yes or no, nine digits, words."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+FORMAT = Format("constants", constants, ConstantsOptions, load_ratios=True)

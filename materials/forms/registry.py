@@ -12,7 +12,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from ...errors import BubblefitError, InputError
-from ...plugins import Group, PlugIn, names_with, plug_in_named
+from ...files import Group, PlugIn, names_with, plug_in_named
 from .base import Form
 
 GROUP: Group = "bubblefit.laws"

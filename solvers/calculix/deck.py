@@ -2,14 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ... import __version__
+from ...errors import InputError, SolverFailure
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.disk import rim_form, rim_share
+from ...meshes.mesh import Mesh
+from ...notes import Note, NoteKind
 from ..decks import render
 from .library import MATERIAL, STATE_VARIABLES
-from .shells import ShellMesh
+
+Element = Literal["S4", "S8R"]
+ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
+
+
+@dataclass(frozen=True, eq=False)
+class ShellMesh:
+    """Nodes (n, 3) mm, elements (m, 4 or 8) and sets, numbered from 0; corners come first.
+
+    `corners` : how many nodes are the mesh's own; the others are midsides.
+    """
+
+    points: NDArray[np.float64]
+    elements: NDArray[np.intp]
+    node_sets: Mapping[str, NDArray[np.intp]]
+    corners: int
+
+
+def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
+    """The mesh as S4, or as S8R with a midside node on every edge.
+
+    A midside between two rim nodes is moved out onto the rim's circle or ellipse; a midside whose
+    two ends are in a set is in the set when the edge bounds the mesh.
+
+    Raises
+    ------
+    InputError : another element.
+    """
+    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    if element == "S4":
+        return ShellMesh(points, quads, mesh.node_sets, len(points))
+    if element != "S8R":
+        problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
+        raise InputError(None, "solver.calculix.element", problem)
+    # Edge k of a quad joins corners k and k + 1: the order of S8R's midsides.
+    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2), axis=2)
+    edges, which, used = np.unique(
+        ends.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+    )
+    midsides = points[edges].mean(axis=1)
+    border = used == 1
+    sets = {}
+    for name, nodes in mesh.node_sets.items():
+        inside = border & np.isin(edges, nodes).all(axis=1)
+        sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(inside)])
+        if name == "rim":
+            form = rim_form(points[nodes, :2])
+            own = np.flatnonzero(inside)
+            midsides[own, :2] /= rim_share(form, midsides[own, :2])[:, None]
+    elements = np.concatenate([quads, len(points) + which.reshape(quads.shape)], axis=1)
+    return ShellMesh(np.concatenate([points, midsides]), elements, sets, len(points))
+
 
 MESH, MESH_FILE = "mesh.inp.j2", "mesh.inp"
 #: Iterations before CalculiX judges convergence (8, 12), gives up (24) and so on; cut to half
@@ -77,3 +137,167 @@ def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:
 def _holding(folder: Path | None, name: str) -> Path | None:
     """The user's folder when it has this template too: a deck of one's own can do with our mesh."""
     return folder if folder is not None and (folder / name).is_file() else None
+
+
+T = TypeVar("T")
+#: Makes something of the .frd file and the number of iterations.
+Reader = Callable[[Path, int], T]
+#: Steps and increments that converged in a run that stopped early.
+Converged = Collection[tuple[int, int]]
+#: As a reader, of a run that stopped early; and why it did.
+Rescue = Callable[[Path, int, Converged, str], T]
+
+
+class Run(Protocol):
+    """Runs a deck in a scratch folder of its own."""
+
+    def __call__(
+        self, files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None
+    ) -> T:
+        """What `read` makes of the results, or `rescue` of those of a run that stopped early.
+
+        Parameters
+        ----------
+        files : text of each input file by name.
+
+        Raises
+        ------
+        SolverFailure : it did not end well.
+        """
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How decks are written.
+
+    element : "S8R" or "S4". templates : the user's own folder. shells : the mesh of shells of a
+    mesh of quads, made once.
+    """
+
+    element: str
+    templates: Path | None
+    shells: Callable[[Mesh], ShellMesh]
+
+
+Array = NDArray[np.float64]
+
+#: Corners, then midsides, of the square [-1, 1]^2.
+_NATURAL = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]], float)
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+def pressure_forces(points: Array, elements: NDArray[np.intp], pressure: float) -> Array:
+    """Forces (n, 3) N of `pressure` (MPa) along the normals of elements (m, 4 or 8) at `points`."""
+    forces = np.zeros_like(points)
+    corner = points[elements]
+    for a, wa in zip(_GAUSS, _WEIGHTS, strict=True):
+        for b, wb in zip(_GAUSS, _WEIGHTS, strict=True):
+            values, slopes = _shape(np.array([a, b]), elements.shape[1])
+            base = np.einsum("in,mnk->imk", slopes, corner)
+            normal = np.cross(base[0], base[1])  # its length is the area
+            part = wa * wb * pressure * values[None, :, None] * normal[:, None, :]
+            np.add.at(forces, elements, part)
+    return forces
+
+
+def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
+    """Shape functions (nodes,) and their derivatives (2, nodes) at x (2,)."""
+    s = _NATURAL[:4] * x
+    values = 0.25 * (1 + s[:, 0]) * (1 + s[:, 1])
+    slopes = 0.25 * np.stack([_NATURAL[:4, 0] * (1 + s[:, 1]), _NATURAL[:4, 1] * (1 + s[:, 0])])
+    if nodes == 4:
+        return values, slopes
+    middle, rise = np.empty(4), np.empty((2, 4))
+    for k, (u, v) in enumerate(_NATURAL[4:]):
+        along = 0 if u == 0 else 1  # the coordinate that runs along the edge
+        across, sign = 1 - along, v if u == 0 else u
+        middle[k] = 0.5 * (1 - x[along] ** 2) * (1 + sign * x[across])
+        rise[along, k] = -x[along] * (1 + sign * x[across])
+        rise[across, k] = 0.5 * sign * (1 - x[along] ** 2)
+    # A midside takes half from each of the corners beside it.
+    beside = 0.5 * (np.eye(4) + np.roll(np.eye(4), 1, axis=0))  # corner x midside
+    return (
+        np.concatenate([values - beside @ middle, middle]),
+        np.concatenate([slopes - rise @ beside.T, rise], axis=1),
+    )
+
+
+# A sheet that is not flat, or not taut, and a rim that moves, as shells of CalculiX.
+#
+# CalculiX counts displacements from the nodes of the deck, which are where the sheet is without
+# stress; the model counts them from its reference surface. The two differ by the sheet's slack.
+
+#: Longest first increment of a step in which the rim moves, and how long it stays for it.
+FIRST_OF_STEP = 0.01
+#: Slope of a shell that lowers its stiffness by 2 %.
+STEEP = 0.1
+
+
+def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
+    """The shells where the sheet is without stress; of those on the reference surface."""
+    warp, fill = model.slack
+    return replace(shells, points=shells.points * (1.0 + warp, 1.0 + fill, 1.0))
+
+
+def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
+    """Node and direction (from 1) of the rim's unknowns, and their paths; none if it stays.
+
+    A path is a list of (total time, displacement in mm from the node without stress). A step is 1
+    long, and its first increment (`FIRST_OF_STEP`) has to leave the rim where it is: where a
+    prescribed displacement changes in it, CalculiX begins with a linear iteration, from which a
+    membrane under pressure does not recover.
+
+    Raises
+    ------
+    SolverFailure : the mesh has lines of symmetry; a rim that is moved where shells must not turn
+        crashes CalculiX 2.20.
+    """
+    if model.rim_motion is None and not any(model.slack):
+        return []
+    if {"symmetry_x", "symmetry_y"} & set(shells.node_sets):
+        problem = "takes a slack sheet, or a rim that moves, on the full disk only"
+        raise SolverFailure(problem, "calculix")
+    rim = shells.node_sets["rim"]
+    back = shells.points - without_stress(shells, model).points
+    times, places = [0.0], [np.zeros_like(back)]
+    for i in range(len(model.increments)):
+        moved = back.copy()
+        if model.rim_motion is not None:
+            moved += _with_midsides(shells, model, model.rim_motion[i])
+        times += [i + FIRST_OF_STEP, i + 1.0]
+        places += [places[-1], moved]
+    return [
+        {
+            "node": int(node) + 1,
+            "dof": axis + 1,
+            "path": [(t, float(at[node, axis])) for t, at in zip(times, places, strict=True)],
+        }
+        for node in rim
+        for axis in model.supports["rim"]
+    ]
+
+
+def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:
+    """(nodes, 3) mm: a midside of the rim moves as the middle of its two ends does."""
+    moved = np.zeros_like(shells.points)
+    moved[model.mesh.node_sets["rim"]] = motion
+    if shells.elements.shape[1] == 8:
+        ends = shells.elements[:, :4]
+        moved[shells.elements[:, 4:]] = 0.5 * (moved[ends] + moved[np.roll(ends, -1, axis=1)])
+    return moved
+
+
+def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
+    """What the tilt of the sheet does to the law, where that is worth a word.
+
+    Warp and fill are x and y of the deck, not laid onto every shell: where a shell stands at a
+    slope s, its stiffness along the slope is lower by 2 s^2.
+    """
+    corner = shells.points[shells.elements[:, :4]]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    slope = float((np.hypot(normal[:, 0], normal[:, 1]) / np.abs(normal[:, 2])).max())
+    if slope <= STEEP:
+        return ()
+    lower = f"the sheet's slopes of up to {slope:.2f} lower its stiffness there by up to"
+    words = f"CalculiX takes warp and fill as x and y: {lower} {200 * slope**2:.1f} %"
+    return (Note(NoteKind.TILT, words),)

@@ -38,7 +38,7 @@ def read(filename: Path | str) -> meshio.Mesh:
     # Here, not above: this module is imported with bubblefit, and reading is rare.
     import numpy as np
 
-    from ..cells import cell_blocks
+    from ..base import cell_blocks
     from .frd import FrdFile
 
     file = FrdFile(filename)

@@ -12,9 +12,48 @@ from pathlib import Path
 
 from ...caching import cache_folder
 from ...errors import InputError, OutputError, SolverFailure
+from ...files import render
+from ...materials.card import MaterialCard
+from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
-from ...materials.pieces import piece_constants
-from .law_file import law_number
+from ...materials.tables import piece_constants
+
+# The file that carries a law's moduli into the material library, whatever their number.
+#
+# A deck cannot: CalculiX copies the constants of a material into a field of 21 numbers (2.20; 2.21
+# makes it as long as it must be) and writes on beyond its end without a word.
+
+SUFFIX = ".law"
+#: First line of the file, before the law's number.
+TITLE = "bubblefit law"
+
+
+def law_number(law: HypoelasticLaw) -> int:
+    """What a deck calls the law's moduli: made of all their digits, below 1.1e12."""
+    return int.from_bytes(hashlib.sha256(_numbers(law).encode()).digest()[:5], "big")
+
+
+def law_text(law: HypoelasticLaw) -> str:
+    """Text of the file: title and number; how many pieces E1, E2 and G12 have; a line a piece.
+
+    A piece is the strain up to which it holds and four coefficients (MPa, highest power of the
+    strain first), those of E1 before those of E2 and of G12.
+    """
+    return f"{TITLE} {law_number(law)}\n{_numbers(law)}"
+
+
+def law_files(law: HypoelasticLaw) -> dict[str, str]:
+    """The file by its name, to lie where ccx runs: the library reads every *.law there."""
+    return {f"bubblefit-{law_number(law)}{SUFFIX}": law_text(law)}
+
+
+def _numbers(law: HypoelasticLaw) -> str:
+    constants = piece_constants(law)
+    counts, pieces = constants[:3], constants[3:]
+    rows = [[f"{count:.0f}" for count in counts]]
+    rows += [[repr(value) for value in pieces[i : i + 5]] for i in range(0, len(pieces), 5)]
+    return "".join(" ".join(row) + "\n" for row in rows)
+
 
 #: Name on `*MATERIAL`: CalculiX loads libBUBBLEFIT.so and calls HYPOELASTIC. Several materials in
 #: one deck: MATERIAL + "@BODY", MATERIAL + "@SEAM".
@@ -139,3 +178,34 @@ def _compile(command: list[str]) -> None:
         tail = "\n".join((done.stderr or done.stdout).splitlines()[-25:])
         problem = f"{command[0]} does not compile the material library {SOURCE.name}"
         raise SolverFailure(problem, "calculix", done.returncode, tail)
+
+
+def calculix(card: MaterialCard, options: NoOptions) -> Export:
+    """*MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, and its moduli."""
+    says = Says(
+        carries=(
+            "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
+            "moduli hold, thickness constant or incompressible",
+        ),
+        loses=(
+            "the unsymmetric part of the tangent (CalculiX takes the symmetric one): more "
+            "iterations, the same result",
+            "through the thickness and in transverse shear the material is linear (constants 3 "
+            "and 4)",
+        ),
+        confirm=("that this ccx loads material libraries (Debian's does not): bubblefit doctor",),
+    )
+    text = render(
+        "calculix/card.inp.j2",
+        head=heading(card, "CalculiX material", says, "**"),
+        material=MATERIAL,
+        constants=constants(card.law),
+        states=STATE_VARIABLES,
+        library=LIBRARY_FILE,
+        flags=" ".join(FLAGS),
+    )
+    source = SOURCE.read_text(encoding="utf-8")
+    return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
+
+
+FORMAT = Format("calculix", calculix)

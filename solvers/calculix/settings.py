@@ -6,10 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...sections import Positive
-from ..licence_settings import ExternalSettings
-from ..offer import Offer
-from ..settings import Override
+from ...readers.sections import Positive
+from ..settings import ExternalSettings, Offer, Override
 
 
 class CalculixSettings(ExternalSettings):

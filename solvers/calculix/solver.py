@@ -9,23 +9,20 @@ from typing import Any, TypeVar
 
 from ...errors import BubblefitError, InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh
-from ...models.bubble import BubbleModel
-from ...models.cylinder import CylinderModel
-from ...models.patch import PatchModel
-from ...models.uniaxial import UniaxialModel
-from ..analyses import analysis_of
-from ..base import History, Progress, SolverCheck
-from ..identity import in_words, templates_mark
+from ...meshes.strip_models import PatchModel, UniaxialModel
+from ..base import History, Progress, SolverCheck, analysis_of
+from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder
-from . import bubble, cylinder_analysis, patch, strip
-from .analysis import Reader, Rescue, Run, Setup
-from .executable import ADVICE, Executable, find_ccx
-from .law_file import law_files
-from .library import material_library
-from .reasons import collapsed, increments, reason
-from .shells import ELEMENTS, ShellMesh, shell_mesh
+from . import bubble, strip
+from . import cylinder_results as cylinder_analysis
+from . import strip as patch
+from .deck import ELEMENTS, Reader, Rescue, Run, Setup, ShellMesh, shell_mesh
+from .executable import ADVICE, Executable, collapsed, find_ccx, increments, reason
+from .library import law_files, material_library
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +34,7 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
     BubbleModel: bubble.analyse,
     UniaxialModel: strip.analyse,
     CylinderModel: cylinder_analysis.analyse,
-    PatchModel: patch.analyse,
+    PatchModel: patch.analyse_patch,
 }
 
 

@@ -3,21 +3,285 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from ...errors import LicenceDenied, SolverFailure
+from ...errors import InputError, LicenceDenied, SolverFailure
 from ..base import Progress
-from ..process import Watch, run_process
+from ..disk import WORDS, disk_full
+from ..process import Outcome, Watch, log_tail, run_process
 from ..scratch import run_folder
-from .analysis import Reader
-from .command import find_marc, run_command
-from .deck import JOB
-from .reasons import Ending, ending
-from .settings import MarcSettings
-from .sts import increments
+from .deck import JOB, Reader
+from .settings import VARIABLE, MarcSettings
+
+ADVICE = (
+    f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; "
+    "see `bubblefit docs marc`"
+)
+SECONDS = 60.0
+
+
+def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
+    """Marc on `job`.dat in the current folder, in the foreground and asking nothing.
+
+    Parameters
+    ----------
+    subroutine : file name of user code, which Marc compiles, where the law needs it.
+    """
+    older = settings.options == "older"
+    words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
+    if older:
+        words += ["-nprocd", str(settings.processors)]
+        if settings.threads > 1:
+            words += ["-nthread", str(settings.threads)]
+    else:
+        words += ["-nte", str(settings.threads), "-nts", str(settings.threads)]
+        if settings.processors > 1:
+            words += ["-nps", str(settings.processors)]
+    if subroutine is not None:
+        words += ["-u", subroutine]
+    return with_modules(settings.modules, [*words, *settings.arguments])
+
+
+def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
+    """The command in a login shell that has loaded `modules`; as it is without any."""
+    if not modules:
+        return list(words)
+    load = " && ".join(f"module load {shlex.quote(name)}" for name in modules)
+    # The command's own words never become text of the shell.
+    return ["/bin/bash", "-lc", f'{load} && exec "$@"', "bash", *words]
+
+
+def find_marc(settings: MarcSettings) -> Path | None:
+    """Where run_marc is; None where only the loaded modules know.
+
+    Raises
+    ------
+    InputError : the one that was named is not there or is no program.
+    SolverFailure : there is none on the PATH.
+    """
+    given = Path(os.path.expanduser(settings.executable))
+    if os.sep in settings.executable:
+        if not given.is_file():
+            raise InputError(given, "marc", "there is no such file; name the run_marc to run")
+        if not os.access(given, os.X_OK):
+            raise InputError(given, "marc", "is not executable; chmod +x it, or name another")
+        return given.absolute()
+    if settings.modules:
+        return _in_modules(settings)
+    found = shutil.which(settings.executable)
+    if found is None:
+        raise SolverFailure(f"there is no {settings.executable} on the PATH; {ADVICE}", "marc")
+    return Path(found)
+
+
+def _in_modules(settings: MarcSettings) -> Path | None:
+    """As the shell sees it after `module load`."""
+    ask = with_modules(settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh",
+                                          settings.executable])  # fmt: skip
+    said = None
+    with suppress(OSError, subprocess.SubprocessError):
+        said = subprocess.run(ask, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL)
+    if said is None or said.returncode != 0:
+        lines = said.stderr.decode(errors="replace").strip().splitlines() if said else []
+        why = f" ({lines[-1]})" if lines else ""
+        names = ", ".join(settings.modules)
+        problem = f"modules {names} give no {settings.executable}{why}; {ADVICE}"
+        raise SolverFailure(problem, "marc")
+    path = said.stdout.decode(errors="replace").strip().splitlines()
+    return Path(path[-1]) if path else None
+
+
+_EXIT = re.compile(r"exit\s++number\s*+:?\s*+(\d{1,9})(?!\d)", re.IGNORECASE)
+COLUMNS = 13
+
+
+@dataclass(frozen=True)
+class Increment:
+    """One line of the .sts file: load case, increment, iterations, cut-backs, total time."""
+
+    case: int
+    increment: int
+    iterations: int
+    cut_backs: int
+    time: float
+
+
+def increments(sts: Path) -> list[Increment]:
+    """Increments that ended so far, repeated ones as often as they are there.
+
+    Half a line at the end is left for the next look; lines that are not of 13 numbers are the
+    header and the end.
+    """
+    text = _text(sts)
+    found = []
+    for line in text[: text.rfind("\n") + 1].splitlines():
+        parts = line.split()
+        if len(parts) != COLUMNS:
+            continue
+        try:
+            case, increment, cycles, _, cuts = (int(part) for part in parts[:5])
+            found.append(Increment(case, increment, cycles, cuts, float(parts[10])))
+        except ValueError:
+            continue
+    return found
+
+
+def exit_number(*files: Path) -> int | None:
+    """The last exit number in the first of the files that has one; None: it never ended.
+
+    Of nine digits at most: Marc's have four.
+    """
+    for file in files:
+        numbers = _EXIT.findall(_text(file))
+        if numbers:
+            return int(numbers[-1])
+    return None
+
+
+def repeated(done: list[Increment]) -> int:
+    """How many increments were tried again after they did not converge."""
+    numbers = [one.increment for one in done]
+    return len(numbers) - len(set(numbers))
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="latin-1").replace("\r\n", "\n")
+    except OSError:
+        return ""
+
+
+NORMAL, NO_SMALLER, TURNED = 3004, 3015, 1005
+#: Exit numbers that public sources explain; others are reported as they are.
+MEANINGS = {
+    NO_SMALLER: "the time step could not get smaller: no convergence",
+    TURNED: "an element was turned inside out",
+    3: "run_marc could not compile or link the user subroutine",
+}
+#: Total time that may be missing at the end: the .sts has few digits.
+NEAR = 1e-3
+MOST_LINES = 12
+_ERROR = re.compile(r"\*\*\*\s*error", re.IGNORECASE)
+_INSIDE_OUT = re.compile(r"inside[ -]out(?:\s+at\s+element\s+(\d+))?", re.IGNORECASE)
+_LICENCE = re.compile(r"licen[cs]e", re.IGNORECASE)
+_REFUSED = re.compile(
+    r"error|fail|denied|unable|could not|cannot|(not |un)available|exhausted|no such feature",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a job ended: `problem` in one line, None when well; what Marc said of it.
+
+    licence: it never began, for want of a licence. iterations, repeated: of all increments.
+    """
+
+    problem: str | None
+    number: int | None
+    said: str
+    licence: bool
+    iterations: int
+    repeated: int
+
+    @property
+    def collapse(self) -> bool:
+        """Whether Marc itself gave up, its time step as small as it may be.
+
+        What it wrote until then is a result that ends early; after any other bad end (killed, out
+        of time, an element inside out) there is none.
+        """
+        said = self.problem is not None and self.problem.startswith(MEANINGS[NO_SMALLER])
+        return self.number == NO_SMALLER and said
+
+
+def ending(
+    folder: Path, job: str, screen: str, outcome: Outcome, timeout: float, time: float
+) -> Ending:
+    """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
+
+    Parameters
+    ----------
+    screen : name of the file with what run_marc printed.
+    timeout : s, that it had. time : total time at its end when it ends well.
+
+    The return code of run_marc is not asked: scripts around Marc give any.
+    """
+    done = increments(folder / f"{job}.sts")
+    number = exit_number(
+        *(folder / f"{job}.{end}" for end in ("sts", "log", "out")), folder / screen
+    )
+    texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
+    errors, licence_lines, turned, complaints = _lines(texts)
+    full = disk_full(folder, complaints, outcome)
+    reached = f"after increment {done[-1].increment}" if done else "before the first increment"
+    licence = bool(licence_lines) and not done
+    problem = None
+    if outcome.timed_out:
+        problem, licence = f"did not end within {timeout:g} s: killed {reached}", False
+    elif licence and number != NORMAL:
+        problem = f"no licence: {licence_lines[0]}"
+    elif full and number != NORMAL:
+        problem = f"disk full {reached}: {full}"
+    elif outcome.exit_code < 0 or (outcome.signal_name and number is None):
+        problem = f"killed by {outcome.signal_name} {reached}"
+    elif number is None:
+        what = "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
+        problem = f"{what}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
+    elif turned is not None:
+        problem = f"an element was turned inside out{turned}, {reached}"
+    elif number != NORMAL:
+        meaning = MEANINGS.get(number, "did not end well")
+        problem = f"{meaning}, {reached}"
+    elif not done or done[-1].time < time - NEAR * max(1.0, time):
+        at = done[-1].time if done else 0.0
+        problem = f"ended at time {at:g} of {time:g}, {reached}"
+    said = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
+    return Ending(problem, number, said, licence and problem is not None,
+                  sum(one.iterations for one in done), repeated(done))  # fmt: skip
+
+
+def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
+    """`*** error` lines, refusals of a licence, which element was inside out ("" unknown), and
+    complaints of a full disk.
+    """
+    errors: list[str] = []
+    full: list[str] = []
+    refusals: list[str] = []
+    turned: str | None = None
+    for file in files:
+        try:
+            # The .out of a long job is large: line by line.
+            with file.open(encoding="latin-1") as text:
+                for line in text:
+                    found = _INSIDE_OUT.search(line)
+                    if found is not None and turned is None:
+                        turned = f" (element {found[1]})" if found[1] else ""
+                    if any(words.lower() in line.lower() for words in WORDS):
+                        _add(full, line)
+                    if _ERROR.search(line):
+                        _add(errors, line)
+                    if _LICENCE.search(line) and _REFUSED.search(line):
+                        _add(refusals, line)
+        except OSError:
+            continue
+    return errors, refusals, turned, full
+
+
+def _add(lines: list[str], line: str) -> None:
+    text = " ".join(line.split())
+    if text not in lines and len(lines) < MOST_LINES:
+        lines.append(text)
+
 
 log = logging.getLogger(__name__)
 

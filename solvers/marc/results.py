@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
+from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
-from ...models.bubble import BubbleModel
-from ...models.uniaxial import UniaxialModel
+from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
-from ..base import History
+from ..base import History, extremes, log_strain
 from ..pulls import at_elongations
-from ..strains import extremes, log_strain
 from .t19 import T19File
 
 Array = NDArray[np.float64]

@@ -10,11 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
+from ...readers.sections import first_error
 from ...reading import is_file, toml_of
-from ...section_errors import first_error
-from ..licence_settings import ExternalSettings
-from ..offer import Offer
-from ..settings import Override
+from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.

@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...errors import SolverFailure
-from ...materials.exports.marc_hypela2 import hypela2_source
+from ...materials.exports.marc import hypela2_source
 from ...materials.law import HypoelasticLaw
-from ...models.bubble import BubbleModel
-from ...models.cylinder import CylinderModel
-from ...models.uniaxial import UniaxialModel
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.cylinder_model import CylinderModel
+from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
-from ..analyses import analysis_of
-from ..base import History, Progress, SolverCheck
-from ..identity import file_mark, in_words, templates_mark
-from ..licence_settings import KEYS
-from . import bubble, cylinder_analysis, strip
-from .analysis import Reader, Run
-from .command import find_marc
-from .job import Job, run_job
+from ..base import History, Progress, SolverCheck, analysis_of
+from ..decks import file_mark, in_words, templates_mark
+from ..settings import KEYS
+from . import cylinder as cylinder_analysis
+from . import plates as bubble
+from . import plates as strip
+from .deck import Reader, Run
+from .job import Job, find_marc, run_job
 from .settings import MarcSettings, marc_settings
 
 #: Settings that change what the deck or the subroutine says, or what Marc makes of them.
@@ -33,7 +33,7 @@ T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
     BubbleModel: bubble.analyse,
-    UniaxialModel: strip.analyse,
+    UniaxialModel: strip.analyse_strip,
     CylinderModel: cylinder_analysis.analyse,
 }
 

@@ -8,16 +8,68 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
-from ...models.inflated import InflatedModel, RigidCylinder
+from ...errors import InputError, SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.cylinder_model import Bending, ClosedGas, CylinderModel, InflatedModel, RigidCylinder
 from ...notes import Note, NoteKind
 from ..base import History
-from .closed import ClosedMembrane
-from .contact import brought_to_touch, gaps
-from .march import Asked, Loading, NoEquilibrium, march, straight_on
-from .settling import settled
+from . import closed as closed_model
+from .bubble import TENSION_FIELD, Wall
+from .closed import ClosedMembrane, brought_to_touch, closed_membrane, gaps
+from .newton import (
+    Asked,
+    Loading,
+    NoEquilibrium,
+    Record,
+    halved,
+    initial_moduli,
+    march,
+    straight_on,
+)
 
 Array = NDArray[np.float64]
+
+#: Viscosity of the first step over pressure over the size of a facet: so much that it hardly
+#: moves. Factor down after a step that was found, up after one that was not; the most of both.
+FIRST, DOWN, UP, MOST_STEPS = 20.0, 0.3, 8.0, 60
+#: Likewise: the least; above the most, given up; at or below the third, rest is looked for
+#: where a step moved no node by more than this share of a facet's size.
+LEAST, MOST, LITTLE, NEAR = 1e-3, 1e5, 10.0, 0.05
+
+
+def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
+    """Equilibrium (n, 3) that the membrane moves to from `start`, nothing else moving; or None.
+
+    Backward Euler steps of a viscous motion, residual(u) + viscosity area (u - u_before) = 0, each
+    an equilibrium of a membrane that cannot jump. The viscosity is taken away as the motion dies
+    down and the answer has none of it: what is returned is in equilibrium without it. The fabric's
+    law sees the way there as one increment.
+    """
+    facet = float(np.sqrt(np.median(membrane.elements.area.sum(axis=1))))
+    unit = membrane.pressure / facet
+    viscosity, u = FIRST * unit, start
+    try:
+        for _ in range(MOST_STEPS):
+            membrane.drag(viscosity, u)
+            found = membrane.equilibrium(u, membrane.pressure)
+            if found is None:
+                viscosity *= UP
+                if viscosity > MOST * unit:
+                    return None
+                continue
+            moved, u = float(np.abs(found - u).max()), found
+            restless = viscosity > LITTLE * unit or moved > NEAR * facet
+            viscosity = max(DOWN * viscosity, LEAST * unit)
+            if restless:
+                continue
+            membrane.drag(0.0, u)
+            rest = membrane.equilibrium(u, membrane.pressure)
+            if rest is not None:
+                return rest
+        return None
+    finally:
+        membrane.drag(0.0, start)
+
 
 #: A node further from where the last increments led to than this many times the collar's way.
 SNAP = 4.0
@@ -159,3 +211,225 @@ class Moving(Loading):
 
     def problem(self, before: float, level: float, place: str) -> str:
         return f"no equilibrium between {before:.4g} and {level:.4g} mm of deflection"
+
+
+#: A gas at this many times the pressure nearly prescribes the volume that it fills.
+OVERPRESSURE = 50.0
+#: Share of the volume for one step, the smallest tried, and how far all of them may lead.
+STEP, LEAST_STEP, MOST_GROWTH = 0.01, 1e-4, 2.0
+
+
+def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float) -> Array | None:
+    """Equilibrium at `level` beyond a limit pressure, from that at `before` (MPa); None if not.
+
+    Under pressure alone the membrane would jump. The law needs the strain path in between, so
+    that every step of the volume is an increment of it and is accepted.
+    """
+    outside = OVERPRESSURE * level
+    first, _ = membrane.cavity.measure(membrane.reference + u)
+    volume, pressure, step, slope = first, before, STEP, np.zeros_like(u)
+    try:
+        while step >= LEAST_STEP and volume < MOST_GROWTH * first:
+            membrane.gas = ClosedGas((outside + pressure) * volume * (1.0 + step), outside)
+            found = membrane.equilibrium(u + step * slope, 0.0)
+            if found is None and step < 0.5 * STEP:
+                # Snapping gathers in one bulge, and the rest of the wall slackens.
+                found = membrane.equilibrium_from_slack(u, level)
+                if found is None:
+                    found = settled(membrane, u + step * slope)
+            if found is None:
+                step, slope = 0.5 * step, np.zeros_like(u)
+                continue
+            if membrane.pressure >= level:
+                membrane.gas = None
+                return membrane.equilibrium(found, level)
+            membrane.accept()
+            slope, u = (found - u) / step, found
+            volume, pressure = membrane.volume, membrane.pressure
+            step = min(STEP, 1.5 * step)
+        return None
+    finally:
+        membrane.gas = None
+
+
+#: An increment in which the volume grows by a larger share is gone through by volume.
+MOST_GROWTH_INFLATED = 0.1
+
+
+def analyse_inflated(
+    membrane: ClosedMembrane, model: InflatedModel, asked: Asked
+) -> tuple[History, Array]:
+    """History of the inflation, or of the bending where the model has one; no derivatives yet.
+
+    The membrane is fresh: no strain, no stress.
+
+    Raises
+    ------
+    InputError : derivatives or a guess was asked for.
+    SolverFailure : an increment of the pressure has no equilibrium.
+    """
+    if asked.parameters or asked.guess is not None:
+        raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
+    levels = np.array(model.pressures)
+    volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
+    sides, filling = outside_caps(model), Filling(membrane)
+    record = Record(membrane, len(levels))
+    membrane.keep_tangent = False
+    for i, u in enumerate(march(filling, levels, asked)):
+        record.accept(i, u)
+        volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
+    remarks = tuple(
+        Note(
+            NoteKind.SNAP,
+            f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
+            "leading the volume",
+        )
+        for before, level in filling.snaps
+    )
+    if model.bending is not None:
+        bent = closed_membrane(
+            model, membrane.law, membrane.tolerance, model.fixed(bent=True),
+            membrane.wall,
+        )  # fmt: skip
+        bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
+        bent.wrinkle[:] = membrane.wrinkle
+        bent.iterations = membrane.iterations
+        extremes = (record.low, record.high)
+        start = (record.path[-1], float(levels[-1]))
+        history = analyse(bent, model, *start, extremes, sides, asked)
+        history = replace(history, remarks=(*remarks, *history.remarks))
+    else:
+        reactions = {
+            name: record.forces[:, model.mesh.node_sets[name]].sum(axis=1)
+            for name in model.supports
+        }
+        history = History(
+            levels,
+            record.path,
+            record.low,
+            record.high,
+            reactions,
+            cavity_pressure=levels,
+            cavity_volume=model.copies * volume,
+            iterations=membrane.iterations,
+            path=record.path,
+            wrinkled=wrinkled,
+            remarks=remarks,
+        )
+    return history, np.zeros((*history.displacement.shape, 0))
+
+
+def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
+    """(elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
+    sides = np.ones(len(model.mesh.quads), dtype=bool)
+    sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
+    return sides
+
+
+class Filling(Loading):
+    """A closed membrane under a pressure (MPa).
+
+    snaps : the pressures between which it snaps, as they are met.
+    """
+
+    most_cuts = 8
+
+    def __init__(self, membrane: ClosedMembrane) -> None:
+        self.membrane = membrane
+        self.snaps: list[tuple[float, float]] = []
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        return self.membrane.equilibrium(start, level)
+
+    def first(self, level: float) -> Array:
+        return self._from_slack(level, self.most_cuts)
+
+    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        return straight_on(levels, path, level)
+
+    def reached(
+        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    ) -> Array | None:
+        found = self._directly(lower, u, level, start, cuts)
+        if found is not None:
+            cavity, reference = self.membrane.cavity, self.membrane.reference
+            now, then = (cavity.measure(reference + at)[0] for at in (found, u))
+            if now < (1.0 + MOST_GROWTH_INFLATED) * then:
+                return found
+            # Newton may leap over a limit point, but the law needs the strain path on the way.
+        self.snaps.append((lower, level))
+        return through_snap(self.membrane, u, lower, level)
+
+    def problem(self, before: float, level: float, place: str) -> str:
+        return (
+            f"no equilibrium at {level * 1e3:.4g} kPa ({place}); more increments usually help, "
+            "unless the membrane has a limit pressure below this one"
+        )
+
+    def _directly(
+        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    ) -> Array | None:
+        found = self.equilibrium(start, level)
+        if found is None and cuts == self.most_cuts:
+            # Folds of a cap come and go: what helps against slack helps here before smaller steps.
+            found = self.membrane.equilibrium_from_slack(u, level)
+        return found if found is not None else halved(self, lower, u, level, cuts)
+
+    def _from_slack(self, level: float, cuts: int) -> Array:
+        """Facets carry no pressure until they are stretched."""
+        initial_moduli(self.membrane.law)
+        none = np.zeros_like(self.membrane.reference)
+        found = self.membrane.equilibrium_from_slack(none, level)
+        if found is not None:
+            return found
+        if cuts > 0:
+            lower = self._from_slack(0.25 * level, cuts - 1)
+            found = self._directly(0.25 * level, lower, level, lower, cuts)
+            if found is not None:
+                return found
+        raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
+
+
+def prepare(
+    model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
+) -> ClosedMembrane:
+    """What does not change from one law to the next; a tension field unless asked otherwise."""
+    return closed_model.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
+
+
+def analyse_cylinder(
+    membrane: ClosedMembrane, model: CylinderModel, asked: Asked
+) -> tuple[History, Array]:
+    """As `inflated.analyse`."""
+    return analyse_inflated(membrane, closed_membrane_of(model), asked)
+
+
+def closed_membrane_of(model: CylinderModel) -> InflatedModel:
+    """The cylinder with its posts and ring; whatever is held, reported and closed in stays.
+
+    A quarter has the support at z = span / 2 and half of the ring, as its planes of symmetry have
+    it; the whole cylinder has both supports, whose forces are reported as one.
+    """
+    half, radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
+    sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
+    size = model.collar
+    across, along, middle = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    bending = Bending(
+        [RigidCylinder("supports", across, (0.0, 0.0, side * half), radius) for side in sides],
+        RigidCylinder(
+            "collar", along, middle, 0.5 * size.inner_diameter, True, size.length, size.fillet
+        ),
+        model.increments,
+        released="support_bottom",
+        gas=model.gas,
+        reported=model.reported.tolist(),
+    )
+    return InflatedModel(
+        model.mesh,
+        model.thickness,
+        np.asarray(model.mesh.warp),
+        model.inflation,
+        {**model.guides, "support_bottom": (1,)},
+        model.copies,
+        bending,
+    )

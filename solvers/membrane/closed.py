@@ -2,25 +2,314 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ...materials.law import HypoelasticLaw
-from ...models.gas import ClosedGas
-from ...models.inflated import RigidCylinder
-from .bordered import BorderedTangent
-from .cavity import Cavity
-from .contact import contact_forces
-from .flexure import Flexure
-from .line_search import searched_equilibrium
-from .newton import Membrane, initial_stiffness
-from .wall import Wall
+from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
+from ...meshes.mesh import volume_and_gradient
+from .bubble import STIFF, Wall
+from .factorisation import BorderedTangent, tangent_for
+from .kernel import reference_elements
+from .newton import Membrane, initial_stiffness, searched_equilibrium
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cavity:
+    """A closed surface, or the part of one that symmetry planes close.
+
+    weight, origin (3,): see `volume_and_gradient`. A plane x_k = origin_k adds nothing to
+    direction k, and nothing to any other because its normal is along k; where two planes share a
+    direction (a slice of a long tube) that direction gets no weight. symmetric (3,): directions
+    with a plane; planes (n, 3): nodes of open edges in one, by its normal.
+    """
+
+    quads: NDArray[np.intp]
+    weight: Array
+    origin: Array
+    symmetric: NDArray[np.bool_]
+    planes: NDArray[np.bool_]
+
+    def measure(self, position: Array) -> tuple[float, Array]:
+        """Volume (mm^3) of the meshed part at `position` (n, 3), and its derivative (3 n,) mm^2."""
+        volume, push = volume_and_gradient(position, self.quads, self.weight, self.origin)
+        return volume, push.reshape(-1)
+
+
+def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp]) -> Cavity:
+    """Find the symmetry planes that close the surface.
+
+    Parameters
+    ----------
+    fixed : held unknowns, 3 * node + direction.
+
+    Raises
+    ------
+    InputError : an open edge that lies in no plane that its nodes are held in.
+    """
+    sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    border = edges[count == 1]
+    held = np.zeros(points.shape, dtype=bool)
+    held.reshape(-1)[fixed] = True
+    size = float(np.ptp(points, axis=0).max())
+    level = np.abs(points[border[:, 0]] - points[border[:, 1]]) < 1e-9 * size
+    in_plane = held[border].all(axis=1) & level  # (edges, 3)
+    if not in_plane.any(axis=1).all():
+        first, second = border[int(np.argmin(in_plane.any(axis=1)))]
+        raise InputError(
+            None, "mesh", f"the cavity is open between nodes {first} and {second}: close it, "
+            "or hold the edge normal to a symmetry plane",
+        )  # fmt: skip
+    weight, origin = np.ones(3), points.mean(axis=0)
+    for k in range(3):
+        at = points[border[in_plane[:, k], 0], k]
+        if len(at):
+            origin[k] = at[0]
+            weight[k] = float(np.ptp(at) < 1e-9 * size)
+    if not weight.any():
+        raise InputError(None, "mesh", "the cavity is closed by planes on all six sides")
+    planes = np.zeros(points.shape, dtype=bool)
+    for k in range(3):
+        planes[border[in_plane[:, k]], k] = True
+    return Cavity(quads, weight / weight.sum(), origin, in_plane.any(axis=0), planes)
+
+
+# Bending stiffness of the membrane's wall: what keeps a wrinkle from being as fine as the mesh.
+#
+# No rotations: the curvature along a line of the mesh is the second difference of three positions,
+#
+#     curvature = [(x_+ - x_0)/l_+ - (x_0 - x_-)/l_-] / h,   h = (l_+ + l_-)/2,
+#
+# (l reference lengths), a vector that turns with the wall, and the energy of a node's share of the
+# surface is D/2 |curvature|^2 (the quadratic bending of Bergou et al., Symposium on Geometry
+# Processing 2006, on the lines of a grid). It is quadratic in the positions, so that its stiffness
+# is one constant matrix. The sheet is flat when it is free; twist has no stiffness.
+
+Numbers = NDArray[np.intp]
+
+#: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
+STRAIGHT = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Flexure:
+    """The lines of a mesh through its nodes.
+
+    nodes (h, 3): before, at and after the node; where a plane of symmetry ends the line the node
+    after it twice, once mirrored. differences (h, 3, 3): by node and component, 1/mm^2, of the
+    curvature. shares (h, 2) mm^2 mm^3: surface times thickness^3/12 that bends along warp, fill.
+    """
+
+    nodes: Numbers
+    differences: Array
+    shares: Array
+
+    def stiffness(self, law: HypoelasticLaw) -> Array:
+        """(h, 3, 3, 3) N/mm: by line, component, node and node; with moduli at zero strain."""
+        plane = np.diagonal(initial_stiffness(law))[:2]
+        c = self.differences
+        return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
+
+    def matrix(self, law: HypoelasticLaw, count: int) -> sp.csr_matrix:
+        """(3 count, 3 count) N/mm on all unknowns of `count` nodes."""
+        values = self.stiffness(law)
+        unknowns = 3 * self.nodes[:, None, :] + np.arange(3)[:, None]  # (h, 3, 3)
+        rows = np.broadcast_to(unknowns[..., :, None], values.shape)
+        columns = np.broadcast_to(unknowns[..., None, :], values.shape)
+        triples = (values.ravel(), (rows.ravel(), columns.ravel()))
+        return sp.csr_matrix(triples, shape=(3 * count, 3 * count))
+
+
+def flexure_of(
+    points: Array, quads: Numbers, warp: Array, thickness: Array, planes: NDArray[np.bool_]
+) -> Flexure:
+    """The lines through every node of a mesh.
+
+    Parameters
+    ----------
+    points : (n, 3) mm. warp : (quads, 3). thickness : mm, one or (quads,).
+    planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
+    """
+    share, inertia, along = _of_nodes(points, quads, warp, thickness)
+    nodes, differences, shares = [], [], []
+    for before, node, after, mirror in _lines(points, quads, planes):
+        step = points[after] - points[node]
+        back = points[node] - points[before] if before != after else -mirror * step
+        ahead, behind = float(np.linalg.norm(step)), float(np.linalg.norm(back))
+        if step @ back < STRAIGHT * ahead * behind:
+            continue
+        one = np.ones(3)
+        slopes = np.stack([mirror / behind, -one / behind - one / ahead, one / ahead])
+        if before == after:
+            # What is normal to the plane is the same on both sides, so that none of it is left.
+            slopes *= mirror > 0
+        nodes.append((before, node, after))
+        differences.append(slopes / (0.5 * (ahead + behind)))
+        direction = step / ahead + back / behind
+        cosine = direction @ along[node] / np.linalg.norm(direction)
+        warps = min(1.0, float(cosine) ** 2)
+        shares.append(share[node] * inertia[node] * np.array([warps**2, (1.0 - warps) ** 2]))
+    return Flexure(
+        np.array(nodes, dtype=np.intp).reshape(-1, 3),
+        np.array(differences).reshape(-1, 3, 3),
+        np.array(shares).reshape(-1, 2),
+    )
+
+
+def _of_nodes(
+    points: Array, quads: Numbers, warp: Array, thickness: Array
+) -> tuple[Array, Array, Array]:
+    """Of every node: surface mm^2, mean of thickness^3 / 12, direction of the warp."""
+    corner = points[quads]
+    across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    area = 0.5 * np.linalg.norm(across, axis=1)
+    normal = across / (2.0 * area[:, None])
+    flat = warp - np.einsum("mk,mk->m", warp, normal)[:, None] * normal
+    flat /= np.linalg.norm(flat, axis=1)[:, None]
+    share, cube, along = np.zeros(len(points)), np.zeros(len(points)), np.zeros(points.shape)
+    np.add.at(share, quads, 0.25 * area[:, None])
+    np.add.at(cube, quads, 0.25 * (area * np.broadcast_to(thickness, area.shape) ** 3)[:, None])
+    np.add.at(along, quads, flat[:, None])
+    inertia = cube / (12.0 * np.where(share > 0, share, 1.0))
+    length = np.linalg.norm(along, axis=1)[:, None]
+    return share, inertia, along / np.where(length > 0, length, 1.0)
+
+
+def _lines(
+    points: Array, quads: Numbers, planes: NDArray[np.bool_]
+) -> Iterator[tuple[int, int, int, Array]]:
+    """(before, node, after, mirror (3,)): neighbours that continue each other through a node.
+
+    Where a plane of symmetry ends a line, what is after is before as well, and mirrored.
+    """
+    beside: list[dict[int, set[int]]] = [{} for _ in points]
+    for e, quad in enumerate(quads.tolist()):
+        for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
+            beside[a].setdefault(b, set()).add(e)
+            beside[b].setdefault(a, set()).add(e)
+    size = 1e-9 * float(np.ptp(points, axis=0).max())
+    for node, around in enumerate(beside):
+        normals = np.flatnonzero(planes[node])
+        inside = list(around)
+        for normal in normals:
+            leaving = [a for a in around if abs(points[a, normal] - points[node, normal]) > size]
+            if len(leaving) == 1:
+                mirror = np.ones(3)
+                mirror[normal] = -1.0
+                yield leaving[0], node, leaving[0], mirror
+                inside.remove(leaving[0])
+        if len(around) + len(normals) == 4 and len(inside) > 1:
+            for i, a in enumerate(inside):
+                for b in inside[i + 1 :]:
+                    if not around[a] & around[b]:
+                        yield a, node, b, np.ones(3)
+
+
+#: mm to which the first touch is found, and places looked at at once on the way to it.
+TOUCH, WAYS = 1e-9, 500
+
+
+def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
+    """Distance (n,) mm of points (n, 3) from a body, its gradient (n, 3) and Hessian (n, 3, 3).
+
+    Negative inside the body. A ring's mouth is rounded by its fillet: there the distance is that
+    from the circle through the fillet's centre, less its radius.
+    """
+    axis = np.asarray(body.axis, dtype=float)
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ axis
+    across = arm - along[:, None] * axis
+    r = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    radial = across / r[:, None]
+    around = np.cross(axis, radial)
+    turn = np.einsum("ni,nj->nij", around, around) / r[:, None, None]
+    if not body.ring:
+        return r - body.radius, radial, turn
+    beyond = np.abs(along) - (0.5 * body.length - body.fillet)
+    in_mouth = beyond > 0
+    s = np.where(in_mouth, beyond, 0.0)
+    q = body.radius + body.fillet - r
+    d = np.where(in_mouth, np.hypot(q, s), q)
+    d = np.where(np.abs(d) > 1e-9, d, 1e-9)
+    out = -(q / d)[:, None] * radial + (s / d * np.sign(along))[:, None] * axis
+    side = (s / d)[:, None] * radial + (q / d * np.sign(along))[:, None] * axis
+    curve = np.where(in_mouth, 1.0 / d, 0.0)
+    hessian = curve[:, None, None] * np.einsum("ni,nj->nij", side, side)
+    return d - body.fillet, out, hessian - (q / d)[:, None, None] * turn
+
+
+def contact_forces(
+    body: RigidCylinder, position: Array, stiffness: Array
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
+
+    stiffness (n,) N/mm: penalty times the node's share of the reference surface.
+    """
+    near = _within_reach(body, position)
+    gap, out, hessian = gaps(body, position[near])
+    inside = gap < 0
+    touched = near[inside]
+    k, g, n = stiffness[touched], gap[inside], out[inside]
+    force = np.zeros_like(position)
+    force[touched] = -(k * g)[:, None] * n
+    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[inside]
+    return force, k[:, None, None] * slope, touched
+
+
+def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
+    """The few nodes that may be inside the body: all that are, without their distances."""
+    arm = position - np.asarray(body.centre, dtype=float)
+    along = arm @ np.asarray(body.axis, dtype=float)
+    square = np.einsum("ni,ni->n", arm, arm) - along**2
+    if body.ring:
+        # The mouth opens from the inner radius outwards.
+        return np.flatnonzero((square > body.radius**2) & (np.abs(along) < 0.5 * body.length))
+    return np.flatnonzero(square < body.radius**2)
+
+
+def brought_to_touch(
+    body: RigidCylinder, position: Array, direction: Array, bite: float
+) -> RigidCylinder:
+    """The body moved along `direction` until it is `bite` (mm) into the surface.
+
+    Raises
+    ------
+    InputError : no node lies on its way.
+    """
+    centre, axis = np.asarray(body.centre, dtype=float), np.asarray(body.axis, dtype=float)
+    arm = position - centre
+    if body.ring:
+        near = np.abs(arm @ axis) < 0.5 * body.length
+    else:
+        near = np.abs(arm @ np.cross(axis, direction)) < body.radius
+    if not near.any():
+        problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
+        raise InputError(None, "mesh", problem)
+    nodes, heights = position[near], arm[near] @ direction
+    low, high = float(heights.min()) - 2 * body.radius, float(heights.max()) + 2 * body.radius
+    # The first touch from outside is the one wanted; a ring starts around the membrane's middle.
+    if body.ring:
+        low = 0.5 * float(heights.min() + heights.max())
+
+    def least(ways: Array) -> Array:
+        """Smallest gap with the body moved by each of them: the nodes move the other way."""
+        shifted = nodes - ways[:, None, None] * direction
+        return gaps(body, shifted.reshape(-1, 3))[0].reshape(len(ways), -1).min(axis=1)
+
+    while high - low > TOUCH:
+        ways = np.linspace(low, high, WAYS)
+        first = int(np.argmax(least(ways) < -bite))
+        low, high = float(ways[max(first - 1, 0)]), float(ways[first])
+    return replace(body, centre=tuple((centre + low * direction).tolist()))
+
 
 #: The slack state's artificial stiffness is multiplied by this in every iteration.
 FADE = 0.6
@@ -178,3 +467,51 @@ class ClosedMembrane(Membrane):
             if found is not None:
                 return found
         return None
+
+
+def prepare(
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
+) -> ClosedMembrane:
+    """What does not change from one law to the next; a stiff wall unless asked otherwise."""
+    return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
+
+
+def closed_membrane(
+    model: InflatedModel,
+    law: HypoelasticLaw,
+    tolerance: float,
+    fixed: NDArray[np.intp],
+    wall: Wall,
+) -> ClosedMembrane:
+    """The membrane of a model with these unknowns held."""
+    points = np.array(model.mesh.points, dtype=float)
+    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))
+    elements = reference_elements(points, quads, warp)
+    free = np.setdiff1d(np.arange(points.size), fixed)
+    cavity = closed_cavity(points, quads, fixed)
+    thickness = np.asarray(model.thickness, dtype=float)
+    flexure, coupled = None, quads
+    if model.bending is not None and wall.bending_stiffness > 0:
+        flexure = flexure_of(points, quads, warp, thickness, cavity.planes)
+        flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)
+        before, node, after = flexure.nodes.T
+        coupled = np.concatenate([quads, np.stack([before, node, after, node], axis=1)])
+    tangent = tangent_for(coupled, points.size, free, points)
+    tangent.slot, line_slot = tangent.slot[: len(quads)], tangent.slot[len(quads) :]
+    return ClosedMembrane(
+        points,
+        quads,
+        elements,
+        thickness,
+        law,
+        free,
+        BorderedTangent(tangent),
+        tolerance,
+        # A slack step much larger than a facet folds the mesh.
+        step_limit=0.5 * float(np.sqrt(np.median(elements.area.sum(axis=1)))),
+        wall=wall,
+        cavity=cavity,
+        flexure=flexure,
+        line_slot=line_slot,
+    )

@@ -16,9 +16,44 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from .ordering import swept
-
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+
+NEAR = 1e-9  # of the length
+
+
+def swept(quads: Numbers, points: Array) -> list[Numbers]:
+    """Orders of the nodes (n,), swept from either end of the longest axis.
+
+    Cuthill and McKee start at one node, so that on a tube their fronts lie askew and are up to
+    twice as long as a ring; started at all nodes of an end they are the rings.
+    """
+    axis = int(np.ptp(points, axis=0).argmax())
+    along = points[:, axis]
+    near = NEAR * float(np.ptp(along))
+    rows, columns = np.repeat(quads, 4, axis=1).ravel(), np.tile(quads, (1, 4)).ravel()
+    graph = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
+    ends = (np.flatnonzero(np.abs(along - at) <= near) for at in (along.min(), along.max()))
+    return [_from(graph, end) for end in ends]
+
+
+def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
+    """Breadth first from the nodes of an end, which follow one another along it."""
+    first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
+    degree, seen = np.diff(graph.indptr), np.zeros(graph.shape[0], dtype=bool)
+    seen[first] = True
+    order, at = first.tolist(), 0
+    while at < len(order):
+        beside = graph.indices[graph.indptr[order[at]] : graph.indptr[order[at] + 1]]
+        fresh = beside[~seen[beside]]
+        fresh = fresh[np.argsort(degree[fresh], kind="stable")]
+        seen[fresh] = True
+        order += fresh.tolist()
+        at += 1
+    # What hangs together with no end comes last; it has a band of its own.
+    return np.concatenate([order, np.flatnonzero(~seen)]).astype(np.intp)
+
+
 # Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
 LARGEST_BAND = 8_000_000
 
@@ -160,3 +195,31 @@ class SparseTangent:
 
     def solve(self, rhs: Array) -> Array:
         return np.asarray(self.lu.solve(rhs))
+
+
+class BorderedTangent:
+    """A sparse tangent plus c v v', solved by Sherman and Morrison's formula.
+
+    A gas couples all nodes: dp/du = -c v with v = dV/du, which would fill the matrix.
+    """
+
+    def __init__(self, inner: Tangent) -> None:
+        self.inner, self.data, self.slot = inner, inner.data, inner.slot
+        self.stiffness, self.border = 0.0, np.empty(0)
+
+    def factor(self) -> None:
+        """Factorise the sparse part."""
+        self.inner.factor()
+        self.answer = self.inner.solve(self.border) if self.stiffness else self.border
+
+    def definite(self) -> bool:
+        """Whether the sparse part is (the rest is never negative)."""
+        return self.inner.definite()
+
+    def solve(self, rhs: Array) -> Array:
+        x = self.inner.solve(rhs)
+        if not self.stiffness:
+            return x
+        share = self.stiffness / (1.0 + self.stiffness * float(self.border @ self.answer))
+        across = np.tensordot(self.border, x, axes=1)
+        return np.asarray(x - share * np.multiply.outer(self.answer, across))

@@ -8,11 +8,15 @@ a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), with four 3 x 3 blocks a Gaus
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...caching import compiled
+from ...errors import InputError
 from ...materials.point_law import FAST, SLOPES, membrane_stress
-from ...materials.relaxation import relaxed_membrane_stress
+from ...materials.wrinkles import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
 
@@ -52,7 +56,7 @@ def assemble(  # type: ignore[no-untyped-def]
     entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written;
     share : of the stiffness, left to wrinkles; below 0 the membrane does not wrinkle, otherwise
     strain and stress are those of the fabric and wrinkle (elements, 4, 3), its strain less that
-    of the surface, is written (see materials/relaxation.py).
+    of the surface, is written (see materials/wrinkles.py).
 
     Returns the largest nodal pressure force of an element (N), or -1 when a point has no valid
     stress.
@@ -162,3 +166,69 @@ def assemble(  # type: ignore[no-untyped-def]
                     if place >= 0:
                         data[place] += element[i, j]
     return largest
+
+
+Array = NDArray[np.float64]
+
+_G = 1.0 / np.sqrt(3.0)
+#: 2 x 2 Gauss points of the square; all weights are one.
+GAUSS_POINTS = np.array([[-_G, -_G], [_G, -_G], [_G, _G], [-_G, _G]])
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+#: Bilinear shape functions (point, node) and their derivatives (point, 2, node) on the square.
+VALUES = 0.25 * np.prod(1.0 + GAUSS_POINTS[:, None, :] * _CORNERS[None], axis=2)
+NATURAL = 0.25 * np.stack(
+    [
+        _CORNERS[:, 0] * (1.0 + GAUSS_POINTS[:, None, 1] * _CORNERS[:, 1]),
+        _CORNERS[:, 1] * (1.0 + GAUSS_POINTS[:, None, 0] * _CORNERS[:, 0]),
+    ],
+    axis=1,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceElements:
+    """Shape functions and their derivatives in each facet's material frame.
+
+    values (4 points, 4 nodes); slopes (elements, 4 points, 2, 4) d N/d (warp, fill) in 1/mm;
+    area (elements, 4 points) mm^2 of reference surface at each Gauss point.
+    """
+
+    values: Array
+    slopes: Array
+    area: Array
+
+
+def reference_elements(
+    points: Array, quads: NDArray[np.intp], warp: Array | None = None
+) -> ReferenceElements:
+    """Evaluate the bilinear shape functions on a flat or faceted surface.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) mm. quads : (m, 4).
+    warp : (m, 3) direction of the warp yarn in each facet; x unless given.
+
+    Raises
+    ------
+    InputError : a quad that is inside out, or a warp direction normal to its facet.
+    """
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
+    normal = np.cross(base[:, :, 0], base[:, :, 1])
+    area = np.linalg.norm(normal, axis=2)
+    centre = normal.sum(axis=1)
+    if (area <= 0).any() or (np.einsum("mpk,mk->mp", normal, centre) <= 0).any():
+        bad = int(np.argmin(np.einsum("mpk,mk->mp", normal, centre).min(axis=1)))
+        raise InputError(None, f"element {bad}", "is degenerate or inside out; mend the mesh")
+    unit = normal / area[:, :, None]
+    yarn = np.broadcast_to([1.0, 0.0, 0.0], (len(quads), 3)) if warp is None else warp
+    along = yarn[:, None, :] - np.einsum("mk,mpk->mp", yarn, unit)[:, :, None] * unit
+    length = np.linalg.norm(along, axis=2, keepdims=True)
+    if (length < 1e-6).any():
+        raise InputError(None, "warp", "the warp direction is normal to a facet")
+    along /= length
+    frame = np.stack([along, np.cross(unit, along)], axis=2)  # (m, p, 2, 3)
+    jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
+    slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), NATURAL)
+    return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)

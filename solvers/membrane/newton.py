@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
-from ...materials.law import HypoelasticLaw
-from .element import ReferenceElements
+from ...materials.law import HypoelasticLaw, law_slopes
+from ..base import Progress
 from .factorisation import SingularTangent, Tangent
-from .kernel import assemble
+from .kernel import ReferenceElements, assemble
+from .sensitivity import POINT, advance, by_sheet, element_slopes, explicit
 
 Array = NDArray[np.float64]
 
@@ -181,3 +184,359 @@ def initial_stiffness(law: HypoelasticLaw) -> Array:
     none = np.zeros(3)
     _, tangent = law.increment(none, none, none)
     return tangent[0]
+
+
+# From one level of a load to the next, through halved steps where the next one is too far.
+#
+# The strain history is committed at the levels only and not in between, so that the path integral
+# of the law, and with it the result, does not depend on how a level was reached.
+
+
+class NoEquilibrium(SolverFailure):
+    """No step from a level to the next one was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of an analysis beside its model.
+
+    parameters : of the derivatives. guess : (increments, nodes, 3) displacements to start each
+    increment from. tell : called with every increment that is done.
+    """
+
+    parameters: Sequence[str] = ()
+    guess: Array | None = None
+    tell: Callable[[Progress], None] | None = None
+
+
+@dataclass(frozen=True)
+class Done:
+    """How far a run is: increments of the model."""
+
+    time: float
+
+
+class Loading:
+    """One way of loading a membrane, by a level: a pressure, an elongation, a deflection.
+
+    What differs from one to the other: what equilibrium at a level means, and where to look for it.
+    """
+
+    #: How often a step between two levels is halved at most.
+    most_cuts = 6
+
+    def equilibrium(self, start: Array, level: float) -> Array | None:
+        """Displacement (nodes, 3) at a level, looked for from `start`; None if not found."""
+        raise NotImplementedError
+
+    def first(self, level: float) -> Array | None:
+        """Displacement at the first level, from the unloaded membrane."""
+        raise NotImplementedError
+
+    def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+        """Where to look for the next level after all that were found."""
+        raise NotImplementedError
+
+    def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
+        """Where to look for a level from u at another, inside a step that is halved: straight on.
+
+        before : the displacement as far back, where there is one.
+        """
+        return u if before is None else np.asarray(2.0 * u - before)
+
+    def guessed(self, guess: Array) -> Array:
+        """A guess as it may be taken for a start."""
+        return guess
+
+    def reached(
+        self, lower: float, u: Array, level: float, start: Array, cuts: int
+    ) -> Array | None:
+        """Equilibrium at `level` from that at `lower`, which is u."""
+        return reach(self, lower, u, level, start, cuts)
+
+    def problem(self, before: float, level: float, place: str) -> str:
+        """What to say where `level` cannot be reached; place : "increment 3 of 7"."""
+        raise NotImplementedError
+
+
+def march(
+    loading: Loading,
+    levels: Sequence[float] | Array,
+    asked: Asked,
+    begun: tuple[float, Array] | None = None,
+    done: int = 0,
+) -> Iterator[Array]:
+    """Displacement (nodes, 3) at one level after the other; the caller accepts each in between.
+
+    Parameters
+    ----------
+    begun : level and displacement to start from; the unloaded membrane otherwise.
+    done : increments of the model that are behind us.
+
+    Raises
+    ------
+    NoEquilibrium : a level cannot be reached.
+    """
+    known, path = ([begun[0]], [begun[1]]) if begun is not None else ([], [])
+    for i, level in enumerate(float(value) for value in levels):
+        found = None
+        if asked.guess is not None:
+            found = loading.equilibrium(loading.guessed(asked.guess[i]), level)
+        if found is None and path:
+            start = loading.ahead(known, path, level)
+            found = loading.reached(known[-1], path[-1], level, start, loading.most_cuts)
+        elif found is None:
+            found = loading.first(level)
+        if found is None:
+            place = f"increment {i + 1} of {len(levels)}"
+            raise NoEquilibrium(loading.problem(known[-1] if known else 0.0, level, place))
+        yield found
+        known.append(level)
+        path.append(found)
+        if asked.tell is not None:
+            asked.tell(Done(done + i + 1))
+
+
+def reach(
+    loading: Loading, lower: float, u: Array, level: float, start: Array, cuts: int
+) -> Array | None:
+    """Equilibrium at `level`: from `start`, else through the middle between `lower` and it."""
+    found = loading.equilibrium(start, level)
+    return found if found is not None else halved(loading, lower, u, level, cuts)
+
+
+def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) -> Array | None:
+    """Equilibrium at `level` in two steps from `lower`, where it is u; each may be halved again."""
+    if cuts == 0:
+        return None
+    middle = 0.5 * (lower + level)
+    start = loading.onward(u, lower, middle, None)
+    halfway = reach(loading, lower, u, middle, start, cuts - 1)
+    if halfway is None:
+        return None
+    start = loading.onward(halfway, middle, level, u)
+    return reach(loading, middle, halfway, level, start, cuts - 1)
+
+
+def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
+    """On the line through the last two of the path; where the last one is without two."""
+    if len(path) < 2:
+        return path[-1]
+    ahead = (level - levels[-1]) / (levels[-1] - levels[-2])
+    return np.asarray(path[-1] + ahead * (path[-1] - path[-2]))
+
+
+def lagrange(x: Array, known: Array, at: float) -> Array:
+    """The polynomial through `known` (k, nodes, 3) at x (k,), at another place."""
+    shares = [
+        math.prod((at - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
+        for a in range(len(x))
+    ]
+    return np.asarray(np.einsum("a,ank->nk", shares, known))
+
+
+class Record:
+    """What every analysis keeps of its increments.
+
+    path (increments, nodes, 3) mm; forces likewise, N, of the nodes on what holds them; low, high
+    (3,) extremes of the strain components.
+    """
+
+    def __init__(self, membrane: Membrane, count: int) -> None:
+        self.membrane = membrane
+        self.path, self.forces = (np.zeros((count, *membrane.reference.shape)) for _ in range(2))
+        self.low, self.high = np.zeros(3), np.zeros(3)
+
+    def accept(self, i: int, u: Array) -> None:
+        """Accept increment i, whose displacement is u (nodes, 3)."""
+        self.membrane.accept()
+        self.path[i] = u
+        self.forces[i] = self.membrane.residual.reshape(u.shape)
+        np.minimum(self.low, self.membrane.strain_old.min(axis=(0, 1)), out=self.low)
+        np.maximum(self.high, self.membrane.strain_old.max(axis=(0, 1)), out=self.high)
+
+
+# Newton's iteration with a line search, for contact and wrinkles: their stiffness jumps.
+#
+# A full step from a tangent without a node's contact, or with a wrinkle's next to nothing, lands
+# far inside a body. The residual's largest entry then says little, but its work along the step
+# does: it changes its sign where the energy along the step is least (Matthies and Strang, Int. J.
+# Numer. Methods Eng. 14 (1979) 1613). Gas, contact and an increment of the law are nearly
+# conservative.
+
+#: Steps that have not found the equilibrium by then rarely do: half the way is tried instead.
+MOST_STEPS = 16
+#: Residuals looked at in one step, and what is left of the work along it when it is good enough.
+MOST_TRIALS, LEFT = 10, 0.5
+#: A step is good enough, too, where the residual falls to this part or was as small as this.
+GAIN, SMALL = 0.1, 1e-2
+#: Part of the way to the end known to be too far: at least, where only that is known, at most.
+NEAREST, BLIND, FARTHEST = 0.1, 0.3, 0.9
+
+
+def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array | None:
+    """Displacement (n, 3) in equilibrium at `pressure`, starting from u; None if not found."""
+    u = u.copy()
+    norm = membrane.unbalance(u, pressure, with_tangent=True)
+    least, idle = np.inf, 0
+    for _ in range(MOST_STEPS):
+        if norm < membrane.tolerance:
+            return u
+        idle = idle + 1 if 0.5 * least < norm < ROUNDING_BELOW else 0
+        if idle >= MOST_IDLE:
+            return u
+        least = min(least, norm)
+        if not np.isfinite(norm):
+            return None
+        try:
+            membrane.tangent.factor()
+        except SingularTangent:
+            return None
+        step = -membrane.tangent.solve(membrane.residual[membrane.free])
+        if not np.isfinite(step).all():
+            return None
+        norm = _along(membrane, u, pressure, step, norm)
+    return u if norm < membrane.tolerance else None
+
+
+def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: float) -> float:
+    """Move u along the step as far as is good; the residual there, with its tangent."""
+    flat, free = u.reshape(-1), membrane.free
+    before = flat[free].copy()
+    slope = float(step @ membrane.residual[free])
+    largest = float(np.abs(step).max())
+    part = min(1.0, membrane.step_limit / largest) if largest > 0 else 1.0
+    low, slope_low, high, slope_high = 0.0, slope, math.inf, math.nan
+    for trial in range(MOST_TRIALS):
+        flat[free] = before + part * step
+        # Most steps are taken as they are, so that the first comes with its tangent.
+        found = membrane.unbalance(u, pressure, with_tangent=trial == 0)
+        now = float(step @ membrane.residual[free]) if np.isfinite(found) else math.nan
+        if found < GAIN * norm or norm < SMALL or abs(now) <= LEFT * abs(slope):
+            break
+        if now * slope > 0 and abs(now) <= abs(slope):
+            if high == math.inf:
+                break
+            low, slope_low = part, now
+        else:
+            high, slope_high = part, now if now * slope < 0 else math.nan
+        share = slope_low / (slope_low - slope_high)
+        share = BLIND if math.isnan(share) else min(FARTHEST, max(NEAREST, share))
+        part = low + share * (high - low)
+    if trial > 0:
+        found = membrane.unbalance(u, pressure, with_tangent=True)
+    return found
+
+
+# Where equilibria are unstable, in words.
+#
+# An equilibrium is stable where the tangent's symmetric part is positive definite (Hill, J. Mech.
+# Phys. Solids 6 (1958) 236): then every small motion away from it takes work, whatever it is.
+
+
+def named(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
+    """Loads (n,) by their number and unit."""
+    return tuple(f"{level:.4g} {unit}" for level in levels.tolist())
+
+
+#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones.
+SheetSlopes = Mapping[str, tuple[Array, Array]]
+
+
+class Derivatives:
+    """Derivatives of displacement, strain and stress, carried along the strain path.
+
+    Parameters
+    ----------
+    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", "thickness" (of
+        a sheet of one thickness), and those of `sheet`.
+    stress_free : (n, 3) mm, places of the nodes without stress; needed with `sheet` only.
+    sheet : of the parameters that are of the sheet.
+    """
+
+    def __init__(
+        self,
+        membrane: Membrane,
+        parameters: Sequence[str],
+        stress_free: Array | None = None,
+        sheet: SheetSlopes | None = None,
+    ) -> None:
+        self.membrane = membrane
+        law, names = membrane.law, list(parameters)
+        shape = (len(membrane.quads), 4, 3, len(names))
+        self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
+        self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
+        self.strain, self.stress, self.fresh = np.zeros(shape), np.zeros(shape), np.empty(shape)
+        self.point = np.empty((len(membrane.quads), 4, POINT))
+        self.rate = np.empty((membrane.reference.size, len(names)))
+        self.sheet: Sheet | None = None
+        if sheet and stress_free is not None:
+            self.sheet = Sheet(membrane, stress_free, sheet, [names.index(n) for n in sheet])
+
+    def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
+        """Explicit derivative of the residual at the equilibrium u, (3 n, np)."""
+        m, e, law = self.membrane, self.membrane.elements, self.membrane.law
+        explicit(
+            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.pieces,
+            law.coupling, law.area_power, m.strain_old, m.stress_old, self.rows, self.by_coupling,
+            self.push, self.strain, self.stress, self.fresh, self.point, self.rate,
+        )  # fmt: skip
+        if self.sheet is not None:
+            self.rate[:, self.sheet.columns] += self.sheet.at_fixed_displacement(u, pressure)
+        return self.rate
+
+    def advance(self, du: Array) -> None:
+        """Take strain and stress derivatives to the end of the increment, du (3 n, np)."""
+        m = self.membrane
+        self.stress, self.fresh = self.fresh, self.stress
+        advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
+        if self.sheet is not None:
+            strain, stress = self.sheet.at_points(self.point)
+            self.strain[..., self.sheet.columns] += strain
+            self.stress[..., self.sheet.columns] += stress
+
+    def increment(self, u: Array, pressure: float = 0.0) -> Array:
+        """d u / d parameters (3 n, np) at the equilibrium u, factorised and not yet accepted."""
+        m = self.membrane
+        rate = self.at_fixed_displacement(u, pressure)
+        du = np.zeros_like(rate)
+        du[m.free] = -m.tangent.solve(rate[m.free])
+        self.advance(du)
+        return du
+
+
+class Sheet:
+    """What the parameters of the stress-free sheet bring at fixed displacement.
+
+    Parameters
+    ----------
+    columns : where these parameters stand among all.
+    """
+
+    def __init__(
+        self, membrane: Membrane, stress_free: Array, slopes: SheetSlopes, columns: Sequence[int]
+    ) -> None:
+        self.membrane, self.columns = membrane, list(columns)
+        self.surface = np.array([surface for surface, _ in slopes.values()])
+        pairs = [element_slopes(stress_free, membrane.quads, way) for _, way in slopes.values()]
+        self.slopes = np.array([slopes for slopes, _ in pairs])
+        self.area = np.array([area for _, area in pairs])
+        self.green = np.empty((len(membrane.quads), 4, 3, len(columns)))
+        self.rate = np.empty((membrane.reference.size, len(columns)))
+
+    def at_fixed_displacement(self, u: Array, pressure: float) -> Array:
+        """Of the residual, (3 n, columns)."""
+        m, e, law = self.membrane, self.membrane.elements, self.membrane.law
+        by_sheet(
+            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure, law.pieces,
+            law.coupling, law.area_power, m.strain_old, m.stress_old, self.surface, self.slopes,
+            self.area, self.green, self.rate,
+        )  # fmt: skip
+        return self.rate
+
+    def at_points(self, point: Array) -> tuple[Array, Array]:
+        """Of log strain and stress (elements, 4, 3, columns); point : what `explicit` left."""
+        to_strain = point[..., 6:15].reshape(*point.shape[:2], 3, 3)
+        to_stress = point[..., 15:24].reshape(*point.shape[:2], 3, 3)
+        strain = to_strain @ self.green
+        return strain, to_stress @ strain

@@ -8,6 +8,7 @@ the solve, strain and stress derivatives are advanced to the end of the incremen
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...caching import compiled
 from ...materials.point_law import (
@@ -32,10 +33,10 @@ from ...materials.point_law import (
     SLOPES,
     TURN1,
     TURN2,
+    by_pieces,
     membrane_stress,
 )
-from ...materials.point_moduli import by_pieces
-from .kernel import base_vectors, metric
+from .kernel import NATURAL, base_vectors, metric
 
 #: What `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), law tangent (9).
 POINT = 24
@@ -170,3 +171,137 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                 stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
                 stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
                 stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2
+
+
+# Direct differentiation of the membrane by its own stress-free shape, compiled.
+#
+# A sheet that is raised, or longer, has other shape function slopes and areas, and with the same
+# displacement other places. That gives the residual and the strains an explicit derivative, which
+# `explicit` of sensitivity.py, written for the law's numbers, does not have.
+
+
+@compiled(fastmath=FAST)
+def by_sheet(  # type: ignore[no-untyped-def]
+    position, quads, values, slopes, area, thickness, pressure, pieces, coupling, power, h_old,
+    s_old, surface, slopes_by, area_by, green, rate,
+):  # fmt: skip
+    """Derivative of the residual at fixed displacement and fixed strain before the increment.
+
+    surface (k, n, 3), slopes_by (k, elements, 4, 2, 4), area_by (k, elements, 4): derivatives of
+    the reference places, of the shape functions' slopes and of the area by k parameters; writes
+    green (elements, 4, 3, k), of the Green-Lagrange strain (E11, E22, 2 E12), and rate (3 n, k).
+    """
+    count = len(surface)
+    rate[:] = 0.0
+    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    steep = np.empty(SLOPES)
+    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    work, stiff = np.empty((3, 3)), np.empty((3, 3))
+    x, f, f_by = np.empty((4, 3)), np.empty((2, 3)), np.empty((2, 3))
+    first, second = np.empty(3), np.empty(3)
+    first_by, second_by = np.empty(3), np.empty(3)
+    normal, normal_by = np.empty(3), np.empty(3)
+    for e in range(quads.shape[0]):
+        for n in range(4):
+            for k in range(3):
+                x[n, k] = position[quads[e, n], k]
+        for g in range(4):
+            dn = slopes[e, g]
+            base_vectors(x, dn, f)
+            m, q, c = metric(f)
+            membrane_stress(
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
+                pk2, stiff, p, law, steep, pull, work,
+            )  # fmt: skip
+            normal[0] = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+            normal[1] = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
+            normal[2] = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+            for k in range(3):
+                first[k] = pk2[0] * f[0, k] + pk2[2] * f[1, k]
+                second[k] = pk2[1] * f[1, k] + pk2[2] * f[0, k]
+            for j in range(count):
+                dn_by = slopes_by[j, e, g]
+                for i in range(2):
+                    for k in range(3):
+                        total = 0.0
+                        for n in range(4):
+                            total += dn_by[i, n] * x[n, k] + dn[i, n] * surface[j, quads[e, n], k]
+                        f_by[i, k] = total
+                e0, e1, e2 = 0.0, 0.0, 0.0
+                for k in range(3):
+                    e0 += f[0, k] * f_by[0, k]
+                    e1 += f[1, k] * f_by[1, k]
+                    e2 += f[0, k] * f_by[1, k] + f[1, k] * f_by[0, k]
+                green[e, g, 0, j], green[e, g, 1, j], green[e, g, 2, j] = e0, e1, e2
+                s0 = stiff[0, 0] * e0 + stiff[0, 1] * e1 + stiff[0, 2] * e2
+                s1 = stiff[1, 0] * e0 + stiff[1, 1] * e1 + stiff[1, 2] * e2
+                s2 = stiff[2, 0] * e0 + stiff[2, 1] * e1 + stiff[2, 2] * e2
+                for k in range(3):
+                    first_by[k] = (
+                        s0 * f[0, k] + pk2[0] * f_by[0, k] + s2 * f[1, k] + pk2[2] * f_by[1, k]
+                    )
+                    second_by[k] = (
+                        s1 * f[1, k] + pk2[1] * f_by[1, k] + s2 * f[0, k] + pk2[2] * f_by[0, k]
+                    )
+                    a, b = (k + 1) % 3, (k + 2) % 3
+                    normal_by[k] = (
+                        f_by[0, a] * f[1, b] - f_by[0, b] * f[1, a]
+                        + f[0, a] * f_by[1, b] - f[0, b] * f_by[1, a]
+                    )  # fmt: skip
+                share, share_by = area[e, g], area_by[j, e, g]
+                wall, wall_by = thickness[e] * share, thickness[e] * share_by
+                for n in range(4):
+                    push = pressure * values[g, n]
+                    for k in range(3):
+                        rate[3 * quads[e, n] + k, j] += (
+                            wall_by * (dn[0, n] * first[k] + dn[1, n] * second[k])
+                            + wall * (dn_by[0, n] * first[k] + dn_by[1, n] * second[k])
+                            + wall * (dn[0, n] * first_by[k] + dn[1, n] * second_by[k])
+                            - push * (share_by * normal[k] + share * normal_by[k])
+                        )
+
+
+Array = NDArray[np.float64]
+
+
+def element_slopes(points: Array, quads: NDArray[np.intp], direction: Array) -> tuple[Array, Array]:
+    """Derivatives of `reference_elements` where the points move along a direction.
+
+    The warp yarn is x, laid onto each facet.
+
+    Parameters
+    ----------
+    points : (n, 3) mm, without stress. quads : (m, 4).
+    direction : (n, 3) mm per unit of what moves them.
+
+    Returns
+    -------
+    Of slopes (m, 4 points, 2, 4 nodes), 1/mm per unit, and of area (m, 4), mm^2 per unit.
+    """
+    base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
+    base_by = np.einsum("pan,mnk->mpak", NATURAL, direction[quads])
+    normal = np.cross(base[:, :, 0], base[:, :, 1])
+    normal_by = np.cross(base_by[:, :, 0], base[:, :, 1])
+    normal_by += np.cross(base[:, :, 0], base_by[:, :, 1])
+    unit, unit_by, _, area_by = _normalised(normal, normal_by)
+    # Along the yarn: x less its part along the normal.
+    across, across_by = unit[..., :1], unit_by[..., :1]
+    along = np.array([1.0, 0.0, 0.0]) - across * unit
+    along, along_by, _, _ = _normalised(along, -across_by * unit - across * unit_by)
+    frame = np.stack([along, np.cross(unit, along)], axis=2)
+    frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=2)
+    jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
+    jacobian_by = np.einsum("mpak,mpbk->mpab", base_by, frame)
+    jacobian_by += np.einsum("mpak,mpbk->mpab", base, frame_by)
+    inverse = np.linalg.inv(jacobian)
+    inverse_by = -inverse @ jacobian_by @ inverse
+    slopes_by = np.einsum("mpab,pan->mpbn", inverse_by.transpose(0, 1, 3, 2), NATURAL)
+    return slopes_by, area_by
+
+
+def _normalised(vector: Array, by: Array) -> tuple[Array, Array, Array, Array]:
+    """Unit vectors (..., 3), lengths (...), each followed by its derivative."""
+    length = np.linalg.norm(vector, axis=-1)
+    unit = vector / length[..., None]
+    length_by = np.einsum("...k,...k->...", unit, by)
+    return unit, (by - length_by[..., None] * unit) / length[..., None], length, length_by

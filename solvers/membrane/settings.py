@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..offer import Offer
-from ..settings import SolverSettings
+from ..settings import Offer, SolverSettings
 
 
 class MembraneSettings(SolverSettings):

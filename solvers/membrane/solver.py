@@ -13,18 +13,18 @@ from threadpoolctl import ThreadpoolController
 from ... import __version__
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
-from ...models.bubble import BubbleModel
-from ...models.cylinder import CylinderModel
-from ...models.inflated import InflatedModel
-from ...models.patch import PatchModel
-from ...models.uniaxial import UniaxialModel
-from ..analyses import analysis_of
-from ..base import BandEnd, History, Progress, SolverCheck, parameters_of
-from ..identity import in_words
-from . import bubble, closed_model, cylinder, inflated, patch, strip
-from .march import Asked
-from .newton import Membrane
-from .wall import BAND, TENSION_FIELD, Walls, chosen_wall
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.cylinder_model import CylinderModel, InflatedModel
+from ...meshes.strip_models import PatchModel, UniaxialModel
+from ..base import BandEnd, History, Progress, SolverCheck, analysis_of, parameters_of
+from ..decks import in_words
+from . import bending as cylinder
+from . import bending as inflated
+from . import bubble, strip
+from . import closed as closed_model
+from . import strip as patch
+from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
+from .newton import Asked, Membrane
 
 Array = NDArray[np.float64]
 
@@ -43,9 +43,9 @@ class Analysis(NamedTuple):
 ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
-    InflatedModel: Analysis(closed_model.prepare, inflated.analyse),
-    CylinderModel: Analysis(cylinder.prepare, cylinder.analyse),
-    PatchModel: Analysis(patch.prepare, patch.analyse),
+    InflatedModel: Analysis(closed_model.prepare, inflated.analyse_inflated),
+    CylinderModel: Analysis(cylinder.prepare, cylinder.analyse_cylinder),
+    PatchModel: Analysis(patch.prepare_patch, patch.analyse_patch),
 }
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
@@ -61,10 +61,10 @@ class MembraneSolver:
     tolerance : largest residual force over the largest nodal pressure force (a strip: over the
         largest reaction of a node).
     wrinkle_stiffness : share of its stiffness that a closed membrane keeps across its wrinkles
-        (tension field, materials/relaxation.py); None: it carries compression as it carries
+        (tension field, materials/wrinkles.py); None: it carries compression as it carries
         tension, as bubbles and strips do.
     bending_stiffness : share of the wall's own that counts where rigid bodies bend a closed
-        membrane (solvers/membrane/flexure.py).
+        membrane (solvers/membrane/closed.py).
     wall : of a bent cylinder: "tension field" or "stiff". Unless it, or one of the shares, is
         given, `band` names both, and `run` takes the tension field.
 

@@ -3,22 +3,142 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
-from ...models.uniaxial import UniaxialModel
+from ...materials.responses import biaxial_response
+from ...meshes.strip_models import PatchModel, UniaxialModel
 from ..base import History
-from .derivatives import Derivatives
-from .driven import DrivenTangent, Pull
-from .element import reference_elements
-from .march import Asked, Loading, Record, lagrange, march
-from .newton import Membrane, initial_moduli
-from .stability import named
-from .wall import Wall
+from .bubble import Wall
+from .factorisation import Tangent, tangent_for
+from .kernel import reference_elements
+from .newton import (
+    Asked,
+    Derivatives,
+    Done,
+    Loading,
+    Membrane,
+    Record,
+    initial_moduli,
+    lagrange,
+    march,
+    named,
+)
 
 Array = NDArray[np.float64]
+
+MOST_CORRECTIONS = 12
+#: mm of gauge elongation over mm of gauge length.
+GAUGE_TOLERANCE = 1e-10
+
+
+class DrivenTangent:
+    """The factorisable tangent of the free unknowns, and beside it that of the driven ones.
+
+    Both lie in one array, so that one assembly fills them: first what `free` needs, then every
+    element entry with a driven row or column.
+
+    Parameters
+    ----------
+    driven : unknowns that move together; none of them free.
+    """
+
+    def __init__(
+        self, quads: NDArray[np.intp], size: int, free: NDArray[np.intp], driven: NDArray[np.intp]
+    ) -> None:
+        self.inner: Tangent = tangent_for(quads, size, free)
+        dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
+        rows, columns = np.repeat(dofs, 12, axis=1), np.tile(dofs, (1, 12))
+        beside = np.isin(rows, driven) | np.isin(columns, driven)
+        inside = self.inner.data.size
+        count = int(beside.sum())
+        self.data = np.zeros(inside + count)
+        self.slot = self.inner.slot.copy()
+        self.slot[beside] = inside + np.arange(count)
+        self.inner.data = self.data[:inside]
+        self._tail, self._at = self.data[inside:], (rows[beside], columns[beside])
+        self._shape = (size, size)
+
+    def factor(self) -> None:
+        self.inner.factor()
+
+    def definite(self) -> bool:
+        return self.inner.definite()
+
+    def solve(self, rhs: Array) -> Array:
+        return self.inner.solve(rhs)
+
+    def edge(self) -> sp.csr_matrix:
+        """(size, size): the driven rows and columns of the tangent as last assembled."""
+        return sp.csr_matrix((self._tail, self._at), shape=self._shape)
+
+
+class Pull:
+    """A set of unknowns that moves together by one amount, and the gauge that it has to open.
+
+    Parameters
+    ----------
+    direction : (3 n,) displacement of every driven unknown for one mm of pull, zero elsewhere.
+    gauge : its two nodes.
+    """
+
+    def __init__(
+        self,
+        membrane: Membrane,
+        tangent: DrivenTangent,
+        direction: Array,
+        gauge: NDArray[np.intp],
+    ) -> None:
+        self.membrane, self.tangent = membrane, tangent
+        self.direction, self.gauge = direction, gauge
+        lower, upper = membrane.reference[gauge]
+        self.gauge_length = float(np.linalg.norm(upper - lower))
+
+    def elongation(self, u: Array) -> tuple[float, Array]:
+        """Elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
+        lower, upper = (self.membrane.reference + u)[self.gauge]
+        length = float(np.linalg.norm(upper - lower))
+        slope = np.zeros(u.shape)
+        slope[self.gauge[1]] = (upper - lower) / length
+        slope[self.gauge[0]] = -slope[self.gauge[1]]
+        return length - self.gauge_length, slope.reshape(-1)
+
+    def response(self) -> Array:
+        """(3 n,) displacement per mm of pull, for the tangent as last assembled and factorised."""
+        free = self.membrane.free
+        w = self.direction.copy()
+        w[free] = -self.tangent.solve((self.tangent.edge() @ self.direction)[free])
+        return w
+
+    def equilibrium(self, u: Array, elongation: float) -> Array | None:
+        """Equilibrium (n, 3) in which the gauge has this elongation, from u; None if not found.
+
+        Newton on the pull: between two equilibria the whole strip follows its tangent, so that
+        the second one is near.
+        """
+        m = self.membrane
+        for _ in range(MOST_CORRECTIONS):
+            found = m.equilibrium(u, 0.0)
+            if found is None:
+                return None
+            now, slope = self.elongation(found)
+            gap = elongation - now
+            if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
+                return found
+            m.factor()
+            w = self.response()
+            opens = float(slope @ w)
+            move = gap / opens if opens > 0 else np.inf
+            if abs(move) * np.abs(w).max() > m.step_limit:
+                return None
+            u = found + move * w.reshape(u.shape)
+        return None
+
 
 #: Increments that the start of the next one is extrapolated from.
 LOOK_BACK = 4
@@ -144,3 +264,56 @@ class Pulling(Loading):
         share = elongation / self.pull.gauge_length
         u[:, 1] = share * (reference[:, 1] - reference[:, 1].max())
         return self.guessed(u)
+
+
+@dataclass(eq=False)
+class Patch:
+    """What the solver keeps of a patch from run to run: its law, and where the last run ended."""
+
+    law: HypoelasticLaw
+    strain_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
+    stress_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
+    keep_tangent: bool = False
+    iterations: int = 0
+
+
+def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
+    """There is nothing to prepare; equilibrium holds to rounding, whatever the tolerance."""
+    return Patch(law)
+
+
+def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[History, Array]:
+    """History, and the derivatives of the displacements by the parameters at every load.
+
+    Raises
+    ------
+    SolverFailure : the law has no strain for a load.
+    """
+    found = biaxial_response(patch.law, model.loads, model.thickness, asked.parameters)
+    if found.reached < len(model.loads):
+        warp, fill = model.loads[found.reached]
+        raise SolverFailure(
+            f"no equilibrium at {warp:.4g} and {fill:.4g} N/mm along warp and fill (load "
+            f"{found.reached + 1} of {len(model.loads)}): a modulus is not positive, or the law "
+            "softens before it",
+            "membrane",
+        )
+    patch.strain_old[0, 0, :2], patch.stress_old[0, 0, :2] = found.strain[-1], found.stress[-1]
+    patch.iterations = len(model.loads)
+    stretch = 1.0 + found.elongation
+    slope = stretch[:, :, None] * found.slope
+    none = np.zeros(1)
+    moved = model.displacements(found.elongation)
+    rates = np.zeros((*moved.shape, len(asked.parameters)))
+    rates[:, :, :2] = model.mesh.points[None, :, :2, None] * slope[:, None]
+    if asked.tell is not None:
+        asked.tell(Done(float(len(model.loads))))
+    history = History(
+        model.loads.sum(axis=1),
+        moved,
+        np.concatenate([found.strain.min(axis=0), none]),
+        np.concatenate([found.strain.max(axis=0), none]),
+        iterations=patch.iterations,
+        unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
+    )
+    return history, rates

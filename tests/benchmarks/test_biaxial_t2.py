@@ -7,8 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from bubblefit.materials.designers.constants import DesignersConstants
-from bubblefit.materials.designers.ratios import RATIOS, shares
+from bubblefit.materials.designers import RATIOS, DesignersConstants, shares
 
 from ..biaxial_files import cycle, write_rows
 from ..places import ROOT

@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import live_line
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.fits import prediction_page
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Exhibit
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import read_project
+from bubblefit.reports import prediction_page
 from bubblefit.solvers import registry
 
 from ..commands import bubblefit, in_process, interrupted, one_line, result_in

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.materials.designers.constants import DesignersConstants
+from bubblefit.materials.designers import DesignersConstants
 
 from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows
 from ..commands import in_process, one_line, result_in

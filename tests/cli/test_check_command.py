@@ -9,13 +9,13 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.biaxial import doubts as biaxial_doubts
-from bubblefit.experiments.bubble.doubts import place, size
-from bubblefit.experiments.doubts import ROUGH
+from bubblefit.experiments.bubble import doubts as place
+from bubblefit.experiments.bubble import doubts as size
+from bubblefit.experiments.kinds import ROUGH
 from bubblefit.experiments.registry import kinds
 from bubblefit.experiments.strips import doubts
-from bubblefit.fits.check import check
-from bubblefit.fits.doubts import expected_of
-from bubblefit.fits.setup import prepare_fit
+from bubblefit.runs.check import check, expected_of
+from bubblefit.runs.setup import prepare_fit
 
 from ..camera import camera_project
 from ..commands import in_process, one_line, result_in

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.identification import correction
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Exhibit
+from bubblefit.inference import search as correction
 from bubblefit.solvers import process
 
 from ..commands import in_process, result_in

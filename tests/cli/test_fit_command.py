@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import bubblefit, one_line, result_in

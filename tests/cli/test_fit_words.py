@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from bubblefit.cli.ending import written_to
 from bubblefit.cli.fit_words import lines_of, misfit_lines, modulus_lines, warning_lines
-from bubblefit.fits.few_strains import Answer, answers
-from bubblefit.identification.noise import Misfit
+from bubblefit.inference.noise import Misfit
 from bubblefit.notes import GRAVEST, Note, NoteKind, foremost
+from bubblefit.runs.result import Answer, answers
 
 from ..projects import constant_strips
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.fits.project import read_project
+from bubblefit.project.project import read_project
 from click.testing import CliRunner, Result
 
 from ..commands import bubblefit

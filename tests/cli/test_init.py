@@ -11,10 +11,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 from bubblefit.cli.init import KINDS
-from bubblefit.data.registration.register import RegistrationOptions
-from bubblefit.fits.file import parse
-from bubblefit.fits.json_schema import SHIPPED, project_schema
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.bubble.registration import RegistrationOptions
+from bubblefit.project.project import read_project
+from bubblefit.project.schema import SHIPPED, parse, project_schema
 from click.testing import CliRunner
 
 from ..commands import in_process, one_line

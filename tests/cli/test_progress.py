@@ -10,8 +10,8 @@ from bubblefit import caching
 from bubblefit.cli import live_line
 from bubblefit.cli.live_line import COMPILING, SeriesProgress
 from bubblefit.cli.progress import StudyProgress
-from bubblefit.fits.analyses import Step
-from bubblefit.fits.start import EvaluationRecord, StartRecord
+from bubblefit.runs.simulation import Step
+from bubblefit.runs.starts import EvaluationRecord, StartRecord
 
 Clock = Callable[[float], None]
 

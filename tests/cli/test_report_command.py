@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.fits.unfinished import UNFINISHED, page_of_folder
-from bubblefit.reports import Table, pdf, write_report
+from bubblefit.reports import pdf
+from bubblefit.reports.content import Table
+from bubblefit.reports.html import write_report
 from bubblefit.reports.page_file import read_page_data
+from bubblefit.reports.unfinished import UNFINISHED, page_of_folder
 from click.testing import CliRunner, Result
 
 from ..reports.test_html import drawn, full_report

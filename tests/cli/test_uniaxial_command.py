@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import a_start_is_stored, bubblefit, interrupted, one_line, result_in

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.bending import BendingCurve, read_bending_curves
-from bubblefit.data.bending_scatter import model_error, scatter
-from bubblefit.data.channels import Channel
+from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
+from bubblefit.readers.machine_tables import Channel
 
 from ..complaints import complaint_with
 from ..cylinder_cases import write_readings

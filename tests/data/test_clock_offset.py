@@ -6,8 +6,13 @@ import re
 
 import numpy as np
 import pytest
-from bubblefit.data.clock_offset import find_offset, given_offset
-from bubblefit.data.offset_misfits import _rest_height, log_at, offset_misfits
+from bubblefit.readers.pressure_log import (
+    _rest_height,
+    find_offset,
+    given_offset,
+    log_at,
+    offset_misfits,
+)
 
 from ..complaints import complaint
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.column_names import means, split_unit
-from bubblefit.data.curves import (
+from bubblefit.errors import InputError
+from bubblefit.readers.columns import means, split_unit
+from bubblefit.readers.curves import (
     DIRECTION_ALIASES,
     LoadCurve,
     read_load_curves,
     split_at_restarts,
 )
-from bubblefit.errors import InputError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -10,14 +10,14 @@ import pytest
 
 def test_the_library_loads_without_pandas_and_scipy_spatial():
     code = (
-        "import sys, bubblefit.data.gauge, bubblefit.data.polynomial_order;"
+        "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.polynomials;"
         "assert not {'pandas', 'scipy.spatial'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_readers_are_where_the_package_says():
-    from bubblefit import data
+    from bubblefit import readers as data
 
     for name in data.__all__:
         assert callable(getattr(data, name)), name

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import QUANTITIES, read_fields
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.gauge import virtual_strain_gauge
-from bubblefit.data.registry import format_of
+from bubblefit.experiments.strips.gauge import virtual_strain_gauge
+from bubblefit.readers.fields import QUANTITIES, read_fields
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.registry import format_of
 
 from .. import dic_exports
 from ..complaints import complaint
@@ -206,7 +206,7 @@ def test_ncorr_is_planar(version, tmp_path):
 def as_version_73(path, copy):
     """What MATLAB's -v7.3 makes of Ncorr's struct: fields as lists of references."""
     import h5py
-    from bubblefit.data.mat_files import read_variables
+    from bubblefit.readers.mat_files import read_variables
 
     (saved,) = read_variables(path, ["data_dic_save"])["data_dic_save"]
     with h5py.File(copy, "w", userblock_size=512) as file:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.registration.directions import axes_angle, in_all_quarters, line_angle
+from bubblefit.experiments.bubble.placement import axes_angle, in_all_quarters, line_angle
 from hypothesis import given
 from hypothesis import strategies as st
 

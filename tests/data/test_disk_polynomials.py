@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.disk_polynomials import fit_disk_polynomial
+from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
 
 from ..complaints import complaint
 

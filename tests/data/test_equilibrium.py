@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.apex_shape import apex_shape
-from bubblefit.data.equilibrium import apex_of
-from bubblefit.data.fields import DisplacementField
+from bubblefit.experiments.bubble.equilibrium import apex_of, apex_shape
+from bubblefit.readers.fields import DisplacementField
 
 from ..complaints import complaint
 

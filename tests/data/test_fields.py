@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import read_fields
-from bubblefit.data.frames import FLAGGED, FrameOptions
 from bubblefit.errors import InputError
+from bubblefit.readers.fields import read_fields
+from bubblefit.readers.frames import FLAGGED, FrameOptions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.frame_choice import (
-    AT_REST,
+from bubblefit.readers.pressure_log import (
+    AT_REST_FRAME_CHOICE as AT_REST,
+)
+from bubblefit.readers.pressure_log import (
     BEYOND,
     RELEASED,
     REPEATED,

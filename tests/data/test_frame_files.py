@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bubblefit.data.frame_files import frame_files
+from bubblefit.readers.frames import frame_files
 
 from ..complaints import complaint
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.frame_rows import FrameRows, frame_of
-from bubblefit.data.frames import FrameOptions
+from bubblefit.readers.frames import FrameOptions, FrameRows, frame_of
 
 from ..complaints import complaint
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.frames import Frame, FrameOptions, read_frames
 from bubblefit.errors import InputError
+from bubblefit.readers.frames import Frame, FrameOptions, read_frames
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -6,9 +6,14 @@ import logging
 
 import numpy as np
 import pytest
-from bubblefit.data.frames import Frame
-from bubblefit.data.gauge import gauge_load_curve, virtual_strain_gauge
-from bubblefit.data.surface_points import place_of, triangulated, usual_edge
+from bubblefit.experiments.strips.gauge import (
+    gauge_load_curve,
+    place_of,
+    triangulated,
+    usual_edge,
+    virtual_strain_gauge,
+)
+from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.curves import read_load_curves
-from bubblefit.data.frames import Frame
-from bubblefit.data.gauge import virtual_strain_gauge
-from bubblefit.data.gauge_loads import PairedLoads, loads_at_frames
-from bubblefit.data.gauge_table import GaugeTable
+from bubblefit.experiments.strips.gauge import (
+    GaugeTable,
+    PairedLoads,
+    loads_at_frames,
+    virtual_strain_gauge,
+)
+from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.frames import Frame
 
 from ..complaints import complaint
 

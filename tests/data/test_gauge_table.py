@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.gauge import GaugeRecord
-from bubblefit.data.gauge_table import GaugeTable
+from bubblefit.experiments.strips.gauge import GaugeRecord, GaugeTable
 from bubblefit.notes import Note, NoteKind
+from bubblefit.readers.curves import LoadCurve
 
 FILES = ("a.csv", "b.csv", "c.csv", "d.csv")
 #: Of 20 mm at rest; lost in the third frame, longest in the second.

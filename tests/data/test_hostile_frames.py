@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import read_fields
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.hdf5_files import check_readable
-from bubblefit.data.mat_files import read_variables
 from bubblefit.errors import InputError
+from bubblefit.readers.fields import read_fields
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.hdf5_files import check_readable
+from bubblefit.readers.mat_files import read_variables
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

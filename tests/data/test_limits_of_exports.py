@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data import hdf5_files, mat_version_5, mat_version_73, npz_files
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.hdf5_files import array_of, member, open_hdf5
-from bubblefit.data.mat_version_5 import names_5, variables_5
-from bubblefit.data.mat_version_73 import variables_73
-from bubblefit.data.npz_files import array_names, read_arrays
+from bubblefit.readers import hdf5_files, mat_version_5, mat_version_73, npz_files
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.hdf5_files import array_of, member, open_hdf5
+from bubblefit.readers.mat_version_5 import names_5, variables_5
+from bubblefit.readers.mat_version_73 import variables_73
+from bubblefit.readers.npz_files import array_names, read_arrays
 
 from .. import dic_exports
 from ..complaints import complaint

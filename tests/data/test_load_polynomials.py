@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.load_polynomials import (
-    LoadPolynomial,
-    fit_load_polynomial,
-    specimen_scatter,
-)
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.polynomials import LoadPolynomial, fit_load_polynomial, specimen_scatter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

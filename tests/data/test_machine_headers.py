@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bubblefit.data.machine_headers import cells_of, find_blocks, find_header, nothing_found
+from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header, nothing_found
 
 from ..complaints import complaint
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.machine_loads import read_machine_loads, read_times
 from bubblefit.errors import InputError
+from bubblefit.readers.machine_tables import read_machine_loads, read_times
 
 
 @pytest.mark.parametrize(

@@ -6,21 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data import column_names
-from bubblefit.data.bending import read_bending_curves
-from bubblefit.data.channels import Channel, in_unit
-from bubblefit.data.column_names import PRESSURE_UNITS, means, nearest_to_strip, scale_of
-from bubblefit.data.curves import LoadCurve, read_load_curves, split_at_restarts
-from bubblefit.data.disk_polynomials import fit_disk_polynomial
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.file_values import value_in_file
-from bubblefit.data.formats import dice
-from bubblefit.data.frame_choice import REPEATED, choose_frames
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.name_numbers import check_pattern, number_in_name
-from bubblefit.data.offset_misfits import offset_misfits
-from bubblefit.data.rising import misfit_of, straightest
-from bubblefit.data.surfaces import fit_surface, read_surfaces
+from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
+from bubblefit.readers import columns as column_names
+from bubblefit.readers.bending import read_bending_curves
+from bubblefit.readers.columns import PRESSURE_UNITS, means, nearest_to_strip, scale_of
+from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
+from bubblefit.readers.fields import DisplacementField
+from bubblefit.readers.formats import dice
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.machine_tables import Channel, in_unit
+from bubblefit.readers.names import check_pattern, number_in_name, value_in_file
+from bubblefit.readers.pressure_log import (
+    REPEATED,
+    choose_frames,
+    misfit_of,
+    offset_misfits,
+    straightest,
+)
+from bubblefit.readers.surfaces import fit_surface, read_surfaces
 
 from ..complaints import complaint
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
+from bubblefit.meshes.disk import Outline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.curves import read_load_curves, split_at_restarts
-from bubblefit.data.load_polynomials import fit_load_polynomial
-from bubblefit.data.polynomial_order import compare_orders
+from bubblefit.experiments.strips.polynomials import compare_orders
+from bubblefit.readers.curves import read_load_curves, split_at_restarts
+from bubblefit.readers.polynomials import fit_load_polynomial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.channels import Channel
-from bubblefit.data.column_names import PRESSURE_UNITS, TIME_UNITS, columns_of, split_unit
-from bubblefit.data.file_values import value_in_file
-from bubblefit.data.frames import Frame
-from bubblefit.data.name_numbers import check_pattern, number_in_name
-from bubblefit.data.pressure_log import LogOptions, apex_height, read_pressure_log
+from bubblefit.readers.columns import PRESSURE_UNITS, TIME_UNITS, columns_of, split_unit
+from bubblefit.readers.frames import Frame
+from bubblefit.readers.machine_tables import Channel
+from bubblefit.readers.names import check_pattern, number_in_name, value_in_file
+from bubblefit.readers.pressure_log import LogOptions, apex_height, read_pressure_log
 
 from ..complaints import complaint
 

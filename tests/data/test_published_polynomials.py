@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.curves import (
-    LoadCurve,
-    read_load_curves,
-    split_at_restarts,
+from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
+from bubblefit.readers.polynomials import (
+    fit_load_polynomial,
+    read_published_polynomials,
+    specimen_scatter,
 )
-from bubblefit.data.load_polynomials import fit_load_polynomial, specimen_scatter
-from bubblefit.data.published_polynomials import read_published_polynomials
 
 from ..complaints import complaint
 from ..places import PUBLISHED

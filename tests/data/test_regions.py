@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.regions import strain_regions
 from bubblefit.errors import InputError
+from bubblefit.experiments.strips.polynomials import strain_regions
 
 
 def test_a_broken_line_gives_its_own_breaks_back() -> None:

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.frames import Frame
-from bubblefit.data.registration.clamp import UNKNOWN, clamp_motion, without
-from bubblefit.data.registration.placement import Placement, turned
-from bubblefit.data.registration.plane import plane_through
-from bubblefit.data.registration.register import RegistrationOptions, register
-from bubblefit.data.registration.rim import rim_of_motion
-from bubblefit.data.registration.symmetry import symmetry_axes
-from bubblefit.data.registration.warp import centre_strain, warp_of_points
 from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.placement import (
+    UNKNOWN,
+    Placement,
+    clamp_motion,
+    plane_through,
+    turned,
+    without,
+)
+from bubblefit.experiments.bubble.registration import (
+    RegistrationOptions,
+    centre_strain,
+    register,
+    rim_of_motion,
+    symmetry_axes,
+    warp_of_points,
+)
+from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data import registry
-from bubblefit.data.curves import read_load_curves
-from bubblefit.data.fields import read_fields
-from bubblefit.data.frames import LOST, Frame, read_frames
-from bubblefit.data.published_polynomials import read_published_polynomials
-from bubblefit.data.registry import (
+from bubblefit.errors import InputError, PlugInFailure
+from bubblefit.readers import registry
+from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.fields import read_fields
+from bubblefit.readers.frames import LOST, Frame, read_frames
+from bubblefit.readers.polynomials import read_published_polynomials
+from bubblefit.readers.registry import (
     Format,
     format_named,
     format_names,
@@ -21,7 +22,6 @@ from bubblefit.data.registry import (
     formats,
     register_format,
 )
-from bubblefit.errors import InputError, PlugInFailure
 
 from ..complaints import complaint
 from ..plug_ins import install
@@ -97,8 +97,8 @@ def test_names_that_are_not_there_and_files_that_are_not_there(tmp_path):
 READER = """
 import json
 import numpy as np
-from bubblefit.data.frames import Frame
-from bubblefit.data.registry import Format
+from bubblefit.readers.frames import Frame
+from bubblefit.readers.registry import Format
 
 def read(path, options):
     content = json.loads(path.read_text())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.frames import Frame
-from bubblefit.data.spheres import _linear, fit_sphere, points_of
+from bubblefit.readers.frames import Frame
+from bubblefit.readers.spheres import _linear, fit_sphere, points_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

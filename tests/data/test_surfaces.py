@@ -6,8 +6,8 @@ import csv
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import DisplacementField, read_fields
-from bubblefit.data.surfaces import (
+from bubblefit.readers.fields import DisplacementField, read_fields
+from bubblefit.readers.surfaces import (
     AXES,
     DisplacementSurface,
     fit_surface,

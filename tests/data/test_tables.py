@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.tables import read_table, write_table
+from bubblefit.readers.tables import read_table, write_table
 
 from ..complaints import complaint
 

@@ -6,12 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.decimal_marks import decimal_mark, is_number
-from bubblefit.data.frame_headings import columns_of, heading_of
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.text_cells import _quick, _slow, read_numbers
-from bubblefit.data.text_columns import quantity_columns
-from bubblefit.data.text_layouts import cells_of, find_layout
+from bubblefit.readers.frames import FrameOptions, columns_of, heading_of, read_frames
+from bubblefit.readers.tables import decimal_mark, is_number
+from bubblefit.readers.text_frames import (
+    _quick,
+    _slow,
+    cells_of,
+    find_layout,
+    quantity_columns,
+    read_numbers,
+)
 
 from ..complaints import complaint
 

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.channels import Channel, in_unit
-from bubblefit.data.column_names import PRESSURE_UNITS
-from bubblefit.data.curves import direction_named, read_load_curves
-from bubblefit.data.file_values import value_in_file
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.machine_loads import read_machine_loads
-from bubblefit.data.registry import format_named
-from bubblefit.data.tables import read_table
+from bubblefit.readers.columns import PRESSURE_UNITS
+from bubblefit.readers.curves import direction_named, read_load_curves
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads
+from bubblefit.readers.names import value_in_file
+from bubblefit.readers.registry import format_named
+from bubblefit.readers.tables import read_table
 
 from ..complaints import complaint
 

@@ -7,11 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.doubts import Doubt, Expected, judged
-from bubblefit.experiments.notes import (
+from bubblefit.experiments.kinds import (
+    Doubt,
+    Expected,
     beyond_card,
     beyond_range,
     by_strain,
+    judged,
     notes_of_record,
     other_thickness,
     unstable_words,

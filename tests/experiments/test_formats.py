@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.base import Fabric, Place
-from bubblefit.experiments.formats import named_format
+from bubblefit.experiments.keys import named_format
+from bubblefit.experiments.kinds import Fabric, Place
 
 PLACE = Place(Path("fabric.toml"), "bubble[0]", Fabric("Valmex", 0.8))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.experiments.notes import beyond_card, beyond_range, notes_of, strains_of
+from bubblefit.experiments.kinds import beyond_card, beyond_range, notes_of, strains_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History

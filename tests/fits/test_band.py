@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.fits import prediction_page
-from bubblefit.fits.prediction_result import Predictions
-from bubblefit.fits.predictions import RunEvent, predict
-from bubblefit.fits.project import read_project
-from bubblefit.reports import Report
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Exhibit
+from bubblefit.project.project import read_project
+from bubblefit.reports import prediction_page
+from bubblefit.reports.content import Report
+from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
 
 from ..cylinder_cases import FAILS, Banded, write_project, write_readings

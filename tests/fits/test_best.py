@@ -8,8 +8,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.fits.best import best_fit, noise_of
-from bubblefit.fits.budget import with_certainty
+from bubblefit.runs.best import best_fit, noise_of, with_certainty
 
 
 def test_one_analysis_serves_both(together: bf.Fit) -> None:

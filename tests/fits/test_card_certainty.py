@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
 from bubblefit.materials.card import read_card
+from bubblefit.project.project import read_project
+from bubblefit.runs.fit import fit
 
 from ..projects import constant_strips
 

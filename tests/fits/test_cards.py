@@ -8,16 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Fabric, Place, Scales
-from bubblefit.fits.cards import (
-    CardSection,
-    NamedCard,
-    card_sources,
-    chosen_cards,
-    read_cards,
-)
+from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.cards import CardSection, NamedCard, card_sources, chosen_cards, read_cards
 
 from ..complaints import complaint
 

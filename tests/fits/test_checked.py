@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 from bubblefit import __version__
-from bubblefit.experiments.doubts import Doubt, Judgement
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.fits import check as room
-from bubblefit.fits.check import Check
-from bubblefit.reports import Report, Table
+from bubblefit.experiments.kinds import Doubt, Exhibit, Judgement
+from bubblefit.reports.content import Report, Table
+from bubblefit.runs import check as room
+from bubblefit.runs.check import Check
 
 SURE, VAGUE = Doubt("unit", True, "off by 1000"), Doubt("slack", False, "0.2 mm of slack")
 

@@ -18,11 +18,11 @@ import bubblefit as bf
 import cloudpickle
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.fits import cluster_worker
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.start import StartRecord
+from bubblefit.runs import cluster_worker
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers import licence_leases, licences
-from bubblefit.solvers.announcements import Announcement, announce, hearing
+from bubblefit.solvers.base import Announcement, announce, hearing
 from bubblefit.solvers.process import run_process
 from bubblefit.solvers.scheduler import check
 
@@ -267,9 +267,9 @@ def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) ->
 def test_the_code_counts_by_content(tmp_path: Path, monkeypatch) -> None:
     """In whatever room it is; tests, documents and what has been compiled do not."""
     files = {name: tmp_path / name for name in
-             ("errors.py", "fits/start.py", "templates/marc/deck.j2", "tests/test_a.py",
+             ("errors.py", "runs/starts.py", "templates/marc/deck.j2", "tests/test_a.py",
               "docs/make_api.py", "fits/__pycache__/start.pyc")}  # fmt: skip
-    for path in (*files.values(), tmp_path / "fits/__init__.py", tmp_path / "tests/__init__.py"):
+    for path in (*files.values(), tmp_path / "runs/__init__.py", tmp_path / "tests/__init__.py"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
     monkeypatch.setattr(cluster_worker, "ROOT", tmp_path)

@@ -11,8 +11,8 @@ import bubblefit as bf
 import pytest
 from bubblefit import writing
 from bubblefit.errors import OutputError
-from bubblefit.fits import running_files
-from bubblefit.fits.store import Store
+from bubblefit.runs import starts as running_files
+from bubblefit.runs.folder import Store
 
 from ..projects import constant_strips
 

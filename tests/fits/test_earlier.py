@@ -9,8 +9,8 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.fits.earlier import proposals
-from bubblefit.identification.starts import ProposedStarts, SobolStarts
+from bubblefit.inference.unknowns import ProposedStarts, SobolStarts
+from bubblefit.runs.setup import proposals
 
 from ..commands import in_process
 from ..complaints import complaint

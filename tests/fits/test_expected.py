@@ -6,9 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from bubblefit.fits.doubts import expected_of
-from bubblefit.identification.bounds import LawBounds
+from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.check import expected_of
 
 LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
 LEAST = {"E1": 5.0, "E2": 6.0, "G12": 0.5}

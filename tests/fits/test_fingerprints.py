@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import FitSetup, fingerprints, prepare_fit
 from bubblefit.materials.forms.trilinear import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import read_project
+from bubblefit.runs.setup import FitSetup, fingerprints, prepare_fit
 
 from ..projects import small, with_form
 

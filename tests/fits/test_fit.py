@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
-from bubblefit.fits import best
-from bubblefit.fits.start import StartRecord
-from bubblefit.reports import Maps, Solid
+from bubblefit.reports.maps import Maps, Solid
 from bubblefit.reports.page_file import read_page_data
 from bubblefit.reports.style import BLACK
+from bubblefit.runs import best
+from bubblefit.runs.starts import StartRecord
 from matplotlib.figure import Figure
 
 from ..commands import in_process, result_in
@@ -198,7 +198,7 @@ def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path
     """A start whose moduli give another objective from the unloaded state: exit 4, a page."""
     ended = replace(fitted.best.ranked[0], objective=fitted.objective + 1e-3)
     monkeypatch.setattr(
-        "bubblefit.fits.executor.Executor.run_starts", lambda *a: iter([replace(ended, number=0)])
+        "bubblefit.runs.executor.Executor.run_starts", lambda *a: iter([replace(ended, number=0)])
     )
     arguments = ("bubble", fitted.project.path, "--starts", 1, "--out", "out", "--json")
     in_process("bubble", fitted.project.path, "--starts", 1, "--out", "out", cwd=tmp_path, code=4)
@@ -221,7 +221,7 @@ def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path
 
 
 def test_starts_that_a_failure_ended_are_told(fitted: bf.Fit):
-    from bubblefit.fits.numbers import notes_of_fit
+    from bubblefit.runs.record import notes_of_fit
 
     cut = replace(fitted.best.records[1], failure="killed by SIGKILL at once")
     best_of = replace(fitted.best, records=[fitted.best.records[0], cut])
@@ -291,7 +291,7 @@ def test_another_form_of_the_moduli(tmp_path: Path, form: str):
 
 
 def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
-    from bubblefit.fits.numbers import notes_of_fit
+    from bubblefit.runs.record import notes_of_fit
 
     def with_unstable(point, words):
         (history,) = point.histories
@@ -311,7 +311,7 @@ def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
 
 
 def test_a_test_that_says_nothing_of_a_modulus_is_named(fitted: bf.Fit):
-    from bubblefit.fits.numbers import notes_of_fit
+    from bubblefit.runs.record import notes_of_fit
 
     def said(least: float) -> list[str]:
         sigma = {"least": least, "median": 2.0, "largest": 9.0}

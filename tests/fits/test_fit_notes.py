@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fit_words import lines_of
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.identification.assessment import certainty
+from bubblefit.inference.assessment import certainty
 from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.project.project import read_project
 from bubblefit.reports.html import number
+from bubblefit.runs.setup import prepare_fit
 
 from ..projects import small
 

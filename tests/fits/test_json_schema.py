@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 
 import pytest
-from bubblefit.fits.executor import cores
-from bubblefit.fits.json_schema import SHIPPED, _plain, _used, schema_text
+from bubblefit.project.schema import SHIPPED, _plain, _used, schema_text
+from bubblefit.runs.executor import cores
 
 
 def test_the_shipped_schema_is_what_the_sections_say() -> None:

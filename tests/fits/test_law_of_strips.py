@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Reach
-from bubblefit.fits.law import bounds_of, law_of
-from bubblefit.fits.project import Project, read_project
-from bubblefit.identification.draws import allowed, draw
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.experiments.kinds import Reach
+from bubblefit.inference.unknowns import Unknowns, allowed, draw
 from bubblefit.materials.forms.registry import form_names
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.setup import bounds_of, law_of
 
 from ..complaints import complaint, complaint_with
 from ..projects import project_file

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.fits.predictions import predict
-from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
+from bubblefit.project.project import read_project
+from bubblefit.runs.predictions import predict
 from bubblefit.solvers import registry
 
 from ..cylinder_cases import Formula, write_project

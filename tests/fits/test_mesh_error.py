@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits import mesh_error
-from bubblefit.fits.budget import with_certainty
-from bubblefit.fits.mesh_error import notes_of_mesh
-from bubblefit.identification.assessment import Certainty
-from bubblefit.identification.discretisation import limit_of, residual_of
+from bubblefit.experiments.kinds import Weighting
+from bubblefit.inference.assessment import Certainty
+from bubblefit.inference.discretisation import limit_of, residual_of
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import NoteKind
+from bubblefit.runs import best as mesh_error
+from bubblefit.runs.best import notes_of_mesh, with_certainty
 
 from ..places import KNOWN
 from ..projects import constant_strips

@@ -7,7 +7,7 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.fits.numbers import TOGETHER, notes_of_fit, versions
+from bubblefit.runs.record import TOGETHER, notes_of_fit, versions
 
 OPEN = "rests on the other directions"
 LEFT = "points beyond the final length (or before zero) were left out"

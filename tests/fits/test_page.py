@@ -9,13 +9,14 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.fits import page
-from bubblefit.fits.answer import WORDS, band_words
-from bubblefit.fits.coefficients import TITLE, two_digits
-from bubblefit.fits.determined import sigma_words
-from bubblefit.fits.numbers import versions
-from bubblefit.reports import Charts, Download, Facts, Report, Table, Words, percent
+from bubblefit.experiments.kinds import Exhibit
+from bubblefit.reports import fit_page as page
+from bubblefit.reports.charts import Charts
+from bubblefit.reports.content import Download, Facts, Report, Table, Words
+from bubblefit.reports.fit_page import WORDS, band_words, sigma_words
+from bubblefit.reports.html import percent
+from bubblefit.runs.record import versions
+from bubblefit.runs.result import TITLE, two_digits
 
 from ..projects import ELONGATION, MODULI
 

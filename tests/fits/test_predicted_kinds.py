@@ -12,12 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments import registry as kinds_of_test
-from bubblefit.experiments.exhibit import Exhibit, Output
-from bubblefit.experiments.predicted import PredictedRun
-from bubblefit.fits import prediction_result, predictions, project
-from bubblefit.fits.predictions import measured_tests, predict
-from bubblefit.fits.project import Project, read_project
+from bubblefit.experiments.kinds import Exhibit, Output, PredictedRun
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project import project
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs import predictions
+from bubblefit.runs import predictions as prediction_result
+from bubblefit.runs.predictions import measured_tests, predict
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import History
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from bubblefit.experiments.cylinder import page as cylinders
-from bubblefit.fits import prediction_page
-from bubblefit.fits.numbers import versions
-from bubblefit.fits.prediction_result import Predictions
-from bubblefit.fits.predictions import predict
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.notes import Note, NoteKind, rows
-from bubblefit.reports import Report, Table, Words, percent
+from bubblefit.project.project import read_project
+from bubblefit.reports import prediction_page
+from bubblefit.reports.content import Report, Table, Words
+from bubblefit.reports.html import percent
+from bubblefit.runs.predictions import Predictions, predict
+from bubblefit.runs.record import versions
 from bubblefit.solvers import registry
 
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings

@@ -11,19 +11,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Exhibit
-from bubblefit.experiments.notes import notes_of_record
-from bubblefit.experiments.predicted import RunRecord
-from bubblefit.fits import executor, processes
-from bubblefit.fits.cards import chosen_cards
-from bubblefit.fits.prediction_result import Predictions
-from bubblefit.fits.predictions import RunEvent, predict
-from bubblefit.fits.project import Project, read_project
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Exhibit, RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW
+from bubblefit.project.cards import chosen_cards
+from bubblefit.project.project import Project, read_project
 from bubblefit.reports.style import NAMED
+from bubblefit.runs import executor, processes
+from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
 from matplotlib.figure import Figure
 

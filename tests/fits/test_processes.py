@@ -16,18 +16,17 @@ import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.fits.executor import Executor
-from bubblefit.fits.processes import run_tasks
-from bubblefit.fits.start import StartRecord
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.methods import FitOptions
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Comparison
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.processes import run_tasks
+from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import run_process
 from bubblefit.solvers.scratch import run_folder

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Reach
-from bubblefit.fits.law import bounds_of, law_of
-from bubblefit.fits.project import Project, read_project
-from bubblefit.identification.bounds import LawBounds
+from bubblefit.experiments.kinds import Reach
+from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.forms.base import pieces_of
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.setup import bounds_of, law_of
 
 from ..complaints import complaint, complaint_with
 from ..places import EXAMPLES, KNOWN

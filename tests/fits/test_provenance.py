@@ -14,15 +14,12 @@ import bubblefit.fits.facts
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.fits.differences import differences
-from bubblefit.fits.facts import facts_of, solver_facts
-from bubblefit.fits.project import Project, read_project
-from bubblefit.fits.record import Record, data_rows, this_run
-from bubblefit.fits.setup import FitSetup, fingerprints, prepare_fit
-from bubblefit.fits.store import AS_RUN, PROVENANCE, RUN, Store
-from bubblefit.fits.written import project_text, settings_of
+from bubblefit.project.project import Project, project_text, read_project, settings_of
+from bubblefit.runs.folder import AS_RUN, PROVENANCE, RUN, Store, differences
+from bubblefit.runs.record import Record, data_rows, facts_of, solver_facts, this_run
+from bubblefit.runs.setup import FitSetup, fingerprints, prepare_fit
 from bubblefit.solvers.calculix.executable import Executable
-from bubblefit.solvers.identity import in_words
+from bubblefit.solvers.decks import in_words
 
 from ..places import EXAMPLES
 from ..projects import project_file

@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
-from bubblefit.experiments.cylinder.predicted import CylinderPredicted
-from bubblefit.experiments.cylinder.record import run_of
-from bubblefit.experiments.predicted import RunRecord
-from bubblefit.fits.predictions import mark_of
-from bubblefit.fits.run_records import RunRecords
+from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
+from bubblefit.experiments.kinds import RunRecord
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.cylinder import CylinderModel
-from bubblefit.models.reading import curve_reading
+from bubblefit.meshes.cylinder_model import CylinderModel, curve_reading, inflated_cylinder
 from bubblefit.notes import Note, NoteKind
+from bubblefit.runs.folder import RunRecords
+from bubblefit.runs.predictions import mark_of
 from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named

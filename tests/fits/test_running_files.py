@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.fits.running_files import HISTORY, STARTS, RunningFiles
-from bubblefit.fits.start import EvaluationRecord, StartRecord
-from bubblefit.fits.store import RESULT, RUN, Store
+from bubblefit.runs.folder import RESULT, RUN, Store
+from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFiles, StartRecord
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

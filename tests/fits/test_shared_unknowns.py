@@ -9,11 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.fits.shared import shared_unknowns
 from bubblefit.materials.card import read_card
+from bubblefit.project.project import read_project
+from bubblefit.runs.fit import fit
+from bubblefit.runs.setup import prepare_fit, shared_unknowns
 
 from ..commands import in_process
 from ..projects import constant_strips

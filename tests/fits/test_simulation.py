@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.fits.simulation import simulate, simulate_cards
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.simulation import simulate, simulate_cards
 
 from ..bars import BarSolver, BarTest, project_of
 

@@ -13,13 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.spread import Around, laws_around
-from bubblefit.fits.prediction_result import Predictions
-from bubblefit.fits.predictions import RunEvent, predict
-from bubblefit.fits.project import read_project
-from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.certainty import CardCertainty
+from bubblefit.experiments.kinds import Around, laws_around
+from bubblefit.materials.card import CardCertainty, MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import read_project
+from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
 from matplotlib.figure import Figure
 

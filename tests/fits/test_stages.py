@@ -14,12 +14,11 @@ import pytest
 from bubblefit.cli.fit_words import lines_of
 from bubblefit.cli.progress import FitsProgress, StudyProgress
 from bubblefit.errors import InputError
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits import stages
-from bubblefit.fits.coarse import coarse_problem
-from bubblefit.fits.distinct import distinct, moduli_apart
-from bubblefit.fits.stages import one_fit
-from bubblefit.fits.start import Stage, StartRecord
+from bubblefit.experiments.kinds import Weighting
+from bubblefit.runs import fit as stages
+from bubblefit.runs.fit import distinct, moduli_apart, one_fit
+from bubblefit.runs.setup import coarse_problem
+from bubblefit.runs.starts import Stage, StartRecord
 
 from ..commands import result_in
 from ..projects import BUBBLE, constant_strips, project_file

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
-from bubblefit.fits import start as room
-from bubblefit.fits.start import EvaluationRecord, StartRecord, run_start
+from bubblefit.runs import starts as room
+from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 
 
 class Problem:

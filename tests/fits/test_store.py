@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.fits.store import RESULT, RUN, Store, usual_folder
+from bubblefit.runs.folder import RESULT, RUN, Store, usual_folder
 
 from ..complaints import complaint
 

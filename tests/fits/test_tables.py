@@ -9,8 +9,8 @@ from typing import Any
 import bubblefit as bf
 import pandas as pd
 import pytest
-from bubblefit.fits.result import COMPARED, TABLES
-from bubblefit.fits.tables import write_table
+from bubblefit.runs.folder import write_table
+from bubblefit.runs.result import COMPARED, TABLES
 
 from ..complaints import complaint_with
 from ..places import ROOT

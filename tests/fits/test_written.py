@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from bubblefit.fits import written
-from bubblefit.fits.written import (
+from bubblefit.project import project as written
+from bubblefit.project.project import (
     HEAD,
     Written,
     plain,

@@ -10,27 +10,27 @@ from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
-from bubblefit.data import hdf5_files, name_numbers
-from bubblefit.data.bending import read_bending_curves
-from bubblefit.data.biaxial.table import read_biaxial_table
-from bubblefit.data.channels import Channel
-from bubblefit.data.column_names import PRESSURE_UNITS
-from bubblefit.data.curves import read_load_curves
-from bubblefit.data.file_values import value_in_file
-from bubblefit.data.frames import FrameOptions, read_frames
-from bubblefit.data.machine_loads import read_machine_loads, read_times
-from bubblefit.data.pressure_log import read_pressure_log
-from bubblefit.data.published_polynomials import read_published_polynomials
-from bubblefit.data.surfaces import read_surfaces
-from bubblefit.experiments.base import Reach
-from bubblefit.fits.law import bounds_of, law_of
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.kinds import Reach
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.project.project import read_project
+from bubblefit.readers import hdf5_files
+from bubblefit.readers import names as name_numbers
+from bubblefit.readers.bending import read_bending_curves
+from bubblefit.readers.biaxial import read_biaxial_table
+from bubblefit.readers.columns import PRESSURE_UNITS
+from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
+from bubblefit.readers.names import value_in_file
+from bubblefit.readers.polynomials import read_published_polynomials
+from bubblefit.readers.pressure_log import read_pressure_log
+from bubblefit.readers.surfaces import read_surfaces
+from bubblefit.runs.setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
-from bubblefit.solvers.marc.sts import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 
 from .. import dic_exports, projects
@@ -197,8 +197,8 @@ def _biaxial(folder: Path) -> bytes:
 
 
 def _surfaces(folder: Path) -> bytes:
-    from bubblefit.data.fields import DisplacementField
-    from bubblefit.data.surfaces import fit_surface, write_surfaces
+    from bubblefit.readers.fields import DisplacementField
+    from bubblefit.readers.surfaces import fit_surface, write_surfaces
 
     angle = np.linspace(0, 60, 60)
     points = np.stack([angle * np.cos(angle), angle * np.sin(angle)], axis=1)

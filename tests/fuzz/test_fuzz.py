@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.registry import format_of, formats
 from bubblefit.errors import InputError
+from bubblefit.readers.registry import format_of, formats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.methods import FitOptions
-from bubblefit.identification.methods.lm import LevenbergMarquardt
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

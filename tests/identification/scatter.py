@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from bubblefit.identification.problem import Evaluation, FitProblem
+from bubblefit.inference.problem import Evaluation, FitProblem
 
 Array = np.ndarray
 

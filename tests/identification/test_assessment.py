@@ -7,23 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.identification.assessment import (
-    Certainty,
-    _on_bounds,
-    certainty,
-    moduli_error,
-    pinned_by,
-)
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.discretisation import Limit
-from bubblefit.identification.methods.descent import descend
-from bubblefit.identification.noise import Noise
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.problem import Evaluation, FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.assessment import Certainty, _on_bounds, certainty, moduli_error, pinned_by
+from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.discretisation import Limit
+from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.problem import Evaluation, FitProblem
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.identification.chi_square import (
-    CHANCE,
-    NoiseTest,
-    noise_tests,
-    notes_of_noise,
-)
-from bubblefit.identification.noise import Misfit
-from bubblefit.identification.problem import FitProblem
+from bubblefit.inference.misfit import CHANCE, NoiseTest, noise_tests, notes_of_noise
+from bubblefit.inference.noise import Misfit
+from bubblefit.inference.problem import FitProblem
 from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

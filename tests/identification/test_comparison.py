@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.nuisance import Nuisance
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Comparison, Nuisance
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import Unknowns
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

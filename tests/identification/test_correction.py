@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import FitOptions
-from bubblefit.identification.problem import FitProblem
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

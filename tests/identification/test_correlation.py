@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.identification.assessment import certainty
-from bubblefit.identification.correlation import alike, alike_in
+from bubblefit.inference.assessment import certainty
+from bubblefit.inference.noise import alike, alike_in
 from scipy.ndimage import gaussian_filter
 
 from . import cases

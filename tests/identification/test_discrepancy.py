@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.discrepancy import (
+from bubblefit.inference.misfit import (
     Discrepancy,
     discrepancy,
     notes_of_discrepancies,

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.draws import _between, allowed, draw
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.search import feasible_start
+from bubblefit.inference.unknowns import LawBounds, Unknowns, _between, allowed, draw
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from bubblefit.identification import given_law as room
+from bubblefit.inference import search as room
 
 
 def asked(nuisance: tuple[str, ...], differentiates: bool, first: Any = "first") -> list[Any]:

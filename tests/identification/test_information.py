@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.information import Asked, information, summary
-from bubblefit.identification.nuisance import Nuisance
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Nuisance
+from bubblefit.inference.linear import Asked, information, summary
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.law import HypoelasticLaw
 
 LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.likelihood import (
-    FAILED,
-    THRESHOLD,
-    extreme,
-    modulus_row,
-    profile_side,
-)
-from bubblefit.identification.linear import Linear
-from bubblefit.identification.noise import Noise
-from bubblefit.identification.propagation import posteriors_of
-from bubblefit.identification.weighted import WeightedProblem
+from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
+from bubblefit.inference.linear import Linear, posteriors_of
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.problem import WeightedProblem
 from scipy.optimize import minimize
 
 from .cases import CONSTANT, EVERYTHING, levenberg_marquardt, problem

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import FitOptions
-from bubblefit.identification.methods.descent import descend
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import (

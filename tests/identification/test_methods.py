@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import METHODS, FitOptions
-from bubblefit.identification.optimum import Optimum
-from bubblefit.identification.problem import FitProblem
+from bubblefit.inference.methods import METHODS
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.problem import FitProblem, Optimum
+from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CUBIC, LAW, Failing, problem, reference

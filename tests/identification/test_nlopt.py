@@ -8,9 +8,8 @@ from typing import Any
 import nlopt
 import numpy as np
 import pytest
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.search import feasible_start, fit_from
 
 from .cases import CUBIC, Failing, problem
 

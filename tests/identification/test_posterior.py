@@ -6,16 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bubblefit.identification.bands import bands_of
-from bubblefit.identification.blocks import Blocks
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.discretisation import Limit
-from bubblefit.identification.noise import Noise
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.posterior import Posterior
-from bubblefit.identification.problem import Evaluation
-from bubblefit.identification.propagation import posteriors_of
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
+from bubblefit.inference.discretisation import Limit
+from bubblefit.inference.linear import posteriors_of
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.posterior import Posterior, bands_of
+from bubblefit.inference.problem import Evaluation
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CONSTANT, CUBIC, EVERYTHING, LAW, MODEL, Failing, problem, single, targets

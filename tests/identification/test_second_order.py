@@ -8,14 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.fits import budget
-from bubblefit.identification.linear import Linear, Second
-from bubblefit.identification.methods.descent import descend
-from bubblefit.identification.noise import Noise
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.propagation import posteriors_of
-from bubblefit.identification.second_order import NOT_DEFINITE, TOO_LITTLE, definite, second_of
+from bubblefit.inference.linear import (
+    NOT_DEFINITE,
+    TOO_LITTLE,
+    Linear,
+    Second,
+    definite,
+    posteriors_of,
+    second_of,
+)
+from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.problem import FitProblem
 from bubblefit.notes import NoteKind
+from bubblefit.runs import best as budget
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CONSTANT, LAW, MODEL, levenberg_marquardt, problem, reference, single, targets

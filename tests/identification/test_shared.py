@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.strips.objective import LoadObjective
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.noise import Noise
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.propagation import posteriors_of
-from bubblefit.identification.unknowns import Unknowns
-from bubblefit.identification.verdicts import notes_of_verdicts, verdicts
+from bubblefit.inference.assessment import notes_of_verdicts, verdicts
+from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.linear import posteriors_of
+from bubblefit.inference.noise import Noise
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from .cases import CUBIC, LAW, RANGE, levenberg_marquardt

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.discrepancy import notes_of_discrepancies
-from bubblefit.identification.specimens import alike_in_all
+from bubblefit.inference.misfit import alike_in_all, notes_of_discrepancies
 from bubblefit.notes import NoteKind
 
 PLACES = np.linspace(0.1, 3.0, 30)

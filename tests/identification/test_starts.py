@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.identification.draws import allowed, coefficients_at, dimensions
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.starts import (
+from bubblefit.inference.search import feasible_start
+from bubblefit.inference.unknowns import (
     ProposedStarts,
     RandomStarts,
     SobolStarts,
     _places,
+    allowed,
+    coefficients_at,
+    dimensions,
 )
 from scipy.stats import qmc
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification import truncated
-from bubblefit.identification.truncated import truncated_draws
+from bubblefit.inference import posterior as truncated
+from bubblefit.inference.posterior import truncated_draws
 from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
 
 COUNT = 4000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.validation import folds_of
+from bubblefit.inference.resampling import folds_of
 
 
 @pytest.mark.parametrize(

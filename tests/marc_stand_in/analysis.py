@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.inflated import InflatedModel
-from bubblefit.models.uniaxial import UniaxialModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import InflatedModel
+from bubblefit.meshes.strip_models import UniaxialModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 

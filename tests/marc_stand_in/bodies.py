@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from bubblefit.models.inflated import RigidCylinder
+from bubblefit.meshes.cylinder_model import RigidCylinder
 from numpy.typing import NDArray
 
 from .content import Body

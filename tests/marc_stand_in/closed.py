@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from bubblefit.models.gas import Gas
-from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
+from bubblefit.meshes.cylinder_model import Bending, Gas, InflatedModel, RigidCylinder
 from bubblefit.solvers.membrane.bending import BITE
-from bubblefit.solvers.membrane.contact import brought_to_touch
+from bubblefit.solvers.membrane.closed import brought_to_touch
 from numpy.typing import NDArray
 
 from .bodies import collar_of, first_touch, support_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from bubblefit.meshes.volume import volume_gradient
+from bubblefit.meshes.mesh import volume_gradient
 from numpy.typing import NDArray
 
 from .content import Content

@@ -14,7 +14,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from bubblefit.materials.law import UNLIMITED, HypoelasticLaw, ThicknessChange
+from bubblefit.materials.forms.base import UNLIMITED
+from bubblefit.materials.law import HypoelasticLaw, ThicknessChange
 from numpy.typing import NDArray
 
 from .endings import NotCompiled

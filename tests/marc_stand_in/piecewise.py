@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from bubblefit.materials.law import UNLIMITED, HypoelasticLaw
+from bubblefit.materials.forms.base import UNLIMITED
+from bubblefit.materials.law import HypoelasticLaw
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]

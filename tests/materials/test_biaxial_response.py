@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import uniaxial_curve
+from bubblefit.materials.responses import biaxial_response, uniaxial_curve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -19,9 +19,10 @@ from bubblefit.materials.card import (
     thickness_difference,
     write_card,
 )
+from bubblefit.materials.forms.base import UNLIMITED
 from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC
 from bubblefit.materials.forms.spline import Spline
-from bubblefit.materials.law import UNLIMITED, HypoelasticLaw
+from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -8,8 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.materials.card import MaterialCard, read_card, write_card
-from bubblefit.materials.certainty import CardCertainty, certainty_of, words_of
+from bubblefit.materials.card import (
+    CardCertainty,
+    MaterialCard,
+    certainty_of,
+    read_card,
+    words_of,
+    write_card,
+)
 from bubblefit.materials.exports.base import BAND_COLUMNS
 from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.law import HypoelasticLaw

@@ -9,11 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports.radioss_law58 import yarn_of
+from bubblefit.materials.exports.radioss import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import trellis_curve, uniaxial_curve
+from bubblefit.materials.responses import biaxial_response, trellis_curve, uniaxial_curve
 from bubblefit.solvers.exports import FORMATS
 
 from ..biaxial_files import BENT

@@ -13,8 +13,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import trellis_angle, trellis_curve, uniaxial_curve
-from bubblefit.solvers.calculix.law_file import law_text
-from bubblefit.solvers.calculix.library import SOURCE, constants
+from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
 from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner
 

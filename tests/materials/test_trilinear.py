@@ -9,7 +9,7 @@ from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.forms.polynomial import CUBIC
 from bubblefit.materials.forms.trilinear import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.point_moduli import by_pieces, increment_modulus
+from bubblefit.materials.point_law import by_pieces, increment_modulus
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -7,9 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.meshes.cylinder import cylinder_mesh
-from bubblefit.meshes.graded import GROWTH, Refinement, rows
 from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.tube import GROWTH, Refinement, cylinder_mesh, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

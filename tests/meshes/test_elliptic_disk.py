@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
 from bubblefit.errors import InputError
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.meshes.rim import rim_form, rim_share
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, rim_form, rim_share
 
 from ..mesh_quality import scaled_jacobian
 from .test_meshes import areas

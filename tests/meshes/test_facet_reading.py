@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.facet_reading import Facet, FacetReading
-from bubblefit.meshes.smooth_reading import SmoothReading
+from bubblefit.meshes.reading import Facet, FacetReading, SmoothReading
 
 FINE = SmoothReading.of(disk_mesh(100.0, 3072, "full"))
 #: Of a wave of 50 mm, and where it is looked at.

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.meshes.location import sampling_matrix
-from bubblefit.meshes.smooth_reading import SmoothReading
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.meshes.reading import SmoothReading
 
 POINTS = np.random.default_rng(5).uniform(-100, 100, (900, 2))
 

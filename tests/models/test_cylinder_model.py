@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.meshes.cylinder import cylinder_mesh
+from bubblefit.meshes.cylinder_model import (
+    Collar,
+    CylinderModel,
+    Gas,
+    RigidSupports,
+    inflated_cylinder,
+    usual_collar,
+)
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh
-from bubblefit.meshes.volume import enclosed_volume, volume_gradient
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bodies import Collar, RigidSupports, usual_collar
-from bubblefit.models.cylinder import CylinderModel
-from bubblefit.models.gas import Gas
-from bubblefit.solvers.calculix.pressure import pressure_forces
+from bubblefit.meshes.mesh import Mesh, enclosed_volume, volume_gradient
+from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.solvers.calculix.deck import pressure_forces
 
 RADIUS, LENGTH = 75.0, 400.0
 BOX = Mesh(

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.patch import PatchModel
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.meshes.strip_models import PatchModel, straight_strip
 
 MODELS = (
     BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.8, [0.05, 0.1]),

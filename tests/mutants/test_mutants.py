@@ -84,30 +84,30 @@ def test_all_rooms_have_files():
 
 
 def test_tests_of_a_line():
-    lines = {"fits/store.py": {1: {""}, 2: {"t::slow", "t::quick"}, 3: {"test_store.py::own"}}}
+    lines = {"runs/folder.py": {1: {""}, 2: {"t::slow", "t::quick"}, 3: {"test_store.py::own"}}}
     known = Measured(lines, {"t::slow": 9.0, "t::quick": 0.1, "test_store.py::own": 5.0})
-    assert known.tests("fits/store.py", 2, 2, 60.0) == ["t::quick", "t::slow"]
-    assert known.tests("fits/store.py", 2, 3, 60.0)[0] == "test_store.py::own"
-    assert known.tests("fits/store.py", 2, 3, 6.0) == ["test_store.py::own", "t::quick"]
-    assert len(known.tests("fits/store.py", 1, 1, 60.0)) == 3  # runs when the module is loaded
-    assert known.tests("fits/store.py", 7, 7, 60.0) == []
+    assert known.tests("runs/folder.py", 2, 2, 60.0) == ["t::quick", "t::slow"]
+    assert known.tests("runs/folder.py", 2, 3, 60.0)[0] == "test_store.py::own"
+    assert known.tests("runs/folder.py", 2, 3, 6.0) == ["test_store.py::own", "t::quick"]
+    assert len(known.tests("runs/folder.py", 1, 1, 60.0)) == 3  # runs when the module is loaded
+    assert known.tests("runs/folder.py", 7, 7, 60.0) == []
     # A test was the first that needed the module.
-    late = Measured({"fits/store.py": {1: {"t::quick"}, 2: {"t::slow", ""}}}, known.seconds)
-    assert late.tests("fits/store.py", 1, 1, 60.0) == ["t::quick"]
+    late = Measured({"runs/folder.py": {1: {"t::quick"}, 2: {"t::slow", ""}}}, known.seconds)
+    assert late.tests("runs/folder.py", 1, 1, 60.0) == ["t::quick"]
     every = ["test_store.py::own", "t::quick", "t::slow"]
-    assert late.tests("fits/store.py", 1, 1, 60.0, loading=True) == every
+    assert late.tests("runs/folder.py", 1, 1, 60.0, loading=True) == every
     # Those that run some of the module come before those that run none of it.
-    some = Measured({"fits/page.py": {1: {""}, 2: {"t::slow"}}}, known.seconds)
-    assert some.tests("fits/page.py", 1, 1, 60.0)[0] == "t::slow"
+    some = Measured({"reports/fit_page.py": {1: {""}, 2: {"t::slow"}}}, known.seconds)
+    assert some.tests("reports/fit_page.py", 1, 1, 60.0)[0] == "t::slow"
     # Unless they are slow, and the line is no more than loaded.
-    assert some.tests("fits/page.py", 1, 1, 60.0, loading=True)[0] == "t::quick"
+    assert some.tests("reports/fit_page.py", 1, 1, 60.0, loading=True)[0] == "t::quick"
     # A module of declarations: no test runs a line of it, and any may show it.
-    declared = Measured({"fits/schema.py": {1: {""}}}, known.seconds)
-    assert sorted(declared.tests("fits/schema.py", 1, 1, 60.0)) == sorted(known.seconds)
+    declared = Measured({"project/schema.py": {1: {""}}}, known.seconds)
+    assert sorted(declared.tests("project/schema.py", 1, 1, 60.0)) == sorted(known.seconds)
 
 
 def test_tests_near_a_module():
-    found = near(ROOT, "experiments/strips/findings.py")
+    found = near(ROOT, "experiments/strips/report.py")
     assert "tests/experiments/strips/test_objective.py" in found
     assert "tests/materials/test_law.py" not in found
     assert "tests/test_ci.py" not in near(ROOT, "writing.py")

@@ -18,26 +18,24 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble import findings as bubble_findings
-from bubblefit.experiments.bubble.sheet_report import sheet_warnings
-from bubblefit.fits import mesh_error
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.identification.assessment import Certainty, certainty
-from bubblefit.identification.chi_square import NoiseTest
-from bubblefit.identification.chi_square import notes_of_noise as notes_of_noise_tests
-from bubblefit.identification.discrepancy import Discrepancy, notes_of_discrepancies
-from bubblefit.identification.likelihood import BOUND, Side
-from bubblefit.identification.noise import Misfit
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.resampling import Group, Unit
-from bubblefit.identification.second_order import Order
+from bubblefit.experiments.bubble.findings import sheet_warnings
+from bubblefit.inference.assessment import Certainty, certainty
+from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.likelihood import BOUND, Side
+from bubblefit.inference.linear import Order
+from bubblefit.inference.misfit import Discrepancy, NoiseTest, notes_of_discrepancies
+from bubblefit.inference.misfit import notes_of_noise as notes_of_noise_tests
+from bubblefit.inference.noise import Misfit
+from bubblefit.inference.resampling import Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
+from bubblefit.runs import best as mesh_error
+from bubblefit.runs.bootstrap import Bootstrap
+from bubblefit.runs.compare import FoldError, FormFit, LawComparison
+from bubblefit.runs.profile import Profile
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.bootstrapped import Bootstrap
-from bubblefit.studies.folds import FoldError
-from bubblefit.studies.laws import FormFit, LawComparison
-from bubblefit.studies.profiled import Profile
 
 from ..identification import cases
 from ..projects import constant_strips, small

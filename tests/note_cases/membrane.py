@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.notes import notes_of
+from bubblefit.experiments.kinds import notes_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import Note
-from bubblefit.solvers.membrane import bending, inflated
+from bubblefit.solvers.membrane import bending
+from bubblefit.solvers.membrane import bending as inflated
 from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -43,7 +44,7 @@ def notes_of_bending(*_: Any) -> Iterable[Note]:
 
 def notes_of_inflation(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     """Every increment is gone through by volume."""
-    patch.setattr(inflated, "MOST_GROWTH", 0.0)
+    patch.setattr(inflated, "MOST_GROWTH_INFLATED", 0.0)
     model = replace(beam(across=4), bending=None)
     return MembraneSolver(1e-6).run(model, LINEAR).remarks
 

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.models.bending import inflated_cylinder
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.notes import Note
-from bubblefit.solvers.calculix import cylinder_analysis
+from bubblefit.solvers.calculix import cylinder_results as cylinder_analysis
+from bubblefit.solvers.calculix.cylinder import solid_mesh
 from bubblefit.solvers.calculix.cylinder_results import BentCylinder, volumes
-from bubblefit.solvers.calculix.sheet import tilt_remarks
-from bubblefit.solvers.calculix.shells import shell_mesh
-from bubblefit.solvers.calculix.solids import solid_mesh
-from bubblefit.solvers.marc.cylinder_results import may_touch
+from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
+from bubblefit.solvers.marc.cylinder import may_touch
 from bubblefit.solvers.marc.results import bubble_history
 from bubblefit.solvers.marc.solver import MarcSolver
 

@@ -10,21 +10,19 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.frame_files import frame_files
-from bubblefit.data.frames import Frame
-from bubblefit.data.gauge import virtual_strain_gauge
-from bubblefit.data.gauge_table import GaugeTable
 from bubblefit.experiments import registry as experiments
-from bubblefit.fits.simulation import simulate_cards
+from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports import marc_nlelast
+from bubblefit.materials.exports import marc as marc_nlelast
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.frames import Frame, frame_files
+from bubblefit.runs.poisson import vary_nu12
+from bubblefit.runs.refinement import refine
+from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import History
-from bubblefit.studies.poisson import vary_nu12
-from bubblefit.studies.refinement import refine
 
 from ..bars import BarKind, BarSolver, BarTest, project_of
 
@@ -93,4 +91,4 @@ def notes_of_gauge(folder: Path, _: Any) -> list[Note]:
 
 
 def notes_of_exports(*_: Any) -> list[Note]:
-    return marc_nlelast.FORMAT.export(CARD).says.notes
+    return marc_nlelast.FORMAT_MARC_NLELAST.export(CARD).says.notes

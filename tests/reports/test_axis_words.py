@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports import (
+from bubblefit.reports.bending import (
     BendLine,
     BendPanel,
     BendReadings,
-    ConvergencePanel,
-    OrderErrors,
-    StripCurves,
     plot_bending,
     plot_bending_cases,
-    plot_convergence,
     plot_gas,
-    plot_heights,
-    plot_loads,
-    plot_nu12,
-    plot_orders,
-    plot_pinned,
 )
+from bubblefit.reports.convergence import ConvergencePanel, plot_convergence
+from bubblefit.reports.loads import StripCurves, plot_loads
+from bubblefit.reports.nu12 import plot_nu12
+from bubblefit.reports.orders import OrderErrors, plot_orders
+from bubblefit.reports.pinned import plot_pinned
+from bubblefit.reports.scatter import plot_heights
 from bubblefit.reports.style import GREY
 from matplotlib.figure import Figure
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.reports import (
+from bubblefit.reports.bending import (
     BendLine,
     BendPanel,
     BendReadings,

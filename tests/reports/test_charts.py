@@ -6,15 +6,14 @@ import re
 
 import numpy as np
 import pytest
-from bubblefit.reports import Chart, Series, Shade, Solid, dots, line, maps_of, pack
 from bubblefit.reports import map_svg as maps_drawn
 from bubblefit.reports import solid_svg as solids_drawn
 from bubblefit.reports.axes import Axis, axes_of
 from bubblefit.reports.chart_svg import FEW, LEFT, NARROW, RIGHT, WIDTH, chart_svg
-from bubblefit.reports.charts import MOST_POINTS
+from bubblefit.reports.charts import MOST_POINTS, Chart, Series, dots, line
 from bubblefit.reports.map_svg import map_svg, row_ends, scale_bar
-from bubblefit.reports.maps import MOST_PLACES
-from bubblefit.reports.packed import Packed
+from bubblefit.reports.maps import MOST_PLACES, Shade, Solid, maps_of
+from bubblefit.reports.packed import Packed, pack
 from bubblefit.reports.shades import CLASSES, classes
 from bubblefit.reports.solid_svg import BAR, CENTRE, scale_of, seen, solid_svg
 from bubblefit.reports.ticks import log_ticks, ticks, written

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports import plot_clock, plot_curves, plot_spheres
+from bubblefit.reports.clock import plot_clock
+from bubblefit.reports.curves import plot_curves
+from bubblefit.reports.sphere import plot_spheres
 from bubblefit.reports.style import BLUE, NAMED, VERMILION
 from matplotlib.figure import Figure
 

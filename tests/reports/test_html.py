@@ -11,26 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.reports import (
-    Chart,
-    Charts,
+from bubblefit.reports.charts import Chart, Charts, dots, line
+from bubblefit.reports.content import (
     Download,
     Facts,
     Listing,
     Picture,
     Report,
     Section,
-    Shade,
-    Solid,
     Table,
     Words,
-    dots,
-    line,
-    maps_of,
-    pack,
-    write_report,
 )
-from bubblefit.reports.html import write_page
+from bubblefit.reports.html import write_page, write_report
+from bubblefit.reports.maps import Shade, Solid, maps_of
+from bubblefit.reports.packed import pack
 from bubblefit.reports.page_file import as_written, read_page_data
 from matplotlib.figure import Figure
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from bubblefit.reports import write_report
+from bubblefit.reports.html import write_report
 from bubblefit.reports.pdf import print_page
 
 from .. import needs

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports import plot_disk, plot_registration, plot_rises, plot_spheres
+from bubblefit.reports.registration import plot_registration
+from bubblefit.reports.rises import plot_rises
+from bubblefit.reports.sphere import plot_spheres
+from bubblefit.reports.surface import plot_disk
 from matplotlib.figure import Figure
 
 TURN = np.linspace(0.0, 2 * np.pi, 37)

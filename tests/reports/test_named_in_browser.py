@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bubblefit.reports import Report, Section, write_report
+from bubblefit.reports.content import Report, Section
+from bubblefit.reports.html import write_report
 from bubblefit.reports.named_charts import plan_charts
 
 from ..browser import browser

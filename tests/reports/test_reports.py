@@ -10,17 +10,14 @@ import numpy as np
 import pytest
 from bubblefit.errors import OutputError
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.reports import (
-    plot_heights,
-    plot_moduli,
-    plot_optima,
-    plot_profiles,
-    write_vtu,
-)
 from bubblefit.reports.cuts import node_cut, point_cut
 from bubblefit.reports.html import number, percent
-from bubblefit.reports.scatter import _below_one
+from bubblefit.reports.moduli import plot_moduli
+from bubblefit.reports.optima import plot_optima
+from bubblefit.reports.profiles import plot_profiles
+from bubblefit.reports.scatter import _below_one, plot_heights
 from bubblefit.reports.style import BLACK, SKY, VERMILION
+from bubblefit.reports.vtu import write_vtu
 from bubblefit.writing import replacing
 from matplotlib.figure import Figure
 

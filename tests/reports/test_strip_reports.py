@@ -7,19 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.meshes.strip import strip_mesh
-from bubblefit.reports import (
-    LawRow,
-    OrderErrors,
-    StripCurves,
-    plot_laws,
-    plot_loads,
-    plot_moduli,
-    plot_moduli_together,
-    plot_orders,
-    plot_pinned,
-    plot_strip,
-)
+from bubblefit.meshes.strip_models import strip_mesh
+from bubblefit.reports.laws import LawRow, plot_laws
+from bubblefit.reports.loads import StripCurves, plot_loads
+from bubblefit.reports.moduli import plot_moduli
+from bubblefit.reports.moduli_together import plot_moduli_together
+from bubblefit.reports.orders import OrderErrors, plot_orders
+from bubblefit.reports.pinned import plot_pinned
+from bubblefit.reports.strip import plot_strip
 from bubblefit.reports.style import BLACK, GREY, NAMED, SKY, named_look
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports import ConvergencePanel
 from bubblefit.reports.axes import axes_of
 from bubblefit.reports.bootstrap_charts import bootstrap_charts
 from bubblefit.reports.chart_svg import chart_svg
 from bubblefit.reports.charts import Chart, Series, line
+from bubblefit.reports.convergence import ConvergencePanel
 from bubblefit.reports.convergence_charts import convergence_charts
 from bubblefit.reports.likelihoods import ProfilePanel
 from bubblefit.reports.named_charts import plan_charts

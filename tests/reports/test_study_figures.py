@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.reports import ConvergencePanel, plot_convergence, plot_nu12
+from bubblefit.reports.convergence import ConvergencePanel, plot_convergence
+from bubblefit.reports.nu12 import plot_nu12
 from bubblefit.reports.style import NAMED, pressure_colours
 from matplotlib.figure import Figure
 

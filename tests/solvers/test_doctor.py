@@ -11,13 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.solvers.bars import BARS, bar_law
-from bubblefit.solvers.calculix import proof
+from bubblefit.solvers.bars import BARS, bar_law, diagnose
+from bubblefit.solvers.calculix import diagnosis as proof
+from bubblefit.solvers.calculix.diagnosis import bar_deck, prove
 from bubblefit.solvers.calculix.executable import carries_external, every_ccx, find_ccx
-from bubblefit.solvers.calculix.law_file import law_files, law_number
-from bubblefit.solvers.calculix.library import MATERIAL, constants, material_library
-from bubblefit.solvers.calculix.proof import bar_deck, prove
-from bubblefit.solvers.diagnosis import diagnose
+from bubblefit.solvers.calculix.library import (
+    MATERIAL,
+    constants,
+    law_files,
+    law_number,
+    material_library,
+)
 
 from ..places import PUBLISHED
 from ..programs import program

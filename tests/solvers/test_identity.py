@@ -7,7 +7,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.identity import file_mark, templates_mark
+from bubblefit.solvers.decks import file_mark, templates_mark
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

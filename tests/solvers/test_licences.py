@@ -18,16 +18,23 @@ from typing import Any
 import pytest
 from bubblefit.cli.progress import StudyProgress
 from bubblefit.errors import LicenceDenied, SolverFailure
-from bubblefit.fits.processes import run_tasks
+from bubblefit.runs.processes import run_tasks
 from bubblefit.solvers import licence_locks, licences
-from bubblefit.solvers.announcements import Announcement, announce, hearing
-from bubblefit.solvers.base import BandedSolver, DifferentiatingSolver, ProgramSolver, Solver
+from bubblefit.solvers.base import (
+    Announcement,
+    BandedSolver,
+    DifferentiatingSolver,
+    ProgramSolver,
+    Solver,
+    announce,
+    hearing,
+)
 from bubblefit.solvers.licence_locks import locked
-from bubblefit.solvers.licence_settings import LicenceSettings
 from bubblefit.solvers.licences import LicensedSolver, held, patiently
 from bubblefit.solvers.once import Once
 from bubblefit.solvers.registry import solver_named, solver_settings
 from bubblefit.solvers.run_cache import RunCache
+from bubblefit.solvers.settings import LicenceSettings
 
 from ..complaints import complaint
 from ..counted_program import CountedSolver, seen

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strip import strip_mesh
+from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import (
     BandedSolver,
@@ -135,7 +135,7 @@ def test_another_solver_is_another_run(cache: RunCache, tmp_path: Path) -> None:
 def test_the_code_of_a_plug_in_counts(packages: Path) -> None:
     from importlib import import_module, reload
 
-    from bubblefit.solvers.identity import code_mark
+    from bubblefit.solvers.decks import code_mark
 
     ours = code_mark(CalculixSolver.__module__)
     assert ours == code_mark(MarcSolver.__module__)

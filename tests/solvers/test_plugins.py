@@ -15,7 +15,7 @@ from bubblefit.cli.main import main
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.bars import BARS, strip_stresses
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import checked, solver_named, solver_names

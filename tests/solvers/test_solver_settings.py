@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import SolverFailure
+from bubblefit.solvers.bars import diagnose
 from bubblefit.solvers.base import Solver
-from bubblefit.solvers.diagnosis import diagnose
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.overrides import command_line, overridden
 from bubblefit.solvers.registry import (
     SOLVERS,
+    command_line,
+    overridden,
     solver_named,
     solver_names,
     solver_sections,
@@ -117,7 +118,7 @@ def test_what_the_command_line_cannot_say(name, given, settings, words) -> None:
 FOLDER = {
     "__init__.py": "",
     "settings.py": """
-from bubblefit.solvers.offer import Offer
+from bubblefit.solvers.settings import Offer
 from bubblefit.solvers.settings import Override, SolverSettings
 
 class AcmeSettings(SolverSettings):

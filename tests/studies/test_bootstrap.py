@@ -10,14 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError
-from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
-from bubblefit.reports import percent
-from bubblefit.studies import bootstrap as module
-from bubblefit.studies.bootstrap import MOST, bootstrap
-from bubblefit.studies.bootstrapped import Bootstrap
+from bubblefit.project.project import read_project
+from bubblefit.reports.html import percent
+from bubblefit.runs import bootstrap as module
+from bubblefit.runs.bootstrap import MOST, Bootstrap, bootstrap
 from scipy.optimize import minimize_scalar
 
 from ..commands import in_process

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.studies.convergence import (
-    Convergence,
-    convergence,
-    observed_order,
-    richardson,
-)
+from bubblefit.runs.refinement import Convergence, convergence, observed_order, richardson
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

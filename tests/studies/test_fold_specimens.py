@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.studies.folds import fit_of, folds, specimens_of
+from bubblefit.project.project import read_project
+from bubblefit.runs.compare import fit_of, folds, specimens_of
+from bubblefit.runs.setup import FitSetup, prepare_fit
 
 PROJECT = """
 [fabric]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.studies import folds as room
-from bubblefit.studies.folds import FoldError, folds, validate
+from bubblefit.project.project import read_project
+from bubblefit.runs import compare as room
+from bubblefit.runs.compare import FoldError, folds, validate
+from bubblefit.runs.setup import prepare_fit
 
 #: Without contraction the load is the fabric's 0.8 mm times 25 mm times E ln(1 + elongation / 20).
 PROJECT = """

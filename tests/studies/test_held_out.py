@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs import validation as room
 from bubblefit.solvers.base import History
-from bubblefit.studies import held_out as room
 
 LAW = replace(
     HypoelasticLaw.linear(350.0, 190.0, 60.0, 0.0), strain_range=np.array([0.1, 0.14, 0.1])

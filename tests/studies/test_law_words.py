@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.notes import Note, NoteKind
-from bubblefit.studies import law_words
-from bubblefit.studies.fold_record import written_folds
-from bubblefit.studies.folds import FoldError
-from bubblefit.studies.law_words import conclusion, lines_of, table_of
-from bubblefit.studies.laws import LOST, FormFit, LawComparison
+from bubblefit.reports import law_page as law_words
+from bubblefit.reports.law_page import conclusion, lines_of, table_of
+from bubblefit.runs.compare import LOST, FoldError, FormFit, LawComparison, written_folds
 
 RESULT = {
     "objective_is": "sum of RMS errors, N",

@@ -12,10 +12,11 @@ import pandas as pd
 import pytest
 from bubblefit.errors import OutputError
 from bubblefit.notes import rows
-from bubblefit.reports import Charts, LawRow, Report, Table
-from bubblefit.studies import law_page
-from bubblefit.studies.folds import FoldError
-from bubblefit.studies.laws import LawComparison, compare_laws
+from bubblefit.reports import law_page
+from bubblefit.reports.charts import Charts
+from bubblefit.reports.content import Report, Table
+from bubblefit.reports.laws import LawRow
+from bubblefit.runs.compare import FoldError, LawComparison, compare_laws
 
 from ..projects import ELONGATION, MODULI, constant_strips
 

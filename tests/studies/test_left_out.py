@@ -10,13 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits.project import read_project
-from bubblefit.fits.result import Fit
-from bubblefit.fits.setup import FitSetup, prepare_fit
-from bubblefit.studies import left_out
-from bubblefit.studies.left_out import parts_of, without
-from bubblefit.studies.validation import validate
+from bubblefit.experiments.kinds import Weighting
+from bubblefit.project.project import read_project
+from bubblefit.runs import validation as left_out
+from bubblefit.runs.result import Fit
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.validation import parts_of, validate, without
 
 from ..commands import in_process
 from ..projects import BUBBLE, ELONGATION, constant_strips, project_file

@@ -13,16 +13,14 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.bubble import candidates as bubbles
 from bubblefit.experiments.strips import candidates as strips
-from bubblefit.fits.project import read_project
-from bubblefit.identification.assessment import pinned_by
-from bubblefit.identification.noise import Noise
+from bubblefit.inference.assessment import pinned_by
+from bubblefit.inference.noise import Noise
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
-from bubblefit.studies import plan as module
-from bubblefit.studies.plan import plan
-from bubblefit.studies.planned import NOW, Plan, Planned
-from bubblefit.studies.present_tests import Present
+from bubblefit.project.project import read_project
+from bubblefit.runs import plan as module
+from bubblefit.runs.plan import NOW, Plan, Planned, Present, plan
 
 from ..commands import in_process
 from ..page_charts import charts_of

@@ -12,11 +12,10 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import Note, NoteKind
+from bubblefit.runs.poisson import Nu12Study, PartRatios, by_response, ratios, vary_nu12
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.poisson import Nu12Study, PartRatios, vary_nu12
-from bubblefit.studies.ratios import by_response, ratios
 from matplotlib.figure import Figure
 
 from ..bars import STRETCH, BarSolver, BarTest, project_of

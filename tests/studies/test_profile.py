@@ -10,13 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.fits.project import read_project
-from bubblefit.identification.likelihood import BOUND, THRESHOLD, Side
+from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
-from bubblefit.studies.profile import profile
-from bubblefit.studies.profiled import Profile
+from bubblefit.project.project import read_project
+from bubblefit.runs.profile import Profile, profile
 
 from ..commands import in_process
 from ..page_charts import charts_of

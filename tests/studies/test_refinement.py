@@ -9,13 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.fits.analyses import Step
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.strip import strip_mesh
-from bubblefit.models.uniaxial import bias_strip, refined_quads, straight_strip
-from bubblefit.studies.refinement import edge_length, refine, rms_between
+from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
+from bubblefit.runs.refinement import edge_length, refine, rms_between
+from bubblefit.runs.simulation import Step
 from matplotlib.figure import Figure
 
 from ..bars import STRETCH, WIDTH, BarSolver, BarTest, project_of

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.notes import Note, NoteKind
-from bubblefit.studies.refinement import Level, LevelRun, Refinement
-from bubblefit.studies.refinement_tables import RMS, rms_changes
+from bubblefit.runs.refinement import RMS, Level, LevelRun, Refinement, rms_changes
 
 X = np.array([1.0, 2.0])
 LOAD, LATE = "load, N", "load at 2 mm, N"
@@ -114,7 +113,7 @@ def test_table() -> None:
 
 
 def test_panels() -> None:
-    from bubblefit.studies.refinement_tables import panels
+    from bubblefit.runs.refinement import panels
 
     (panel,) = panels(study(RUNS))
     assert (panel.name, panel.sizes) == ("bar", [8.0, 4.0, 2.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bubblefit.studies.refinement_words import lines
+from bubblefit.runs.refinement import lines
 
 
 def level(elements: int, factor: float, values: Any, failed: str = "") -> dict[str, Any]:

@@ -12,10 +12,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.fits import analyses
-from bubblefit.fits.kept_analyses import FOLDER
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs import simulation as analyses
+from bubblefit.runs.folder import FOLDER
 
 from ..commands import in_process, result_in
 from ..projects import BUBBLE

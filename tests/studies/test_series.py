@@ -13,7 +13,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
 from bubblefit.reports.page_file import read_page_data
-from bubblefit.studies.series import (
+from bubblefit.runs.series import (
     Series,
     card_of,
     card_words,

@@ -11,8 +11,7 @@ import pytest
 from bubblefit import __version__
 from bubblefit.errors import OutputError
 from bubblefit.notes import Note, NoteKind
-from bubblefit.studies.held_out import HeldOut
-from bubblefit.studies.validated import Judged, Validation
+from bubblefit.runs.validation import HeldOut, Judged, Validation
 
 from ..page_charts import charts_of
 

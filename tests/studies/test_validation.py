@@ -10,14 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
+from bubblefit.project.project import read_project
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.validation import held_out, judge_cards, validate
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.held_out import held_out
-from bubblefit.studies.validation import judge_cards, validate
 
 from ..commands import bubblefit, in_process
 from ..places import KNOWN

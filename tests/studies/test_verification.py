@@ -11,10 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.runs import verification as subjects
+from bubblefit.runs.verification import (
+    SUBJECTS,
+    numbers,
+)
+from bubblefit.runs.verification import (
+    published as abaqus,
+)
+from bubblefit.runs.verification import (
+    published as marc_bubble,
+)
+from bubblefit.runs.verification.number import Number
+from bubblefit.runs.verification.published import marc_bars
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.verification import SUBJECTS, Number, abaqus, marc_bubble, numbers, subjects
-from bubblefit.studies.verification.bars import marc_bars
 
 from ..commands import in_process
 from ..published_laws import TABLE_4_2

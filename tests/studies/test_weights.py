@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.fits.project import read_project
-from bubblefit.fits.result import Fit
-from bubblefit.studies import weights as study_of
-from bubblefit.studies.weights import COUNTS, weight_study
+from bubblefit.project.project import read_project
+from bubblefit.runs import weights as study_of
+from bubblefit.runs.result import Fit
+from bubblefit.runs.weights import COUNTS, weight_study
 from scipy.optimize import minimize_scalar
 
 from ..commands import in_process

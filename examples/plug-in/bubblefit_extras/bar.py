@@ -7,7 +7,7 @@ import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import bar
-from bubblefit.models.uniaxial import UniaxialModel
+from bubblefit.meshes.strip_models import UniaxialModel
 from bubblefit.solvers.base import Array, History, SolverCheck
 
 NAME, VERSION = "bar", "1.0"

@@ -14,14 +14,25 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pandas as pd
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.base import CardRun, MakeSolver, Place, Reach, Refined, Simulation
-from bubblefit.experiments.exhibit import Exhibit, Output
-from bubblefit.experiments.fittable import Findings, FittedTest, Masks, Weighting
-from bubblefit.identification.comparison import Comparison
+from bubblefit.experiments.kinds import (
+    CardRun,
+    Exhibit,
+    Findings,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Output,
+    Place,
+    Reach,
+    Refined,
+    Simulation,
+    Weighting,
+)
+from bubblefit.inference.comparison import Comparison
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.uniaxial import UniaxialModel, straight_strip
-from bubblefit.sections import Positive, Section
+from bubblefit.meshes.strip_models import UniaxialModel, straight_strip
+from bubblefit.readers.sections import Positive, Section
 from bubblefit.solvers.base import Array, History
 from pydantic import Field
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bubblefit.data.machine_tables import MachineTable, TableOptions
-from bubblefit.data.registry import Format
-from bubblefit.data.tables import TextTable, read_lines
 from bubblefit.errors import InputError
+from bubblefit.readers.machine_tables import MachineTable, TableOptions
+from bubblefit.readers.registry import Format
+from bubblefit.readers.tables import TextTable, read_lines
 
 FIRST = "RIGLOG 1"
 

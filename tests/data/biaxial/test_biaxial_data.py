@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.biaxial.cycles import find_cycles
-from bubblefit.data.biaxial.paths import cycles_of, evaluated_paths
-from bubblefit.data.biaxial.ratios import KNOWN, nearest_ratio, plain_ratio
-from bubblefit.data.biaxial.table import read_biaxial_table
-from bubblefit.materials.designers.ratios import shares
+from bubblefit.materials.designers import shares
+from bubblefit.readers.biaxial import (
+    KNOWN,
+    cycles_of,
+    evaluated_paths,
+    find_cycles,
+    nearest_ratio,
+    plain_ratio,
+    read_biaxial_table,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -6,7 +6,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.doubts import doubts_of_biaxial
-from bubblefit.experiments.doubts import Expected
+from bubblefit.experiments.kinds import Expected
 
 from ...biaxial_files import BENT, biaxial_project, rows_of, write_rows
 

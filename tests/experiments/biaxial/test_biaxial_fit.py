@@ -9,15 +9,15 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits.check import check
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.fits.simulation import simulate_cards
-from bubblefit.materials.biaxial_response import biaxial_response
+from bubblefit.experiments.kinds import Weighting
 from bubblefit.materials.card import read_card
-from bubblefit.materials.designers.ratios import shares
-from bubblefit.models.patch import elongations
+from bubblefit.materials.designers import shares
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.meshes.strip_models import elongations
 from bubblefit.notes import NoteKind
+from bubblefit.runs.check import check
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.simulation import simulate_cards
 
 from ...biaxial_files import BENT, FIVE, THICKNESS, biaxial_project, rows_of, write_rows
 from ...complaints import complaint_with

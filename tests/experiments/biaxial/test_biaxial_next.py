@@ -9,13 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.biaxial.candidates import candidates
-from bubblefit.experiments.candidates import Planning, Precision
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits.result import Fit
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.materials.biaxial_response import biaxial_response
-from bubblefit.materials.designers.ratios import shares
+from bubblefit.experiments.kinds import Planning, Precision, Weighting
+from bubblefit.materials.designers import shares
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.runs.result import Fit
+from bubblefit.runs.setup import prepare_fit
 
 from ...biaxial_files import THICKNESS, biaxial_project, rows_of, write_rows
 from ...commands import in_process

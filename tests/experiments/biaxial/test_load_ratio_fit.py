@@ -5,12 +5,12 @@ from __future__ import annotations
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.card import read_card
-from bubblefit.materials.designers.ratios import shares
+from bubblefit.materials.designers import shares
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.studies.law_candidates import candidates
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.runs.compare import candidates
 
 from ...biaxial_files import THICKNESS, biaxial_project, rows_of, write_rows
 from ...complaints import complaint_with

@@ -7,16 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.data.equilibrium import apex_of
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
 from bubblefit.experiments.bubble.doubts import View, doubts_of
-from bubblefit.experiments.bubble.places import mirrored
-from bubblefit.experiments.doubts import Expected
+from bubblefit.experiments.bubble.equilibrium import apex_of
+from bubblefit.experiments.bubble.objective import mirrored
+from bubblefit.experiments.kinds import Expected
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
+from bubblefit.readers.fields import DisplacementField
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial.transform import Rotation

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.base import Fabric, Place
 from bubblefit.experiments.bubble import point_files
 from bubblefit.experiments.bubble.point_files import PointFiles
-from bubblefit.experiments.bubble.sources import KnownSolution
-from bubblefit.experiments.bubble.test import BubbleTest
-from bubblefit.fits.project import Project, read_project
+from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
+from bubblefit.experiments.kinds import Fabric, Place
+from bubblefit.project.project import Project, read_project
 
 from ...complaints import complaint, complaint_with
 from ...places import EXAMPLES, KNOWN, SHARED

@@ -7,10 +7,10 @@ from typing import Any
 
 import bubblefit as bf
 import pytest
-from bubblefit.experiments.bubble.correlation_record import ASKED, correlation_table
-from bubblefit.experiments.bubble.correlation_section import CorrelationSection
+from bubblefit.experiments.bubble.findings import ASKED, correlation_table
 from bubblefit.experiments.bubble.point_files import PointFiles
-from bubblefit.meshes.facet_reading import Facet
+from bubblefit.experiments.bubble.section import CorrelationSection
+from bubblefit.meshes.reading import Facet
 
 from ...complaints import complaint
 

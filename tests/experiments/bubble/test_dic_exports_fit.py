@@ -7,8 +7,8 @@ import re
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits.law import law_of
+from bubblefit.experiments.kinds import Weighting
+from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...commands import in_process, result_in

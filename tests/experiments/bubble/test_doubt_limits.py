@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.data.equilibrium import Apex
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
-from bubblefit.experiments.bubble.doubts import motion, place, size
-from bubblefit.experiments.bubble.doubts.view import View
-from bubblefit.experiments.doubts import Expected
+from bubblefit.experiments.bubble import doubts as motion
+from bubblefit.experiments.bubble import doubts as place
+from bubblefit.experiments.bubble import doubts as size
+from bubblefit.experiments.bubble.doubts import View
+from bubblefit.experiments.bubble.equilibrium import Apex
+from bubblefit.experiments.kinds import Expected
+from bubblefit.meshes.disk import Outline
+from bubblefit.readers.fields import DisplacementField
 
 RADIUS = 100.0
 FABRIC = Expected({"E1": (250.0, 1500.0), "E2": (50.0, 500.0), "G12": (7.0, 70.0)})

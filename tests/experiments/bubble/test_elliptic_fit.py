@@ -5,11 +5,10 @@ from __future__ import annotations
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.meshes.smooth_reading import SmoothReading
-from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
+from bubblefit.meshes.reading import SmoothReading
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 

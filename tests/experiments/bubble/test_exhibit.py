@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble import figures
+from bubblefit.experiments.bubble import report as figures
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.bubble.tables import misfit_table, residual_table, surface_tables
+from bubblefit.experiments.bubble.report import misfit_table, residual_table, surface_tables
 from bubblefit.solvers.base import History
 
 

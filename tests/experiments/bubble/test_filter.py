@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.fits.fit import fit
-from bubblefit.fits.mesh_error import limit_of_meshes
-from bubblefit.fits.project import read_project
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.facet_reading import Facet, FacetReading
-from bubblefit.meshes.smooth_reading import SmoothReading
+from bubblefit.meshes.reading import Facet, FacetReading, SmoothReading
+from bubblefit.project.project import read_project
+from bubblefit.runs.best import limit_of_meshes
+from bubblefit.runs.fit import fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 PROJECT = """

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import _warnings
-from bubblefit.experiments.exhibit import Output
-from bubblefit.experiments.fittable import FittedTest
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
+from bubblefit.experiments.kinds import FittedTest, Output
 from bubblefit.notes import NoteKind
+from bubblefit.project.project import read_project
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...projects import small

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
-from bubblefit.experiments.bubble.finer import INWARD, _sample, finer_bubble, resampled
 from bubblefit.experiments.bubble.objective import FieldTarget
-from bubblefit.experiments.fittable import Weighting
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
+from bubblefit.experiments.bubble.parts import INWARD, _sample, finer_bubble, resampled
+from bubblefit.experiments.kinds import Weighting
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.project.project import read_project
+from bubblefit.runs.setup import prepare_fit
 
 from ...projects import small
 

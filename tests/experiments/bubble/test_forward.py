@@ -10,13 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import CardRun
 from bubblefit.experiments.bubble import KIND, forward
-from bubblefit.experiments.bubble.sheet_section import Sheet
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.bubble.section import Sheet
+from bubblefit.experiments.kinds import CardRun, Output
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
 
 PART = "bubble"

@@ -11,8 +11,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.figures import left_at_nodes
-from bubblefit.experiments.bubble.inflated import (
+from bubblefit.experiments.bubble.forward import (
     SLACK,
     TAUT,
     WRINKLED,
@@ -23,13 +22,13 @@ from bubblefit.experiments.bubble.inflated import (
     write_series,
 )
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.experiments.bubble.report import left_at_nodes
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.base import History
-from bubblefit.solvers.membrane.bubble import analyse, prepare
-from bubblefit.solvers.membrane.march import Asked
-from bubblefit.solvers.membrane.wall import Wall
+from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare
+from bubblefit.solvers.membrane.newton import Asked
 
 BETA = np.zeros(12)
 BETA[[11, 7, 3]] = 500.0, 200.0, 40.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
+from bubblefit.project.project import read_project
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

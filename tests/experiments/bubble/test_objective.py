@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
-from bubblefit.identification.blocks import Blocks
+from bubblefit.inference.comparison import Blocks
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

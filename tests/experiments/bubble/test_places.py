@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import DisplacementField
-from bubblefit.experiments.bubble.places import at_nodes, folded, mirrored
+from bubblefit.experiments.bubble.objective import at_nodes, folded, mirrored
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.readers.fields import DisplacementField
 
 POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])
 MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import DisplacementField
 from bubblefit.errors import InputError
-from bubblefit.experiments.base import Fabric, Place
-from bubblefit.experiments.bubble import preparation
-from bubblefit.experiments.bubble.known_data import _same_steps_and_mesh
+from bubblefit.experiments.bubble import data as preparation
+from bubblefit.experiments.bubble.data import _same_steps_and_mesh
+from bubblefit.experiments.kinds import Fabric, Place
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.readers.fields import DisplacementField
 
 from ...complaints import complaint
 

@@ -7,17 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.preparation import prepare
-from bubblefit.experiments.bubble.recorded_words import (
+from bubblefit.experiments.bubble.data import prepare
+from bubblefit.experiments.bubble.findings import (
     clock_pictures,
     recorded_lines,
     recorded_numbers,
     recorded_table,
 )
-from bubblefit.experiments.data_files import files_of
-from bubblefit.experiments.exhibit import Output
-from bubblefit.fits.project import read_project
-from bubblefit.fits.written import project_text, settings_of
+from bubblefit.experiments.kinds import Output, files_of
+from bubblefit.project.project import project_text, read_project, settings_of
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.clock_offset import ClockOffset
-from bubblefit.experiments.bubble.recorded import RecordedFrames
-from bubblefit.experiments.bubble.recorded_words import (
+from bubblefit.experiments.bubble.findings import (
     clock_pictures,
     recorded_lines,
     recorded_numbers,
     recorded_table,
 )
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.bubble.point_files import RecordedFrames
+from bubblefit.experiments.kinds import Output
+from bubblefit.readers.pressure_log import ClockOffset
 
 #: Of all five frames of the film, MPa; the first of them is before the log begins.
 DOUBT = np.array([np.nan, 0.0002, 0.0004, 0.0006, 0.0008])
@@ -109,7 +109,7 @@ def test_pressures_and_heights_are_drawn_by_the_clock_of_the_log(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn = []
-    module = "bubblefit.experiments.bubble.recorded_words"
+    module = "bubblefit.experiments.bubble.findings"
     monkeypatch.setattr(f"{module}.plot_clock", lambda *what: drawn.append(what))
     assert clock_pictures(PLAIN, Output(tmp_path)) == [] == drawn
     clock_pictures(TAKEN, Output(tmp_path))

@@ -7,8 +7,8 @@ import re
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.fits.law import law_of
-from bubblefit.identification.assessment import moduli_error
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
-from bubblefit.experiments.bubble import registration
-from bubblefit.experiments.bubble.registration import (
+from bubblefit.experiments.bubble import findings as registration
+from bubblefit.experiments.bubble.findings import (
     registration_line,
     registration_numbers,
     registration_table,
 )
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.kinds import Output
+from bubblefit.meshes.disk import Outline
+from bubblefit.readers.fields import DisplacementField
 
 MOTIONS = (
     SimpleNamespace(points=9, shift=np.array([0.3, 0.4, 0.0]), angle=0.25),

@@ -9,22 +9,28 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.data.equilibrium import Apex
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
-from bubblefit.experiments.base import Fabric, Place, Scales
-from bubblefit.experiments.bubble import examined
-from bubblefit.experiments.bubble.frame_clock import _frame_times
-from bubblefit.experiments.bubble.increments import merge_increments
-from bubblefit.experiments.bubble.objective import FieldTarget
-from bubblefit.experiments.bubble.outline_section import outline_of
-from bubblefit.experiments.bubble.places import at_points
-from bubblefit.experiments.bubble.pressure_section import LogSection
-from bubblefit.experiments.bubble.relative import at_rest, counted_from, with_places
+from bubblefit.experiments.bubble import report as examined
+from bubblefit.experiments.bubble.equilibrium import Apex
+from bubblefit.experiments.bubble.objective import (
+    FieldTarget,
+    at_points,
+    at_rest,
+    counted_from,
+    with_places,
+)
+from bubblefit.experiments.bubble.point_files import _frame_times
+from bubblefit.experiments.bubble.section import (
+    LogSection,
+    Sheet,
+    SheetSection,
+    outline_of,
+    sheet_of,
+)
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
-from bubblefit.experiments.bubble.sheet_section import Sheet, SheetSection, sheet_of
-from bubblefit.experiments.exhibit import Output
-from bubblefit.meshes.disk import disk_mesh
+from bubblefit.experiments.bubble.test import merge_increments
+from bubblefit.experiments.kinds import Fabric, Output, Place, Scales
+from bubblefit.meshes.disk import Outline, disk_mesh
+from bubblefit.readers.fields import DisplacementField
 
 from ...complaints import complaint
 
@@ -319,7 +325,7 @@ def test_every_cell_of_what_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     view = SimpleNamespace(rises=np.array([3.0, 30.0]), apexes=apexes, rim=rim, axes=axes)
     test = SimpleNamespace(thickness=0.8, outline=None)
     prepared: Any = SimpleNamespace(fields=fields, view=view, test=test, registration=None)
-    shown = examined.exhibit(prepared, Output(tmp_path))
+    shown = examined.exhibit_examined(prepared, Output(tmp_path))
     assert shown.facts == [
         ("the sheet rises about, mm", "1.23, -0.50 (+- 0.12)"),
         ("axes of symmetry, degrees from x and y", "-2.35 (+- 0.46, 88% clear)"),
@@ -343,5 +349,5 @@ def test_every_cell_of_what_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     ((path, pressures, rises),) = drawn
     assert (path, pressures) == (tmp_path / "rises.png", [0.02, 0.2]) and rises is view.rises
     view.apexes, view.rim, view.axes = [], None, None
-    bare = examined.exhibit(prepared, Output(tmp_path))
+    bare = examined.exhibit_examined(prepared, Output(tmp_path))
     assert bare.facts == [] and len(bare.tables) == 1

@@ -9,21 +9,22 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.disk_polynomials import fit_disk_polynomial
-from bubblefit.data.fields import DisplacementField
-from bubblefit.data.outline import Outline
 from bubblefit.errors import InputError
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.bubble.relative import counted_from, with_places
-from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
-from bubblefit.experiments.bubble.sheet_report import NOT_BELIEVED
-from bubblefit.experiments.bubble.sheet_section import Sheet
-from bubblefit.fits.fit import fit
-from bubblefit.fits.project import read_project
-from bubblefit.fits.setup import prepare_fit
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.experiments.bubble.findings import NOT_BELIEVED
+from bubblefit.experiments.bubble.objective import (
+    FieldObjective,
+    FieldTarget,
+    counted_from,
+    with_places,
+)
+from bubblefit.experiments.bubble.section import Sheet
+from bubblefit.experiments.bubble.sheet import fit_disk_polynomial, measured_sheet, with_sheet
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
+from bubblefit.project.project import read_project
+from bubblefit.readers.fields import DisplacementField
+from bubblefit.runs.fit import fit
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

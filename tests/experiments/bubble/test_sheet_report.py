@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.outline import Outline
-from bubblefit.experiments.bubble import sheet_report
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.bubble.relative import with_places
-from bubblefit.experiments.bubble.sheet_section import Sheet
-from bubblefit.experiments.exhibit import Output
-from bubblefit.identification.nuisance import Nuisance
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.experiments.bubble import findings as sheet_report
+from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, with_places
+from bubblefit.experiments.bubble.section import Sheet
+from bubblefit.experiments.kinds import Output
+from bubblefit.inference.comparison import Nuisance
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.notes import NoteKind
 from bubblefit.solvers.base import History
 

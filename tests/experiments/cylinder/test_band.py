@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.cylinder import figures, page
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Output
-from bubblefit.reports import BendPanel
+from bubblefit.experiments.cylinder import report as figures
+from bubblefit.experiments.cylinder import report as page
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Output
+from bubblefit.reports.bending import BendPanel
 
 from ...cylinder_cases import ENDS
 from .test_page import BENT, CURVE, LOAD, WAY, case, run, unbroken

@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.beam import Beam, bodies_of, whole_beam
-from bubblefit.experiments.cylinder.record import BendingRun, run_of
+from bubblefit.experiments.cylinder.predicted import BendingRun, run_of
+from bubblefit.experiments.cylinder.report import Beam, bodies_of, whole_beam
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strain import surface_strain
-from bubblefit.meshes.volume import enclosed_volume
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.cylinder import CylinderModel
+from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
+from bubblefit.meshes.mesh import enclosed_volume, surface_strain
 
 from ...cylinder_cases import ran
 

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.beam import draw_beam
-from bubblefit.experiments.cylinder.record import BendingRun, run_of
+from bubblefit.experiments.cylinder.predicted import BendingRun, run_of
+from bubblefit.experiments.cylinder.report import draw_beam
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strain import surface_strain
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.cylinder import CylinderModel
+from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
+from bubblefit.meshes.mesh import surface_strain
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.data.bending import BendingCurve
-from bubblefit.experiments.cylinder import figures
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.cylinder import report as figures
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.kinds import Output
+from bubblefit.readers.bending import BendingCurve
 
 from .test_page import BENT, WAY, case, run
 from .test_tables import MEASURES

@@ -6,25 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.measures import (
+from bubblefit.experiments.cylinder.predicted import (
+    BendingRun,
     bending_measures,
     inflation_strain,
     initial_stiffness,
     knee_point,
     limit_point,
     loads_at,
+    run_of,
     straightness,
     wrinkle_onset,
 )
-from bubblefit.experiments.cylinder.record import BendingRun, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder import cylinder_mesh
+from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh
-from bubblefit.meshes.strain import middle_strain, surface_strain
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.reading import curve_reading
+from bubblefit.meshes.mesh import Mesh, middle_strain, surface_strain
+from bubblefit.meshes.tube import cylinder_mesh
 
 from ...cylinder_cases import ran
 

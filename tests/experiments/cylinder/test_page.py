@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.bending import BendingCurve
-from bubblefit.experiments.cylinder import figures, page
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.cylinder.record import BendingRun
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.cylinder import report as figures
+from bubblefit.experiments.cylinder import report as page
+from bubblefit.experiments.cylinder.predicted import BendingRun, CylinderOutcome
+from bubblefit.experiments.kinds import Output
 from bubblefit.notes import Note, NoteKind
-from bubblefit.reports import Table
+from bubblefit.readers.bending import BendingCurve
+from bubblefit.reports.content import Table
 from bubblefit.solvers.base import BandEnd
 
 from .test_tables import MEASURES

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.cylinder.record import arrays_of, early_end
+from bubblefit.experiments.cylinder.predicted import arrays_of, early_end
 from bubblefit.solvers.base import History
 
 MODEL = SimpleNamespace(deflections=(10.0, 20.0))

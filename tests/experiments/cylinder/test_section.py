@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.cylinder import CylinderTest
-from bubblefit.fits.project import Project, read_project
+from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import DEFLECTION, FRAMES
+from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES
+from bubblefit.project.project import Project, read_project
 
 from ...complaints import complaint_with
 from ...cylinder_cases import write_project, write_readings

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.cylinder import CylinderTest
-from bubblefit.experiments.cylinder.studied import STUDIED, quantities
-from bubblefit.fits.project import read_project
+from bubblefit.experiments.cylinder.predicted import STUDIED, quantities
+from bubblefit.experiments.cylinder.test import CylinderTest
+from bubblefit.project.project import read_project
+from bubblefit.runs.refinement import edge_length
 from bubblefit.solvers.base import History
-from bubblefit.studies.refinement import edge_length
 
 from ...cylinder_cases import STUDIED_PROJECT
 

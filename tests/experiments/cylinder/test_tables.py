@@ -7,18 +7,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.data.bending import BendingCurve
-from bubblefit.data.bending_scatter import BendingError
-from bubblefit.experiments.cylinder.measures import BendingMeasures
-from bubblefit.experiments.cylinder.outcome import CylinderOutcome
-from bubblefit.experiments.cylinder.record import BendingRun
-from bubblefit.experiments.cylinder.tables import (
+from bubblefit.experiments.cylinder.predicted import (
+    BendingMeasures,
+    BendingRun,
+    CylinderOutcome,
     columns_of,
     curve_of,
     measured_table,
     terminal_table,
 )
 from bubblefit.notes import Note, NoteKind
+from bubblefit.readers.bending import BendingCurve, BendingError
 
 MEASURES = BendingMeasures(
     stiffness=4.256,

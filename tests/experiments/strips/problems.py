@@ -10,18 +10,16 @@ import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
 from bubblefit.experiments.strips.objective import LoadObjective
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.comparison import Comparison
-from bubblefit.identification.nuisance import Nuisance, NuisanceOf
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.forms.trilinear import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
 from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -6,12 +6,11 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.base import Fabric, Place, Scales
+from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.experiments.strips import KIND
 from bubblefit.experiments.strips.section import StripsSection
 from bubblefit.experiments.strips.test import StripsTest
-from bubblefit.section_errors import first_error
-from bubblefit.sections import LENGTH_UNITS
+from bubblefit.readers.sections import LENGTH_UNITS, first_error
 from pydantic import ValidationError
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -6,13 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.draws import allowed, draw
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.unknowns import Unknowns
-from bubblefit.materials.definite import DEFINITE
+from bubblefit.inference.search import feasible_start
+from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, draw
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
-from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.law import DEFINITE, HypoelasticLaw
 
 from ...identification.cases import levenberg_marquardt
 from .problems import CUBIC, FORMS, LARGEST, LAW, LEAST, RANGE, strips

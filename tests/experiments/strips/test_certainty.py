@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.identification.assessment import certainty, pinned_by
-from bubblefit.identification.methods.descent import descend
-from bubblefit.identification.noise import Noise
+from bubblefit.inference.assessment import certainty, pinned_by
+from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 
 from ...identification.scatter import follows, scatter_of

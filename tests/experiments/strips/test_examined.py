@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.load_polynomials import fit_load_polynomial
-from bubblefit.experiments.exhibit import Output
-from bubblefit.experiments.strips.examined import exhibit
-from bubblefit.experiments.strips.strip import Strip
+from bubblefit.experiments.kinds import Output
+from bubblefit.experiments.strips.data import Strip
+from bubblefit.experiments.strips.report import exhibit_examined as exhibit
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.polynomials import fit_load_polynomial
 
 WAY = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
 LOAD = np.array([2.0, 50.0, 90.0, 160.0, 120.0])

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import FitOptions
-from bubblefit.identification.problem import FitProblem
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.search import feasible_start, fit_from
 
 from ...identification.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, found_beta, gauge_strains, joint, led, near, strips

@@ -6,17 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.load_polynomials import fit_load_polynomial, specimen_scatter
-from bubblefit.experiments.strips.independent import (
-    PLACES,
-    SPECIMENS,
-    independent_loads,
-    loads_alike,
-)
-from bubblefit.experiments.strips.strip import Strip
-from bubblefit.fits.project import read_project
-from bubblefit.identification.noise import Noise
+from bubblefit.experiments.strips.data import Strip
+from bubblefit.experiments.strips.prepared import PLACES, SPECIMENS, independent_loads, loads_alike
+from bubblefit.inference.noise import Noise
+from bubblefit.project.project import read_project
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.polynomials import fit_load_polynomial, specimen_scatter
 
 from ...projects import constant_strips
 
@@ -83,7 +78,7 @@ def test_a_fit_reckons_with_specimens(tmp_path: Path) -> None:
     """Two specimens of constant moduli: all of their loads count as one."""
     project = read_project(constant_strips(tmp_path))
     one = project.tests["one"]
-    from bubblefit.fits.setup import prepare_fit
+    from bubblefit.runs.setup import prepare_fit
 
     problem = prepare_fit(project, [one]).problem()  # type: ignore[list-item]
     y = problem.unknowns.at(np.array([10.0, 190.0, 330.0]))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.identification.assessment import moduli_error
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import FitOptions
+from bubblefit.inference.assessment import moduli_error
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...identification.cases import levenberg_marquardt

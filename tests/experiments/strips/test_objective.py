@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.strips.objective import LoadObjective
-from bubblefit.identification.blocks import Blocks
-from bubblefit.identification.problem import FitProblem
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.comparison import Blocks
+from bubblefit.inference.problem import FitProblem
+from bubblefit.inference.unknowns import Unknowns
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CubicSpline
 

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import CardRun
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.kinds import CardRun, Output
 from bubblefit.experiments.strips import KIND
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.card import MaterialCard

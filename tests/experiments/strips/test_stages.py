@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from bubblefit.identification.approach import approach
-from bubblefit.identification.feasibility import feasible_start
-from bubblefit.identification.fit import fit_from
-from bubblefit.identification.methods import METHODS, FitOptions
+from bubblefit.inference.methods import METHODS
+from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.search import approach, feasible_start, fit_from
 
 from ...identification.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, joint, led, near

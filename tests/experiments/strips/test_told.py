@@ -10,19 +10,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.data.curves import LoadCurve
-from bubblefit.data.load_polynomials import fit_load_polynomial
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.base import CardRun
-from bubblefit.experiments.exhibit import Output
+from bubblefit.experiments.kinds import CardRun, Output
 from bubblefit.experiments.strips import simulated
-from bubblefit.experiments.strips.findings import findings_of
+from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip
 from bubblefit.experiments.strips.objective import LoadObjective
 from bubblefit.experiments.strips.prepared import FittedStrip
-from bubblefit.experiments.strips.strip import BELOW, BEYOND, Strip
-from bubblefit.experiments.strips.tables import load_table, misfit_table, residual_table
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.experiments.strips.report import (
+    findings_of,
+    load_table,
+    misfit_table,
+    residual_table,
+)
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import NoteKind
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.polynomials import fit_load_polynomial
 from bubblefit.solvers.base import History
 
 WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])

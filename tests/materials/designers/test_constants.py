@@ -6,17 +6,18 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bubblefit.materials.designers.constants import DesignersConstants
-from bubblefit.materials.designers.linear import (
+from bubblefit.materials.designers import (
     POINTS,
+    RATIOS,
+    DesignersConstants,
     LinearPath,
     Options,
+    constants_of_law,
     evaluate,
     every_option,
     line_of,
+    shares,
 )
-from bubblefit.materials.designers.of_law import constants_of_law
-from bubblefit.materials.designers.ratios import RATIOS, shares
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.materials.forms.base import COMPONENTS, map_in_range
-from bubblefit.materials.point_moduli import by_pieces, increment_modulus, point_modulus
+from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 

@@ -10,16 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.materials.biaxial_response import biaxial_response
-from bubblefit.materials.card import MaterialCard, read_card
-from bubblefit.materials.certainty import positive
-from bubblefit.materials.definite import definite_rows
+from bubblefit.materials.card import MaterialCard, positive, read_card
 from bubblefit.materials.exports.base import check_positive
 from bubblefit.materials.forms.base import EVEN
 from bubblefit.materials.forms.ratio import LABELS, LoadRatio
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.pieces import piece_constants
-from bubblefit.materials.point_ratio import RIGHT, load_angle
+from bubblefit.materials.law import HypoelasticLaw, definite_rows
+from bubblefit.materials.point_law import RIGHT, load_angle
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.materials.tables import piece_constants
 from bubblefit.solvers.base import carries_load_ratios, check_carries
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.once import Once

@@ -6,25 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.files import TEMPLATES
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
-from bubblefit.rendering import TEMPLATES
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
+from bubblefit.runs.verification.published import cases, shapes
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.bubble import decks
-from bubblefit.solvers.calculix.pressure import pressure_forces
-from bubblefit.solvers.calculix.sheet import rim_paths, tilt_remarks, without_stress
-from bubblefit.solvers.calculix.shells import shell_mesh
+from bubblefit.solvers.calculix.deck import (
+    pressure_forces,
+    rim_paths,
+    shell_mesh,
+    tilt_remarks,
+    without_stress,
+)
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
-from bubblefit.studies.verification.abaqus import cases, shapes
 
 from ...commands import bubblefit
 from ...fortran_build import LAWS

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.options import with_solver
-from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.project.project import read_project
 from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.run_cache import VARIABLE, RunCache
 

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.volume import enclosed_volume
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bodies import RigidSupports
-from bubblefit.models.cylinder import CylinderModel
-from bubblefit.models.gas import Gas
+from bubblefit.meshes.cylinder_model import CylinderModel, Gas, RigidSupports, inflated_cylinder
+from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder
-from bubblefit.solvers.calculix.cylinder import cylinder_decks
-from bubblefit.solvers.calculix.cylinder_bending import ABOVE, bending_context, body_nodes
-from bubblefit.solvers.calculix.cylinder_gas import (
+from bubblefit.solvers.calculix.cylinder import (
+    ABOVE,
     GasCurve,
+    bending_context,
     better_pressure,
+    body_nodes,
     compliance,
+    cylinder_decks,
     gas_pressure,
+    solid_mesh,
 )
 from bubblefit.solvers.calculix.cylinder_results import (
     BentCylinder,
@@ -32,11 +32,9 @@ from bubblefit.solvers.calculix.cylinder_results import (
     bent_cylinder,
     inflation_history,
 )
+from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.frd import FrdFile
-from bubblefit.solvers.calculix.law_file import law_files
-from bubblefit.solvers.calculix.library import material_library
-from bubblefit.solvers.calculix.reasons import increments
-from bubblefit.solvers.calculix.solids import solid_mesh
+from bubblefit.solvers.calculix.library import law_files, material_library
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers import process, scratch
 from bubblefit.solvers.calculix import solver as module
-from bubblefit.solvers.calculix.law_file import law_number
-from bubblefit.solvers.calculix.reasons import collapsed, increments
+from bubblefit.solvers.calculix.executable import collapsed, increments
+from bubblefit.solvers.calculix.library import law_number
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 

@@ -14,8 +14,12 @@ from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.calculix import library
-from bubblefit.solvers.calculix.law_file import law_files, law_number
-from bubblefit.solvers.calculix.library import STATE_VARIABLES, material_library
+from bubblefit.solvers.calculix.library import (
+    STATE_VARIABLES,
+    law_files,
+    law_number,
+    material_library,
+)
 
 from ... import needs
 from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere

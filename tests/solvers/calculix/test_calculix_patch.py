@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.materials.biaxial_response import biaxial_response
-from bubblefit.models.patch import PatchModel, elongations
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.meshes.strip_models import PatchModel, elongations
 from bubblefit.solvers.calculix.solver import CalculixSolver
 
 from ...fortran_build import LAWS

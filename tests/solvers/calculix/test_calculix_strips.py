@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
+from bubblefit.files import TEMPLATES
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
-from bubblefit.rendering import TEMPLATES
+from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
 from bubblefit.solvers.calculix import strip
-from bubblefit.solvers.calculix.shells import shell_mesh
+from bubblefit.solvers.calculix.deck import shell_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.calculix.strip_results import StripRun, strip_history
+from bubblefit.solvers.calculix.strip import StripRun, strip_history
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.pulls import corrected
 

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.volume import enclosed_volume
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.solvers.marc.bodies import ABOVE, BELOW, contact_bodies
-from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
-from bubblefit.solvers.marc.cylinder_results import may_touch
+from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.meshes.mesh import enclosed_volume
+from bubblefit.solvers.marc.cylinder import (
+    ABOVE,
+    BELOW,
+    bending_deck,
+    contact_bodies,
+    inflation_deck,
+    may_touch,
+)
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.solver import MarcSolver
 

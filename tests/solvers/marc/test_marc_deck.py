@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder import cylinder_mesh
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.graded import Refinement
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import bias_strip, straight_strip
-from bubblefit.solvers.marc.bubble import analyse, bubble_deck
-from bubblefit.solvers.marc.fabric import fabric_context, fabric_frames, named_set, set_lines
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.meshes.tube import Refinement, cylinder_mesh
+from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set, set_lines
+from bubblefit.solvers.marc.plates import analyse, bubble_deck, strip_deck
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
-from bubblefit.solvers.marc.strip import strip_deck
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -5,8 +5,8 @@ import ctypes
 import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports.formats import NoOptions
-from bubblefit.materials.exports.marc_hypela2 import hypela2, hypela2_source
+from bubblefit.materials.exports.base import NoOptions
+from bubblefit.materials.exports.marc import hypela2, hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st

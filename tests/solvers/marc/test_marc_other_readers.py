@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.solvers.marc.bubble import bubble_deck
 from bubblefit.solvers.marc.cylinder import bending_deck
+from bubblefit.solvers.marc.plates import bubble_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.t19 import T19File
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.bars import BARS, TOLERANCE
-from bubblefit.solvers.marc import proof
+from bubblefit.solvers.base import log_strain
+from bubblefit.solvers.marc import diagnosis as proof
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
-from bubblefit.solvers.strains import log_strain
 
 from ...marc_files import sts_text, t19_text
 from ...solvers.calculix.test_calculix_faults import gone

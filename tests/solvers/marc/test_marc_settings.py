@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.cli.options import with_solver
-from bubblefit.fits.project import read_project
 from bubblefit.materials.card import MaterialCard, read_card, write_card
-from bubblefit.solvers.diagnosis import diagnose
+from bubblefit.project.project import read_project
+from bubblefit.solvers.bars import diagnose
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings, marc_settings
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver

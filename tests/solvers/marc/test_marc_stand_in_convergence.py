@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.solvers.marc.bubble import bubble_deck
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.solvers.marc.deck import TOLERANCE
+from bubblefit.solvers.marc.plates import bubble_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.materials.exports.marc_hypela2 import hypela2_source
+from bubblefit.materials.exports.marc import hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import straight_strip
-from bubblefit.solvers.marc.bubble import bubble_deck
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
+from bubblefit.solvers.marc.plates import bubble_deck, strip_deck
 from bubblefit.solvers.marc.settings import MarcSettings
-from bubblefit.solvers.marc.strip import strip_deck
 
 from ... import needs
 from ...fortran_build import LAWS

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...marc_stand_in_runs import marc

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...fortran_build import BETA, LAWS

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.solvers.marc.sts import exit_number, increments, repeated
+from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.runs.verification.published import cases, shapes
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.verification.abaqus import cases, shapes
 
 #: Error of reading the published figures, mm.
 DIGITISED = 0.03

@@ -9,17 +9,22 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.closed import half_tube, tube_warp
+from bubblefit.meshes.cylinder_model import Bending, InflatedModel, RigidCylinder
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
+from bubblefit.meshes.tube import half_tube, tube_warp
 from bubblefit.solvers.base import History
-from bubblefit.solvers.membrane import bending, closed_model
-from bubblefit.solvers.membrane.closed import ClosedMembrane
-from bubblefit.solvers.membrane.contact import brought_to_touch, contact_forces, gaps
-from bubblefit.solvers.membrane.flexure import flexure_of
+from bubblefit.solvers.membrane import bending
+from bubblefit.solvers.membrane import closed as closed_model
+from bubblefit.solvers.membrane.bubble import Wall
+from bubblefit.solvers.membrane.closed import (
+    ClosedMembrane,
+    brought_to_touch,
+    contact_forces,
+    flexure_of,
+    gaps,
+)
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.wall import Wall
 
 RADIUS, LENGTH, SPAN = 75.0, 600.0, 800.0
 POST = RigidCylinder("support", (1.0, 0.0, 0.0), (0.0, 0.0, 0.5 * SPAN), 50.0)

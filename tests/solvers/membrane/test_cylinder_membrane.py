@@ -8,17 +8,21 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.bodies import Collar, RigidSupports
-from bubblefit.models.cylinder import CylinderModel
-from bubblefit.models.gas import Gas
-from bubblefit.models.inflated import Bending, InflatedModel, RigidCylinder
+from bubblefit.meshes.cylinder_model import (
+    Bending,
+    Collar,
+    CylinderModel,
+    Gas,
+    InflatedModel,
+    RigidCylinder,
+    RigidSupports,
+    inflated_cylinder,
+)
+from bubblefit.runs.verification.closed_forms import capped_strain
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.closed import ClosedMembrane
-from bubblefit.solvers.membrane.factorisation import BandedTangent, tangent_for
-from bubblefit.solvers.membrane.ordering import swept
+from bubblefit.solvers.membrane.factorisation import BandedTangent, swept, tangent_for
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.verification.thin_walls import capped_strain
 
 from ...solvers.membrane.test_inflated import LAW
 

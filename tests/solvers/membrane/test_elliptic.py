@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.data.outline import Outline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.elliptic_disk import elliptic_disk_mesh
-from bubblefit.meshes.location import sampling_matrix
-from bubblefit.models.bubble import BubbleModel
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import Outline, elliptic_disk_mesh
+from bubblefit.meshes.mesh import sampling_matrix
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 ISOTROPIC = HypoelasticLaw.linear(400.0, 400.0, 400.0 / 2 / 1.24)

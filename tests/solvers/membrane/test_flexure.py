@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.closed import half_tube, tube_warp
-from bubblefit.solvers.membrane.flexure import Flexure, flexure_of
+from bubblefit.meshes.tube import half_tube, tube_warp
+from bubblefit.solvers.membrane.closed import Flexure, flexure_of
 
 RADIUS, LENGTH, THICKNESS = 75.0, 40.0, 0.8
 LAW = HypoelasticLaw.linear(800.0, 140.0, 20.0, 0.24)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.studies.verification.hencky import (
+from bubblefit.runs.verification.closed_forms import (
     FICHTER,
     MODULUS,
     RADIUS,
@@ -17,6 +16,7 @@ from bubblefit.studies.verification.hencky import (
     apex_coefficient,
     stress_series,
 )
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
 
 def apex(elements: int, pressure: float, nu: float, change: str = "constant") -> float:

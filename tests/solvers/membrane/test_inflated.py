@@ -8,27 +8,29 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strain import log_strain_of
-from bubblefit.models.gas import ClosedGas
-from bubblefit.models.inflated import InflatedModel
-from bubblefit.solvers.membrane.cavity import closed_cavity
-from bubblefit.solvers.membrane.closed_model import closed_membrane
-from bubblefit.solvers.membrane.element import GAUSS_POINTS, reference_elements
-from bubblefit.solvers.membrane.factorisation import tangent_for
-from bubblefit.solvers.membrane.newton import Membrane
-from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.wall import Wall
-from bubblefit.studies.verification.thin_walls import (
+from bubblefit.meshes.cylinder_model import ClosedGas, InflatedModel
+from bubblefit.meshes.mesh import log_strain_of
+from bubblefit.runs.verification.closed_forms import (
     ISOTROPIC,
     NU,
-    RADIUS,
-    THICKNESS,
     E,
     capped_strain,
     in_the_middle,
 )
-from bubblefit.studies.verification.thin_walls import sphere_model as sphere
-from bubblefit.studies.verification.thin_walls import tube_model as tube
+from bubblefit.runs.verification.closed_forms import (
+    RADIUS_THIN_WALLS as RADIUS,
+)
+from bubblefit.runs.verification.closed_forms import (
+    THICKNESS_THIN_WALLS as THICKNESS,
+)
+from bubblefit.runs.verification.closed_forms import sphere_model as sphere
+from bubblefit.runs.verification.closed_forms import tube_model as tube
+from bubblefit.solvers.membrane.bubble import Wall
+from bubblefit.solvers.membrane.closed import closed_cavity, closed_membrane
+from bubblefit.solvers.membrane.factorisation import tangent_for
+from bubblefit.solvers.membrane.kernel import GAUSS_POINTS, reference_elements
+from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.integrate import quad
 from scipy.optimize import brentq
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 LAW = HypoelasticLaw([12.0, 240.0, 120.0, 600.0, -150.0], 0.24, form=LoadRatio())

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import straight_strip
-from bubblefit.solvers.analyses import analysis_of
-from bubblefit.solvers.membrane.march import Asked, Loading, NoEquilibrium, lagrange, march
-from bubblefit.solvers.membrane.march import straight_on as line
+from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.solvers.base import analysis_of
+from bubblefit.solvers.membrane.newton import Asked, Loading, NoEquilibrium, lagrange, march
+from bubblefit.solvers.membrane.newton import straight_on as line
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 LAW = HypoelasticLaw.linear(300.0, 300.0, 100.0, 0.3)

@@ -9,12 +9,12 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.models.bubble import BubbleModel, default_increments
 from bubblefit.solvers.membrane import factorisation
-from bubblefit.solvers.membrane.element import reference_elements
 from bubblefit.solvers.membrane.factorisation import BandedTangent, SparseTangent, tangent_for
+from bubblefit.solvers.membrane.kernel import reference_elements
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.materials.biaxial_response import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.patch import SIDE, PatchModel, elongations
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.meshes.strip_models import SIDE, PatchModel, elongations
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...biaxial_files import BENT

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import SLOPES
-from bubblefit.materials.relaxation import relaxed_update
-from bubblefit.studies.verification.bent_tube import FIRST, PlaneEnds, published_moment
+from bubblefit.materials.wrinkles import relaxed_update
+from bubblefit.runs.verification.closed_forms import FIRST, PlaneEnds, published_moment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

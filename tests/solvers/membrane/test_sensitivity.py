@@ -9,9 +9,8 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes
-from bubblefit.models.bubble import SLACK, BubbleModel, default_increments
+from bubblefit.meshes.bubble_model import SLACK, BubbleModel, default_increments
+from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.solvers.base import DifferentiatingSolver, parameters_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

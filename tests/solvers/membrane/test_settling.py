@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.models.bending import inflated_cylinder
+from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.solvers.membrane.bending import settled
+from bubblefit.solvers.membrane.bubble import Walls
 from bubblefit.solvers.membrane.closed import ClosedMembrane
-from bubblefit.solvers.membrane.settling import settled
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.wall import Walls
 
 from ...solvers.membrane.test_inflated import LAW, run, tube
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.disk_modes import disk_modes, doubly_symmetric, monomials
-from bubblefit.models.bubble import BubbleModel, default_increments
+from bubblefit.meshes.bubble_model import BubbleModel, default_increments
+from bubblefit.meshes.disk import disk_mesh, disk_modes, doubly_symmetric, monomials
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 PRESSURES = (0.022, 0.097, 0.186)

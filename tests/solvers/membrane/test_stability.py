@@ -8,16 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.identification.bounds import LawBounds
-from bubblefit.identification.draws import allowed, draw
-from bubblefit.identification.unknowns import Unknowns
+from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, draw
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import straight_strip
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.base import instability
 from bubblefit.solvers.membrane import bubble, factorisation
+from bubblefit.solvers.membrane.newton import named
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.stability import named
 
 from ...identification.cases import CUBIC, LAW, MODEL, RANGE
 

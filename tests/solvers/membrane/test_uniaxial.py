@@ -10,16 +10,21 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.meshes.strip import strip_mesh, yarn_direction
-from bubblefit.models.bubble import BubbleModel
-from bubblefit.models.uniaxial import UniaxialModel, bias_strip, straight_strip
+from bubblefit.meshes.strip_models import (
+    UniaxialModel,
+    bias_strip,
+    straight_strip,
+    strip_mesh,
+    yarn_direction,
+)
 from bubblefit.solvers.bars import BARS, bar_law
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import newton
-from bubblefit.solvers.membrane.driven import Pull
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.membrane.strip import Pull
 
 from ...places import PUBLISHED
 from ...published_laws import TABLE_3_2

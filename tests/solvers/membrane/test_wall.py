@@ -6,14 +6,13 @@ from typing import Any
 
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.models.bending import inflated_cylinder
-from bubblefit.models.cylinder import CylinderModel
+from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
 from bubblefit.solvers.base import BandedSolver
-from bubblefit.solvers.membrane import cylinder
+from bubblefit.solvers.membrane import bending as cylinder
+from bubblefit.solvers.membrane.bending import closed_membrane_of
+from bubblefit.solvers.membrane.bubble import LEFT, STIFF, TENSION_FIELD, Wall
 from bubblefit.solvers.membrane.closed import ClosedMembrane
-from bubblefit.solvers.membrane.cylinder import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.wall import LEFT, STIFF, TENSION_FIELD, Wall
 from bubblefit.solvers.registry import solver_named
 
 from ...complaints import complaint

@@ -1,1 +1,0 @@
-"""Biaxial tests of a cruciform: loads per width and strains along warp and fill."""

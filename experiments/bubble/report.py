@@ -1,0 +1,446 @@
+"""What a bubble test puts on the page of a fit: cuts, heights, the inflated surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ...inference.comparison import Blocks
+from ...readers.surfaces import write_surfaces
+from ...reports.charts import Chart, Charts, Series, dots, line
+from ...reports.content import Part, Table
+from ...reports.cuts import node_cut, point_cut
+from ...reports.maps import Maps, Shade, Shades, Solid, maps_of
+from ...reports.packed import pack
+from ...reports.profiles import plot_profiles
+from ...reports.rises import plot_rises
+from ...reports.scatter import plot_heights
+from ...writing import replacing
+from ..kinds import Exhibit, Findings, FittedTest, Output, Shown
+from .findings import (
+    clock_pictures,
+    correlation_table,
+    fitted_model,
+    objective_of,
+    recorded_of,
+    recorded_table,
+    registration_picture,
+    registration_table,
+    sheet_exhibit,
+    sheet_lines,
+)
+from .forward import at_nodes, inflated_sheets, write_series
+from .objective import displacement_offset
+
+if TYPE_CHECKING:
+    from .prepared import PreparedBubble
+
+NOT_MATCHED = "for the record: the fit matched the points themselves"
+SURFACES = "surfaces.csv"
+
+
+def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
+    """The blocks of the test's own objective, pressure by pressure."""
+    objective = objective_of(fitted)
+    residual = objective.residual(fitted.histories[0], fitted.nuisance)
+    norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3)
+    note = (
+        "RMS error over the largest measured value, direction by direction"
+        if prepared.test.objective == "e"
+        else "RMS error in mm, direction by direction"
+    )
+    kilo = [1e3 * t.pressure for t in objective.targets]
+    rows: list[list[object]] = [[p, *n.tolist()] for p, n in zip(kilo, norms, strict=True)]
+    return Table("Misfit by pressure", ["pressure, kPa", "x", "y", "z"], rows, note)
+
+
+def surface_tables(prepared: PreparedBubble) -> list[Table]:
+    """R^2 of the polynomial surfaces, where there are any."""
+    if not prepared.surfaces:
+        return []
+    test = prepared.test
+    rows: list[list[object]] = [
+        [1e3 * p, *(f"{r:.5f}" for r in s.r_squared)]
+        for p, s in zip(test.pressures, prepared.surfaces, strict=True)
+    ]
+    note = "" if test.match_by == "surfaces" else NOT_MATCHED
+    title = f"R² of polynomial surfaces of degree {test.match_degree}"
+    return [Table(title, ["pressure, kPa", "x", "y", "z"], rows, note)]
+
+
+def write_surface_table(prepared: PreparedBubble, out: Output) -> list[Shown]:
+    """surfaces.csv, where there are surfaces."""
+    if not prepared.surfaces:
+        return []
+    with replacing(out.path(SURFACES)) as path:
+        write_surfaces(prepared.surfaces, path)
+    return [(out.name(SURFACES), "polynomial surfaces of the data")]
+
+
+def residual_table(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
+    """A row a place, pressure and direction.
+
+    Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
+    (dx, dy, dz), measured, modelled, difference (modelled less measured, offset included), unit.
+    """
+    objective = objective_of(fitted)
+    (comparison,) = fitted.comparisons
+    nodes = comparison.model.mesh.points[:, :2]
+    frames = []
+    every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
+        places = target.at(nodes)
+        for axis, name in enumerate(("dx", "dy", "dz")):
+            frames.append(
+                pd.DataFrame(
+                    {
+                        "part": "bubble",
+                        "frame": frame,
+                        "pressure_kPa": 1e3 * target.pressure,
+                        "x_mm": places[:, 0],
+                        "y_mm": places[:, 1],
+                        "quantity": name,
+                        "measured": np.asarray(target.displacement)[:, axis],
+                        "modelled": modelled[:, axis],
+                    }
+                )
+            )
+    table = pd.concat(frames, ignore_index=True)
+    table["difference"] = table["modelled"] - table["measured"]
+    table["unit"] = objective.unit
+    return table
+
+
+Array = NDArray[np.float64]
+
+#: Pressures that are drawn in one chart; of more, as many spread over all, the last among them.
+MOST = 8
+#: Points that are drawn of one pressure.
+POINTS = 120
+AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
+
+
+def chosen(count: int) -> list[int]:
+    """Numbers of the pressures that are drawn."""
+    return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int)).tolist()
+
+
+def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
+    """Heights along both axes: lines of the model, dots of what was measured."""
+    pressures, offset = prepared.test.pressures, displacement_offset(fitted.nuisance)
+    displacement = fitted.histories[0].displacement + offset
+    points = fitted.comparisons[0].model.mesh.points
+    numbers = chosen(len(pressures))
+    charts = []
+    for axis, (title, label) in enumerate(AXES):
+        series: list[Series] = []
+        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
+            cut, name = node_cut(points, displacement[k], axis), kilo(pressures[k])
+            series.append(line(name, cut.position, cut.height, rank=rank))
+            seen = prepared.fields[k]
+            spots = point_cut(seen.points, seen.displacement, axis)
+            series.append(dots(name, spots.position, spots.height, rank=rank))
+        alt = f"{title}: heights modelled and measured at {len(numbers)} pressures"
+        charts.append(Chart(title, label, "height z, mm", series, alt))
+    caption = f"{prepared.test.name}: lines are the model, dots {source(prepared)}"
+    return Charts(f"{prepared.test.name} cuts", charts, f"{caption}.{left_out(pressures, numbers)}")
+
+
+def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
+    """What is left of dx, dy and dz over the measured height."""
+    objective = objective_of(fitted)
+    left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
+    targets = objective.targets
+    numbers, charts = chosen(len(targets)), []
+    for axis, name in enumerate(("dx", "dy", "dz")):
+        series = []
+        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
+            every = slice(None, None, max(1, -(-len(left[k]) // POINTS)))
+            height = np.asarray(targets[k].displacement)[every, 2]
+            off = left[k][every, axis]
+            series.append(dots(kilo(targets[k].pressure), height, off, rank=rank))
+        rms = float(np.sqrt(np.mean(np.concatenate([own[:, axis] for own in left]) ** 2)))
+        title = f"{name}: RMS {rms:.2g} mm"
+        alt = f"modelled less measured {name} over the measured height, {rms:.2g} mm RMS"
+        charts.append(
+            Chart(title, "measured dz, mm", "modelled − measured, mm", series, alt, level=0.0)
+        )
+    pressures = [target.pressure for target in targets]
+    caption = f"{prepared.test.name}: what is left, over the measured height."
+    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(pressures, numbers))
+
+
+def ranks(count: int) -> list[float]:
+    """Of rising pressures, for their colours."""
+    return np.linspace(0.1, 1.0, count).tolist()
+
+
+def kilo(pressure: float) -> str:
+    """A pressure (MPa) in kPa."""
+    return f"{1e3 * pressure:.4g} kPa"
+
+
+def source(prepared: PreparedBubble) -> str:
+    """What the model is compared with."""
+    return "the known solution" if prepared.known is not None else "what was measured"
+
+
+def left_out(pressures: Sequence[float], numbers: Sequence[int]) -> str:
+    """That not every pressure is drawn."""
+    if len(numbers) == len(pressures):
+        return ""
+    return f" Of {len(pressures)} pressures {len(numbers)} are drawn."
+
+
+LABELS = ("x (warp), mm", "y (fill), mm")
+
+
+def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
+    """dx, dy and dz at every place that was matched."""
+    objective = objective_of(fitted)
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    displacement = fitted.histories[0].displacement
+    modelled = objective.modelled(displacement, fitted.nuisance)
+    left = objective.differences(displacement, fitted.nuisance)
+    targets, name = objective.targets, prepared.test.name
+    rows = [
+        (
+            quantity,
+            "mm",
+            [np.asarray(target.displacement)[:, axis] for target in targets],
+            [own[:, axis] for own in modelled],
+            [own[:, axis] for own in left],
+        )
+        for axis, quantity in enumerate(("dx", "dy", "dz"))
+    ]
+    caption = (
+        f"{name}: displacement of {source(prepared)}, of the model, and their difference. Colours "
+        "end at the least and the largest value of the pressure shown."
+    )
+    if objective.constant:
+        caption += " From the difference a field is taken out that is the same at all pressures."
+    return maps_of(
+        f"{name} maps", "pressure", [kilo(t.pressure) for t in targets],
+        [target.at(nodes) for target in targets], rows, LABELS, caption,
+        f"maps of dx, dy and dz of {name}",
+    )  # fmt: skip
+
+
+#: Signs of x and y of the parts of a whole: a quarter is seen four times.
+WHOLE, QUARTERS = ((1, 1),), ((1, 1), (-1, 1), (-1, -1), (1, -1))
+STRAINS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
+STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
+
+
+def bubble_solid(
+    prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
+) -> Solid:
+    """The modelled surface at every pressure of the test.
+
+    left : (nodes, 3) mm a pressure, between model and measurement; None where nothing is matched.
+    """
+    test, model = prepared.test, fitted_model(fitted)
+    mesh, sheets = model.mesh, list(inflated_sheets(model, fitted.histories[0], fitted.law))
+    signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
+    residual = np.tile(np.array([_sizes(own, mesh.quads) for own in left]), len(signs))
+    shades = [Shade("residual, length", "mm", pack(residual))]
+    fields = (
+        (STRAINS, "1", np.array([sheet.strain for sheet in sheets])),
+        (STRESSES, "MPa", np.array([sheet.stress for sheet in sheets])),
+    )
+    for names, unit, values in fields:
+        every = _around(values, signs)
+        for k, name in enumerate(names):
+            ends: Shades = "about zero" if k == 2 else "from least"
+            shades.append(Shade(name, unit, pack(every[..., k]), ends))
+    points = mesh.points + np.array([sheet.displacement for sheet in sheets])
+    around = [points * (sx, sy, 1.0) for sx, sy in signs]
+    quads = [mesh.quads + k * len(mesh.points) for k in range(len(signs))]
+    caption = (
+        f"{test.name}: the modelled bubble; drag it, or use the arrow keys, to turn it. Strain is "
+        "logarithmic, stress Cauchy stress, both in the middle of each element; the residual "
+        "is the distance of modelled and measured, grey where nothing was measured."
+    )
+    alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
+    return Solid(
+        f"{test.name} bubble", [kilo(sheet.pressure) for sheet in sheets], "pressure",
+        pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
+    )  # fmt: skip
+
+
+def _sizes(left: Array | None, quads: NDArray[np.intp]) -> Array:
+    """(quads,) mm, mean over the corners; NaN where one of them has none."""
+    if left is None:
+        return np.full(len(quads), np.nan)
+    return np.asarray(np.linalg.norm(left, axis=1)[quads].mean(axis=1))
+
+
+def _around(values: Array, signs: Array) -> Array:
+    """(frames, parts * quads, 3): a mirrored part is sheared the other way."""
+    return np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
+
+
+PROFILES, HEIGHTS, SERIES = "profiles.png", "heights.png", "bubble.pvd"
+
+
+def exhibit(
+    prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output
+) -> Exhibit:
+    """Write the figures, surfaces.csv and bubble.pvd with its files."""
+    files = [
+        *write_surface_table(prepared, out),
+        (out.name(SERIES), "the inflated bubble pressure by pressure, for ParaView"),
+    ]
+    left = left_at_nodes(fitted)
+    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, out.path(SERIES), left)
+    of_sheet = sheet_exhibit(prepared, fitted, out)
+    files += [*_pictures(prepared, fitted, out), *of_sheet[1]]
+    figures = list(of_sheet[0])
+    tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
+    if prepared.registration is not None:
+        figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
+        tables.insert(0, registration_table(prepared.registration))
+    taken = recorded_of(prepared)
+    if taken is not None:
+        tables.insert(0, recorded_table(taken))
+        figures += clock_pictures(taken, out)
+    parts: list[Part] = [
+        profile_charts(prepared, fitted),
+        field_maps(prepared, fitted),
+        bubble_solid(prepared, fitted, left),
+        residual_chart(prepared, fitted),
+    ]
+    record = correlation_table(prepared)
+    return Exhibit(_facts(prepared, findings), figures, tables, files, parts, record)
+
+
+def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
+    """(nodes, 3) mm a reported pressure, measured less modelled; None where nothing is matched."""
+    objective, history = objective_of(fitted), fitted.histories[0]
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    left: list[Array | None] = [None] * len(history.displacement)
+    differences = objective.differences(history.displacement, fitted.nuisance)
+    for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
+        frame = number if target.frame is None else target.frame
+        left[frame] = at_nodes(nodes, target.at(nodes), -off)
+    return left
+
+
+def _pictures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
+    """Cuts and heights against what was measured, as pictures beside the page."""
+    test, offset = prepared.test, displacement_offset(fitted.nuisance)
+    displacement = fitted.histories[0].displacement
+    label = "known solution" if prepared.known is not None else "measured"
+    plot_profiles(
+        out.path(PROFILES),
+        test.pressures,
+        fitted.comparisons[0].model.mesh.points,
+        displacement + offset,
+        measured=[(f.points, f.displacement) for f in prepared.fields],
+        measured_label=label,
+    )
+    objective = objective_of(fitted)
+    targets, modelled = objective.targets, objective.modelled(displacement, fitted.nuisance)
+    plot_heights(
+        out.path(HEIGHTS),
+        [t.pressure for t in targets],
+        [t.displacement[:, 2] for t in targets],
+        [own[:, 2] for own in modelled],
+        label,
+    )
+    return [
+        (out.name(PROFILES), f"{test.name}: cuts through the bubble along warp and fill"),
+        (out.name(HEIGHTS), f"{test.name}: modelled against measured height"),
+    ]
+
+
+def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, object]]:
+    numbers = findings.numbers
+    facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
+    dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
+    if any(dropped):
+        facts.append(("points left out", f"{dropped[0]} doubtful, {dropped[1]} beyond the rim"))
+    shift, pressure = numbers["nuisance"].values()
+    if shift is not None:
+        facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
+    if pressure is not None:
+        facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
+    (sheet,) = sheet_lines(numbers["sheet"])
+    facts.append(("sheet", sheet.removeprefix("sheet: ")))
+    return facts
+
+
+HEIGHTS_EXAMINED = "rises.png"
+
+
+def exhibit_examined(prepared: PreparedBubble, out: Output) -> Exhibit:
+    """Write the maps and the rise by pressure."""
+    tables = [_frames(prepared)]
+    if prepared.registration is not None:
+        tables.insert(0, registration_table(prepared.registration))
+    if prepared.view.apexes:
+        tables.append(_equilibrium(prepared))
+    maps = registration_picture(prepared.fields, prepared.test.outline, out)
+    return Exhibit(
+        facts=_facts_examined(prepared), figures=[maps, _rises(prepared, out)], tables=tables
+    )
+
+
+def _facts_examined(prepared: PreparedBubble) -> list[tuple[str, object]]:
+    view = prepared.view
+    facts: list[tuple[str, object]] = []
+    if view.rim is not None:
+        rim = view.rim
+        facts.append(
+            ("the sheet rises about, mm", f"{rim.x:.2f}, {rim.y:.2f} (+- {rim.error:.2g})")
+        )
+    if view.axes is not None:
+        clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
+        facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
+    return facts
+
+
+def _frames(prepared: PreparedBubble) -> Table:
+    rows: list[list[object]] = []
+    for field, rise in zip(prepared.fields, prepared.view.rises, strict=True):
+        dropped = ", ".join(f"{count} {why}" for why, count in field.dropped.items()) or "none"
+        name = "computed" if field.path is None else field.path.name
+        rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
+    header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
+    return Table("Frames", header, rows, text=(1, 3))
+
+
+def _equilibrium(prepared: PreparedBubble) -> Table:
+    thickness = prepared.test.thickness
+    rows: list[list[object]] = [
+        [
+            1e3 * apex.pressure,
+            apex.height,
+            1e3 * apex.curvature,
+            apex.force,
+            apex.error,
+            apex.force / thickness,
+            100 * apex.strain[0],
+            100 * apex.strain[1],
+        ]
+        for apex in prepared.view.apexes
+    ]
+    header = [
+        "pressure, kPa", "apex, mm", "k1 + k2, 1/m", "force, kN/m", "+-", "stress, MPa",
+        "strain along warp, %", "along fill, %",
+    ]  # fmt: skip
+    note = (
+        "n1 k1 + n2 k2 = p with n1 = n2, from the measured shape alone; logarithmic strain, stress "
+        "over the thickness before the test"
+    )
+    return Table("Equilibrium of the apex, without a model", header, rows, note)
+
+
+def _rises(prepared: PreparedBubble, out: Output) -> Shown:
+    pressures = [field.pressure for field in prepared.fields]
+    plot_rises(out.path(HEIGHTS_EXAMINED), pressures, prepared.view.rises)
+    return out.name(HEIGHTS_EXAMINED), "rise about the centre against pressure"

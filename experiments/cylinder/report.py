@@ -1,0 +1,442 @@
+"""What bent cylinders put on a page: facts, figures, tables and files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ...materials.card import BAND, LEVEL
+from ...meshes.cylinder_model import CylinderModel
+from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
+from ...notes import marks
+from ...readers.bending import scatter
+from ...reports.beam import BeamBodies, plot_beam
+from ...reports.bending import (
+    BendLine,
+    BendPanel,
+    BendReadings,
+    plot_bending,
+    plot_bending_cases,
+    plot_gas,
+)
+from ...reports.bending_charts import bending_charts
+from ...reports.charts import Charts
+from ...reports.content import Part, Table, Words
+from ...reports.html import percent
+from ...reports.vtu import write_vtu
+from ...writing import replacing
+from ..kinds import Exhibit, Output, Shown
+from .predicted import BendingRun, load_words, measured_table, place_names
+from .test import CylinderTest
+
+if TYPE_CHECKING:
+    from .predicted import CylinderOutcome
+
+Array = NDArray[np.float64]
+
+#: Node sets that the picture draws as lines.
+LINES = ("mid_span", "top_line", "bottom_line")
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """The whole cylinder: mesh (mm, with warp), displacements when inflated and at the end."""
+
+    mesh: Mesh
+    inflated: Array
+    bent: Array
+
+
+def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
+    """What was meshed and its mirror images."""
+    mesh = model.mesh
+    assert mesh.warp is not None
+    points, quads, warp = mesh.points, mesh.quads, mesh.warp
+    moves = [run.inflated, run.bent]
+    number = np.arange(len(points))
+    lines = {name: np.isin(number, mesh.node_sets[name]) for name in LINES}
+    for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
+        if name not in mesh.node_sets:
+            continue
+        count = len(points)
+        points, quads, source = with_mirror_image(points, quads, axis)
+        sign = np.ones((len(points), 3))
+        sign[count:, axis] = -1.0
+        moves = [u[source] * sign for u in moves]
+        turned = np.ones(3)
+        turned[axis] = -1.0
+        warp = np.concatenate([warp, warp * turned])
+        lines = {name: line[source] for name, line in lines.items()}
+    sets = {name: np.flatnonzero(line) for name, line in lines.items()}
+    return Beam(Mesh(points, quads, sets, {}, warp), moves[0], moves[1])
+
+
+def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies:
+    """Supports and collar, brought to touch the inflated beam; the collar then goes down."""
+    at = beam.mesh.points + beam.inflated
+    radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
+    beside = np.abs(np.abs(at[:, 2]) - half)
+    near = beside < radius
+    height = float((at[near, 1] - np.sqrt(radius**2 - beside[near] ** 2)).min())
+    inner = 0.5 * model.collar.inner_diameter
+    inside = (np.abs(at[:, 2]) <= 0.5 * model.collar.length) & (np.abs(at[:, 0]) < inner)
+    top = float((at[inside, 1] - np.sqrt(inner**2 - at[inside, 0] ** 2)).max())
+    return BeamBodies(
+        ((-half, height), (half, height)), radius, top - deflection, inner, model.collar.length
+    )
+
+
+def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> None:
+    """The picture of the last frame."""
+    beam = whole_beam(model, run)
+    rest, sets = beam.mesh.points, beam.mesh.node_sets
+    nodes, top, bottom = (sets[name] for name in LINES)
+    around = np.argsort(np.arctan2(rest[nodes, 0], rest[nodes, 1]))
+    ring = np.append(nodes[around], nodes[around[0]])
+    top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
+    outline = np.concatenate([top, bottom[::-1], top[:1]])
+    inflated, bent = beam.mesh.points + beam.inflated, beam.mesh.points + beam.bent
+    plot_beam(
+        path,
+        bent,
+        beam.mesh.quads,
+        surface_strain(beam.mesh, beam.bent)[:, 0],
+        inflated[outline][:, [2, 1]],
+        (inflated[ring, :2], bent[ring, :2]),
+        bodies_of(model, beam, float(run.deflection[-1])),
+        title,
+    )
+
+
+def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
+    """The last frame for ParaView, with the inflated one as a further displacement."""
+    beam = whole_beam(model, run)
+    write_vtu(
+        beam.mesh,
+        beam.bent,
+        path,
+        {"inflated_displacement": beam.inflated},
+        {
+            "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
+            "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
+        },
+    )
+
+
+FIGURES, BEAMS = "figures", "beams"
+
+
+def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+    """Loads, gas and beam of every test, and all loads together, as pictures.
+
+    Returns
+    -------
+    Those that the page shows, each with its caption: the loads are charts there.
+    """
+    tests = tests_of(outcome)
+    cards = list(dict.fromkeys(run.card for run in outcome.runs))
+    ranks = {card: rank for rank, card in enumerate(cards)}
+    names = file_names([test.name for test in tests])
+    panels, figures = {}, []
+    for test in tests:
+        ended = _ended(test, outcome)
+        panels[test.name] = _panel(test, outcome, ended, ranks)
+        if not ended:
+            continue
+        stem = f"{FIGURES}/{names[test.name]}"
+        plot_bending(out.path(f"{stem}-load.png"), panels[test.name])
+        plot_gas(out.path(f"{stem}-gas.png"), panels[test.name])
+        first, run = outcome.runs[ended[0]], outcome.bent[ended[0]]
+        drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
+        draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
+        figures += [
+            (out.name(f"{stem}-beam.png"), f"{test.name}: the bent beam, card {first.card}"),
+            (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
+        ]
+    if sum(bool(panel.lines) for panel in panels.values()) > 1:
+        rows = _rows(tests)
+        columns = max(map(len, rows))
+        laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
+        plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
+    return figures
+
+
+def load_charts(outcome: CylinderOutcome) -> list[Charts]:
+    """Load over deflection of every test; nothing where no run came to an end."""
+    cards = list(dict.fromkeys(run.card for run in outcome.runs))
+    ranks = {card: rank for rank, card in enumerate(cards)}
+    tests = tests_of(outcome)
+    panels = [_panel(test, outcome, _ended(test, outcome), ranks) for test in tests]
+    if not any(panel.lines for panel in panels):
+        return []
+    caption = f"Load over deflection{_walls(outcome)}"
+    if outcome.spreads:
+        caption += f". Shaded: {panels[0].spread}"
+    return [bending_charts(panels, caption)]
+
+
+def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
+    """The last frame of every run for ParaView; files and what they are."""
+    tests = file_names([test.name for test in tests_of(outcome)])
+    cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))
+    files = []
+    for i, bent in outcome.bent.items():
+        run = outcome.runs[i]
+        wall = "" if run.predicted else f"-{file_names([run.wall])[run.wall]}"
+        name = f"{BEAMS}/{tests[run.test.name]}-{cards[run.card]}{wall}.vtu"
+        write_beam(run.model, bent, out.path(name))
+        what = f"the beam at {bent.deflection[-1]:g} mm, for ParaView"
+        files.append((out.name(name), what if run.predicted else f"{what} ({run.wall})"))
+    return files
+
+
+def tests_of(outcome: CylinderOutcome) -> list[CylinderTest]:
+    """The tests of the runs, each once."""
+    return list({id(run.test): run.test for run in outcome.runs}.values())
+
+
+def file_names(names: Sequence[str]) -> dict[str, str]:
+    """A name for files for each, all different."""
+    files: dict[str, str] = {}
+    for number, name in enumerate(names, start=1):
+        plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
+        taken = plain.casefold() in (other.casefold() for other in files.values())
+        files[name] = f"{plain}-{number}" if taken else plain
+    return files
+
+
+def _walls(outcome: CylinderOutcome) -> str:
+    """For a caption: what lines and bands are."""
+    if len(outcome.band) < 2:
+        return ""
+    predicted, *others = (end.name for end in outcome.band)
+    return f"; line: {predicted}, dashed: {', '.join(others)}"
+
+
+def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
+    return [BendPanel("")] * (columns - len(row))
+
+
+def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
+    """A row a diameter where there are several of them with several pressures."""
+    rows: dict[float, list[CylinderTest]] = {}
+    for test in tests:
+        rows.setdefault(round(test.diameter, 6), []).append(test)
+    if len(rows) > 1 and max(map(len, rows.values())) > 1:
+        return list(rows.values())
+    flat = list(tests)
+    return [flat[i : i + 3] for i in range(0, len(flat), 3)]
+
+
+def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
+    """The runs of a test that did not fail, of what the solver predicts."""
+    own = [i for i in outcome.bent if outcome.runs[i].test is test]
+    return [i for i in own if outcome.runs[i].predicted]
+
+
+def _panel(
+    test: CylinderTest, outcome: CylinderOutcome, ended: Sequence[int], ranks: Mapping[str, int]
+) -> BendPanel:
+    lines = []
+    for i in ended:
+        run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
+        rms = None if m.error is None else m.error.rms
+        curves = run.deflection, run.load, run.pressure, run.volume
+        other = outcome.other_end(i)
+        band = None if other is None else (other.deflection, other.load)
+        sure = outcome.spreads.get(i)
+        off = None if sure is None or np.isnan(sure).all() else BAND * sure
+        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms, band, off))
+    measured = None
+    if test.measured:
+        s = scatter(test.measured)
+        # Where a repetition has ended the mean of the others jumps.
+        whole = s.count == len(test.measured)
+        readings = [(c.deflection, c.load) for c in test.measured]
+        measured = BendReadings(
+            readings,
+            s.deflection,
+            np.where(whole, s.mean, np.nan),
+            np.where(whole, s.deviation, np.nan),
+        )
+    names = [end.name for end in outcome.band]
+    walls = f"from {' to '.join(names)}" if names else ""
+    return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card")
+
+
+#: mm, of what a project may leave to the usual values.
+SIZES: Mapping[str, Callable[[CylinderTest], float]] = {
+    "span": lambda test: test.supports.span,
+    "seam width": lambda test: test.seam_width,
+    "length": lambda test: test.length,
+    "diameter of the supports": lambda test: test.supports.diameter,
+}
+
+
+def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
+    """What a reader should know before any load: how sure they are, and what was assumed."""
+    lines = []
+    if outcome.spreads:
+        shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
+                  for i, s in outcome.spreads.items() if not np.isnan(s).all()]  # fmt: skip
+        if shares:
+            lines.append(
+                f"By what the cards leave open of their laws, loads are off by up to "
+                f"{percent(max(shares))} of the largest (one standard deviation)."
+            )
+    lines += [f"{words[:1].upper()}{words[1:]}." for words in outcome.unsure]
+    if len(outcome.band) > 1:
+        ends = "; ".join(f"{end.name}: {end.meaning}" for end in outcome.band)
+        lines.append(f"The solver's answer lies between walls ({ends}).")
+    for words in dict.fromkeys(words for test in tests for words in test.assumed):
+        own = [test for test in tests if words in test.assumed]
+        told = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
+        of = "" if len(own) == len(tests) else f" for {', '.join(t.name for t in own)}"
+        size = f" ({', '.join(told)})" if told else ""
+        lines.append(f"Assumed{of}, as the project does not say: the usual {words}{size}.")
+    return lines
+
+
+#: Letters of a cell that is not broken.
+SHORT = 30
+CURVES = "load_deflection.csv"
+MEASURED = "measured.csv"
+
+
+def exhibit(outcome: CylinderOutcome, out: Output) -> Exhibit:
+    """Write everything below the folder and say what is where."""
+    tests = tests_of(outcome)
+    figures = draw_figures(outcome, out)
+    files = [*_write_tables(outcome, tests, out), *write_beams(outcome, out)]
+    tables = [_runs(outcome, tests), *_errors(outcome)]
+    parts: list[Part] = [Words(how_sure(outcome, tests)), *load_charts(outcome)]
+    return Exhibit(_common(tests), figures, tables, files, parts)
+
+
+def _write_tables(
+    outcome: CylinderOutcome, tests: Sequence[CylinderTest], out: Output
+) -> list[Shown]:
+    curves = [outcome.curve(i) for i in range(len(outcome.runs))]
+    for run, curve in zip(outcome.runs, curves, strict=True):
+        curve.insert(0, "wall", run.wall)
+        curve.insert(0, "card", run.card)
+        curve.insert(0, "test", run.test.name)
+    _write(pd.concat(curves), out, CURVES)
+    what = "every curve: deflection, load, pressure, volume, wrinkled share"
+    files = [(out.name(CURVES), what)]
+    measured = measured_table(tests)
+    if len(measured):
+        _write(measured, out, MEASURED)
+        files.append((out.name(MEASURED), "mean and scatter of the repetitions on a grid"))
+    return files
+
+
+def _write(table: pd.DataFrame, out: Output, name: str) -> None:
+    with replacing(out.path(name)) as path:
+        table.to_csv(path, index=False)
+
+
+def _common(tests: Sequence[CylinderTest]) -> list[tuple[str, object]]:
+    """What all tests share, for the head of the page."""
+    facts: list[tuple[str, object]] = []
+    for label, values in (
+        ("length, mm", {t.length for t in tests}),
+        ("span, mm", {t.supports.span for t in tests}),
+        ("element size, mm", {t.size for t in tests}),
+        ("seam width, mm", {t.seam_width for t in tests}),
+    ):
+        if len(values) == 1:
+            facts.append((label, float(values.pop())))
+    return facts
+
+
+def _slopes(tests: Sequence[CylinderTest]) -> str:
+    over = sorted({round(t.reading.slope_over, 6) for t in tests})
+    if len(over) == 1:
+        return f"{over[0]:g} mm"
+    shares = {round(t.reading.slope_over / t.diameter, 9) for t in tests}
+    ends = f"{over[0]:g} to {over[-1]:g} mm"
+    return f"{shares.pop():g} diameters ({ends})" if len(shares) == 1 else ends
+
+
+def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
+    places, rows = place_names(tests), []
+    walls = ["wall"] if outcome.band else []
+    for i, run in enumerate(outcome.runs):
+        m = outcome.measures.get(i)
+        head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
+        tail: list[object] = [outcome.ended(i), ", ".join(marks(run.notes)) or None]
+        tail += [len(run.notes), round(run.record.seconds, 1)]
+        if m is None:
+            rows.append([*head, *[None] * (5 + len(places)), *tail])
+            continue
+        where = m.buckling
+        knee = " (knee)" if m.buckling_is == "knee" else ""
+        buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
+        wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
+        loads = [m.loads.get(place) for place in places]
+        strain, rise = f"{max(m.body_strain):.3f}", f"{m.pressure_rise:+.2f}"
+        stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
+        spread = outcome.sigma(i)
+        listed = [
+            None if load is None else load_words(load, spread.get(place))
+            for place, load in zip(places, loads, strict=True)
+        ]
+        rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
+    header = [
+        "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
+        *(f"load at {place}, N" for place in places),
+        "inflation strain", "pressure, kPa", "ended", "marked", "notes", "s",
+    ]  # fmt: skip
+    slopes = _slopes(tests)
+    note = (
+        f"Stiffness: to {slopes} of deflection. Buckles: the limit point where the load falls "
+        f"afterwards, else the knee, where the slope over {slopes} has fallen to half. Wrinkles: "
+        "more of the surface than when inflated. Inflation strain: the largest along warp or fill "
+        "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
+        " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
+    )
+    if outcome.spreads:
+        how = sorted({run.around.words for run in outcome.runs if run.around is not None})
+        note += (
+            " ±: one standard deviation of the load by what the card leaves open of its law "
+            f"({'; '.join(how)} around it), which is no part of the band of the walls."
+        )
+    note += "".join(f" {words.capitalize()}." for words in outcome.unsure)
+    note += "".join(f" {end.name.capitalize()}: {end.meaning}." for end in outcome.band)
+    named = range(1, header.index("stiffness, N/mm"))
+    text = (*named, header.index("ended"), header.index("marked"))
+    return Table("Runs", header, [_unbroken(row) for row in rows], note, text=text)
+
+
+def _errors(outcome: CylinderOutcome) -> list[Table]:
+    walls = ["wall"] if outcome.band else []
+    rows: list[list[object]] = [
+        [
+            outcome.runs[i].test.name, outcome.runs[i].card,
+            *(walls and [outcome.runs[i].wall]), m.error.rms,
+            percent(m.error.relative), f"{m.error.mean:+.1f}", m.error.compared, m.error.beyond,
+        ]
+        for i, m in outcome.measures.items()
+        if m.error is not None
+    ]  # fmt: skip
+    if not rows:
+        return []
+    shared = ["RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
+    header = ["test", "card", *walls, *shared]
+    note = "Model less reading at every reading that the model reaches; beyond: those it does not."
+    text = [_unbroken(row) for row in rows]
+    named = tuple(range(1, header.index("RMS, N")))
+    return [Table("Against measured loads", header, text, note, text=named)]
+
+
+def _unbroken(row: Sequence[object]) -> list[object]:
+    """The row with names and numbers that stay on one line."""
+    return [c.replace(" ", "\u00a0") if isinstance(c, str) and len(c) < SHORT else c for c in row]

@@ -1,0 +1,42 @@
+"""How a project says what a column of readings means, for every kind of test."""
+
+from __future__ import annotations
+
+from ..errors import InputError
+from ..readers.machine_tables import Channel
+from ..readers.registry import Content, format_named
+from ..readers.sections import Number, Section
+from .kinds import Place
+
+
+class ChannelSection(Section):
+    """How a column of a measured file is meant."""
+
+    column: str | None = None
+    unit: str | None = None
+    scale: Number | None = None
+    offset: Number = 0.0
+
+
+def channel_of(section: ChannelSection) -> Channel:
+    """The channel that a section describes."""
+    return Channel(**section.model_dump())
+
+
+def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
+    """The name, if there is such a format; None where the section leaves it to the files.
+
+    Parameters
+    ----------
+    field : dotted key of the name below the section.
+
+    Raises
+    ------
+    InputError : naming file and key. PlugInFailure : a reader of a plug-in that does not work.
+    """
+    if name is not None:
+        try:
+            format_named(content, name)
+        except InputError as error:
+            raise place.error(field, error.problem) from None
+    return name

@@ -1,0 +1,398 @@
+"""From a section of strips and its files to the strips of a test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...inference.comparison import NoiseIs
+from ...meshes.strip_models import WIDTH
+from ...readers.curves import DIRECTIONS, LoadCurve, read_load_curves, split_at_restarts
+from ...readers.frames import FrameSource
+from ...readers.polynomials import (
+    LoadPolynomial,
+    fit_load_polynomial,
+    read_published_polynomials,
+    specimen_scatter,
+)
+from ...readers.registry import format_of
+from ...readers.sections import beside
+from ...reading import is_file
+from ..keys import named_format
+from ..kinds import DataFile, Place
+from .polynomials import strain_regions
+from .section import CurvesSection, GaugeSection, StripsSection
+
+
+@dataclass(frozen=True)
+class ListedFile:
+    """A file that a section lists.
+
+    field : its key below the section. direction : the one it is listed for; None where the file
+    itself names it.
+    """
+
+    path: Path
+    field: str
+    direction: str | None = None
+
+
+def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
+    """The files of [strips.data], there or not, in the order of the section.
+
+    Raises
+    ------
+    InputError : none in any direction, one that is listed twice for the same.
+    """
+    if data.polynomials is not None:
+        return [ListedFile(folder / data.polynomials, "data.polynomials")]
+    field = "data.files"
+    by_direction: dict[str | None, list[str]] = {}
+    if isinstance(data.files, list):
+        by_direction[None] = data.files
+    elif data.files is not None:
+        by_direction = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
+    listed = []
+    for direction, names in by_direction.items():
+        key = field if direction is None else f"{field}.{direction}"
+        for i, name in enumerate(names):
+            if Path(name) in map(Path, names[:i]):
+                problem = f"{name!r} is listed twice; its points would count double"
+                raise place.error(f"{key}[{i}]", problem)
+            listed.append(ListedFile(folder / name, f"{key}[{i}]", direction))
+    if not listed:
+        problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
+        raise place.error(field, problem)
+    return listed
+
+
+def measured_curves(
+    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
+) -> dict[str, tuple[LoadCurve, ...]]:
+    """The specimens' curves by direction, in the order of `DIRECTIONS`; only those there are.
+
+    A file with one curve in a direction perhaps lists several specimens, one after the other and
+    not named: it is split where the elongation starts again. width : of the strips, mm.
+
+    Raises
+    ------
+    InputError : naming the data file and line: see `read_load_curves`; naming the project and
+        key: one curve listed for two directions.
+    """
+    format = named_format(place, "data.format", "machine table", data.format)
+    columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
+    by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
+    first: dict[Path, LoadCurve] = {}
+    for file in listed:
+        curves = read_load_curves(
+            file.path,
+            columns=columns or None,
+            load_unit=data.load_unit,
+            length_unit=data.length_unit,
+            width=width,
+            comment=data.comment,
+            direction=file.direction,
+            decimal=data.decimal,
+            format=format,
+        )
+        before = first.setdefault(file.path, curves[0])
+        if before.direction != curves[0].direction and _same(before, curves[0]):
+            problem = f"is listed for {before.direction} too, and does not tell the two apart"
+            raise place.error(file.field, problem)
+        for direction in DIRECTIONS:
+            own = [curve for curve in curves if curve.direction == direction]
+            if len(own) == 1:
+                parts = split_at_restarts(own[0])
+                own = list(parts) if len(parts) > 1 else own
+            by_direction[direction] += own
+    return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
+
+
+def _same(one: LoadCurve, other: LoadCurve) -> bool:
+    return np.array_equal(one.elongation, other.elongation) and np.array_equal(one.load, other.load)
+
+
+Array = NDArray[np.float64]
+
+#: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
+#: load cell is of accuracy class 0.5 %.
+LOAD_CELL = 0.005
+#: Why points are not matched.
+BELOW, BEYOND = "elongation below zero", "beyond the final length"
+PLACES = 200  # at which a polynomial is asked for its regions
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """One direction. Lengths mm, loads N.
+
+    Parameters
+    ----------
+    direction : warp, fill or bias.
+    gauge_length, final_length : of the virtual strain gauge, at rest and at the end.
+    polynomial : the load curve, given or fitted to the curves; None where a forward analysis does
+        without data.
+    curves : the specimens' points, empty where only the polynomial is given.
+    scatter : standard deviation of the points about the polynomial; None where not known.
+    through_origin : whether a polynomial through the points starts in the origin.
+    open_end : nobody said the final length: it is where the points end.
+    published : the file of a polynomial that was given, None of one fitted to points.
+    """
+
+    direction: str
+    gauge_length: float
+    final_length: float
+    polynomial: LoadPolynomial | None = None
+    curves: tuple[LoadCurve, ...] = ()
+    scatter: float | None = None
+    through_origin: bool = True
+    open_end: bool = False
+    published: Path | None = None
+
+    @property
+    def elongation(self) -> float:
+        """Of the gauge at the end, mm."""
+        return self.final_length - self.gauge_length
+
+    @property
+    def strain(self) -> float:
+        """Logarithmic strain of the gauge at the end."""
+        return float(np.log1p(self.elongation / self.gauge_length))
+
+    def strain_by(self, mask: NDArray[np.bool_] | None) -> float:
+        """The same by the points of a mask, which alone say where the end is if nobody else did."""
+        end = self._end_of(mask) if self.open_end else self.elongation
+        return float(np.log1p(end / self.gauge_length))
+
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Elongation and load of all specimens up to the end of the model, by elongation."""
+        elongation, load, _ = self._inside
+        return elongation, load
+
+    @property
+    def specimen_of(self) -> NDArray[np.intp]:
+        """Number of the specimen of each of the `points`."""
+        return self._inside[2]
+
+    @property
+    def beyond(self) -> int:
+        """Number of measured points that are not among the `points`."""
+        return sum(len(c.load) for c in self.curves) - len(self.points[0])
+
+    def noise(self, largest: float, given: float | None = None) -> tuple[float, NoiseIs]:
+        """Least noise of a load to reckon with, N, and what it is.
+
+        largest : load measured. given : what the project says of it.
+        """
+        if given is not None:
+            return given, "given"
+        if self.scatter is not None:
+            return self.scatter, "specimens' scatter"
+        return LOAD_CELL * largest, "assumed"
+
+    def data_files(self, points: bool) -> list[DataFile]:
+        """The files of the load curve; points : whether those up to the end alone count."""
+        if self.published is not None:
+            name = format_of("load polynomials", self.published).name
+            return [DataFile(self.published, FrameSource(name), 1)]
+        end = self.elongation * (1 + 1e-9)
+        files = []
+        for curve in self.curves:
+            if curve.path is None:
+                continue
+            below, beyond = int((curve.elongation < 0).sum()), int((curve.elongation > end).sum())
+            dropped = {BELOW: below, BEYOND: beyond} if points else {}
+            used = len(curve.load) - sum(dropped.values())
+            files.append(DataFile(curve.path, curve.source or FrameSource(), used, dropped))
+        return files
+
+    def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
+        """Two shares of the gauge's strain between which three lines follow the load curve best.
+
+        mask : of the points, which the curve is to follow; all unless given.
+
+        Raises
+        ------
+        InputError : the points matched settle no polynomial.
+        """
+        polynomial = self.polynomial
+        if polynomial is None:
+            return None
+        if mask is not None and self.curves:
+            elongation, load = self.points
+            order = polynomial.order
+            polynomial = fit_load_polynomial(
+                elongation[mask], load[mask], order, self.through_origin
+            )
+        u = np.linspace(0.0, self._end_of(mask), PLACES)[1:]
+        strain, whole = np.log1p(u / self.gauge_length), self.strain_by(mask)
+        first, second = strain_regions(strain, polynomial(u))
+        return float(first / whole), float(second / whole)
+
+    def _end_of(self, mask: NDArray[np.bool_] | None) -> float:
+        """How far (mm) the points of a mask go, at most to the end of the gauge."""
+        if mask is None or not self.curves:
+            return self.elongation
+        return min(self.elongation, float(self.points[0][mask].max()))
+
+    @cached_property
+    def _inside(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        if not self.curves:
+            return np.empty(0), np.empty(0), np.empty(0, np.intp)
+        elongation = np.concatenate([c.elongation for c in self.curves])
+        load = np.concatenate([c.load for c in self.curves])
+        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
+        end = self.elongation * (1 + 1e-9)
+        order = np.argsort(elongation, kind="stable")
+        order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
+        return elongation[order], load[order], whose[order].astype(np.intp)
+
+
+#: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
+#: breaks between two readings.
+EXTRAPOLATED = 0.05
+
+
+def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
+    """The strips of a section, by direction: those whose table or whose data are there.
+
+    Files that are not there are done without where the place needs none and all lengths are given.
+
+    Raises
+    ------
+    InputError : naming the project and the key, or the data file: no data, no gauge length, a
+        final length that is not longer or beyond the data, points that settle no polynomial.
+    """
+    data = section.data
+    if (data.polynomials is None) == (data.files is None):
+        problem = "expected exactly one of 'polynomials' and 'files'"
+        raise place.error("data", problem)
+    folder = place.data_folder
+    if folder is None:
+        folder = beside(place.path.parent, data.folder)
+    tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
+    listed = listed_files(place, data, folder)
+    missing = next((file for file in listed if not is_file(file.path)), None)
+    if missing is not None:
+        if place.need_data or not _complete(tables):
+            problem = f"there is no file {missing.path}; --data DIR names another folder"
+            raise place.error(missing.field, problem)
+        length = place.scales.length
+        return {
+            d: _strip(place, d, t.gauge_length * length, t.final_length * length)
+            for d, t in tables.items()
+        }
+    if data.polynomials is not None:
+        strips = _published(place, data, tables, listed[0])
+    else:
+        width = WIDTH if section.width is None else section.width * place.scales.length
+        strips = _measured(place, data, tables, listed, width)
+    if not strips:
+        problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
+        raise place.error("data", problem)
+    for direction in tables:
+        if direction not in strips:
+            problem = f"the data hold no {direction} test; leave this section out or add its data"
+            raise place.error(direction, problem)
+    return strips
+
+
+def _complete(tables: Mapping[str, GaugeSection]) -> bool:
+    lengths = [(t.gauge_length, t.final_length) for t in tables.values()]
+    return bool(lengths) and all(a is not None and b is not None for a, b in lengths)
+
+
+def _published(
+    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
+) -> dict[str, Strip]:
+    format = named_format(place, "data.format", "load polynomials", data.format)
+    curves, length = read_published_polynomials(file.path, format), place.scales.length
+    wanted = [d for d in DIRECTIONS if d in curves and (d in tables or not tables)]
+    strips = {}
+    for direction in wanted:
+        curve, own = curves[direction], tables.get(direction) or GaugeSection()
+        start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
+        end = curve.final_length if own.final_length is None else own.final_length * length
+        scatter = None if np.isnan(curve.scatter) else curve.scatter
+        strips[direction] = _strip(
+            place,
+            direction,
+            start,
+            end,
+            polynomial=curve.polynomial,
+            scatter=scatter,
+            published=file.path,
+        )
+    return strips
+
+
+def _measured(
+    place: Place,
+    data: CurvesSection,
+    tables: Mapping[str, GaugeSection],
+    listed: Sequence[ListedFile],
+    width: float,
+) -> dict[str, Strip]:
+    said = {file.direction for file in listed}
+    strips = {}
+    for direction, curves in measured_curves(place, data, listed, width).items():
+        # A table picks among what a file holds; a file listed for a direction is meant.
+        if tables and direction not in tables and direction not in said:
+            continue
+        own = tables.get(direction) or GaugeSection()
+        if own.gauge_length is None:
+            problem = "this key is missing; the strain follows from it"
+            raise place.error(f"{direction}.gauge_length", problem)
+        start = own.gauge_length * place.scales.length
+        elongation = np.concatenate([c.elongation for c in curves])
+        load = np.concatenate([c.load for c in curves])
+        try:
+            polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+            scatter = specimen_scatter(curves, polynomial).deviation
+        except InputError as error:
+            problem = f"no load curve through the {direction} points: {error.problem}"
+            raise place.error(f"data, {error.field}", problem) from None
+        end = start + polynomial.end
+        if own.final_length is not None:
+            end = own.final_length * place.scales.length
+        strips[direction] = _strip(
+            place,
+            direction,
+            start,
+            end,
+            polynomial=polynomial,
+            curves=curves,
+            scatter=scatter,
+            through_origin=data.through_origin,
+            open_end=own.final_length is None,
+        )
+    return strips
+
+
+def _strip(
+    place: Place,
+    direction: str,
+    start: float,
+    end: float,
+    polynomial: LoadPolynomial | None = None,
+    **data: Any,
+) -> Strip:
+    field = f"{direction}.final_length"
+    if not end > start:
+        problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"
+        raise place.error(field, problem)
+    if polynomial is not None and end - start > polynomial.end * (1 + EXTRAPOLATED):
+        problem = (
+            f"the data end at an elongation of {polynomial.end:.5g} mm; expected up to"
+            f" {start + polynomial.end:.5g} mm, got {end:g} mm"
+        )
+        raise place.error(field, problem)
+    return Strip(direction, start, end, polynomial, **data)

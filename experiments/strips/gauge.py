@@ -1,0 +1,525 @@
+"""The virtual strain gauge: two points followed on a specimen's surface (thesis section 3.2)."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError
+from ...notes import Note, NoteKind, as_note, rows
+from ...readers.curves import LoadCurve, direction_named
+from ...readers.frames import Frame
+from ...readers.machine_tables import read_machine_loads, read_times
+from ...writing import replacing
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from scipy.spatial import Delaunay
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The correlated points of a frame, triangulated by their reference x and y.
+
+    mesh : Delaunay triangles. places : (points, 2, 3) mm, before and after.
+    """
+
+    mesh: Delaunay
+    places: Array
+
+    def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
+        """Longest edge (triangles,) mm in the reference x and y."""
+        corners = self.places[self.mesh.simplices[triangles], 0, :2]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        return np.asarray(edges.max(axis=1))
+
+
+def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
+    """The surface of a frame; None where fewer than three points, or a line, were correlated.
+
+    before : a surface whose triangles are taken where the reference points are the same: most
+        exports have the same points in every frame, and triangulating is what costs.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    places = np.stack([frame.points, frame.points + frame.displacement], axis=1)
+    places = places[np.isfinite(places).all(axis=(1, 2))]
+    if len(places) < 3:
+        return None
+    if before is not None and np.array_equal(places[:, 0, :2], before.places[:, 0, :2]):
+        return Surface(before.mesh, places)
+    try:
+        return Surface(Delaunay(places[:, 0, :2]), places)
+    except QhullError:  # all on one line
+        return None
+
+
+def usual_edge(surface: Surface) -> float:
+    """Median over the triangles of their longest edge, mm."""
+    return float(np.median(surface.longest_edge()))
+
+
+def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
+    """Place (2, 3) mm before and after of the point (2,), or why there is none.
+
+    limit : mm; a triangle with a longer edge spans a hole.
+    """
+    if surface is None:
+        return "no three correlated points that span a surface"
+    triangle, weights = _triangle_around(end, surface)
+    if triangle < 0:
+        return "outside the correlated points"
+    widest = float(surface.longest_edge(np.array([triangle]))[0])
+    if widest > limit:
+        return f"the points around it are {widest:.3g} mm apart, allowed {limit:.3g}"
+    corners = surface.places[surface.mesh.simplices[triangle]]
+    return np.asarray(np.einsum("i,ijk->jk", weights, corners))
+
+
+def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
+    """The triangle that holds a point (2,), -1 for none, and the weights (3,) of its corners.
+
+    By hand: Delaunay.find_simplex first inverts a matrix for every triangle, which costs more
+    than triangulating.
+    """
+    x, y = np.moveaxis(surface.places[surface.mesh.simplices, 0, :2] - end, -1, 0)
+    # Twice the areas that the point makes with the sides opposite to each corner.
+    areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
+    whole = areas.sum(axis=1, keepdims=True)
+    weights = np.divide(areas, whole, out=np.full_like(areas, -1.0), where=whole != 0)
+    best = int(np.argmax(weights.min(axis=1)))
+    return (best if weights[best].min() >= -1e-9 else -1), weights[best]
+
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeRecord:
+    """A virtual strain gauge through n frames; NaN in the frames where it was lost.
+
+    Parameters
+    ----------
+    reference_length : mm, between the two reference places, by x, y and z.
+    length : (n,) mm, by x, y and z.
+    elongation : (n,) mm, length - reference length.
+    strain : (n,) engineering, elongation / reference length.
+    log_strain : (n,) ln(length / reference length).
+    lost : indices of the frames where an end had no correlated surface around it.
+    warnings : one line for each end of the gauge that was lost: in which frames, why, what to do.
+    """
+
+    reference_length: float
+    length: Array
+    elongation: Array
+    strain: Array
+    log_strain: Array
+    lost: tuple[int, ...]
+    warnings: tuple[Note, ...]
+
+
+def virtual_strain_gauge(
+    frames: Sequence[Frame],
+    lower: ArrayLike,
+    upper: ArrayLike,
+    max_gap: float = 1.35,
+) -> GaugeRecord:
+    """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
+
+    An end is lost in a frame where it lies outside the triangulated points, or in a triangle with
+    an edge longer than `max_gap` times the usual longest edge: there the points between are
+    missing, and a value would be interpolated over a hole.
+
+    Parameters
+    ----------
+    frames : in the order of the test; each with its own points, not necessarily the same.
+    lower, upper : (2,) mm, x and y of the ends in the reference state.
+    max_gap : 1.35 finds one missing point of a square grid (there the ratio is 1.41). Points
+        scattered at random need about 2.5.
+
+    Raises
+    ------
+    InputError : no frames, ends that are no points or coincide, an end lost in every frame,
+        a gauge within one triangle of points, a gap that is no number.
+    """
+    if not np.isfinite(max_gap):
+        raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
+    ends = [_end(lower, "lower"), _end(upper, "upper")]
+    if not frames:
+        raise InputError(None, "frames", "expected at least one, got none")
+    if np.array_equal(ends[0], ends[1]):
+        raise InputError(None, "gauge", "lower and upper are the same point; expected two")
+    seen: list[Surface | None] = []
+    whole: Surface | None = None
+    for frame in frames:
+        seen.append(triangulated(frame, whole))
+        whole = seen[-1] or whole
+    spacing = [usual_edge(surface) for surface in seen if surface is not None]
+    usual = float(np.median(spacing)) if spacing else 0.0
+    apart = float(np.linalg.norm(ends[1] - ends[0]))
+    if apart < usual:
+        problem = (
+            f"the ends are {apart:.4g} mm apart, the points {usual:.4g} mm: a gauge must span"
+            " several points; is the length unit right?"
+        )
+        raise InputError(frames[0].path, "gauge", problem)
+    limit = max_gap * usual
+    places = [[place_of(end, surface, limit) for surface in seen] for end in ends]
+    warnings = []
+    for name, end, per_frame in zip(("lower", "upper"), ends, places, strict=True):
+        why = {i: place for i, place in enumerate(per_frame) if isinstance(place, str)}
+        if not why:
+            continue
+        at = f"{name} end of the gauge at ({end[0]:g}, {end[1]:g}) mm"
+        first = next(iter(why.values()))
+        if len(why) == len(frames):
+            problem = f"lost in every frame ({first}); move it onto the correlated surface"
+            raise InputError(frames[0].path, at, problem)
+        which = ", ".join(map(str, why))
+        words = (
+            f"{at}: correlation lost in {len(why)} of {len(frames)} frames ({which}): {first};"
+            " these give no length. Move the gauge to keep them"
+        )
+        warnings.append(Note(NoteKind.LOST, words))
+    return _record(places[0], places[1], tuple(warnings))
+
+
+def _record(lower: Sequence, upper: Sequence, warnings: tuple[Note, ...]) -> GaugeRecord:
+    pairs = [
+        None if isinstance(a, str) or isinstance(b, str) else b - a
+        for a, b in zip(lower, upper, strict=True)
+    ]
+    whole = next((pair for pair in pairs if pair is not None), None)
+    if whole is None:
+        problem = "no frame shows both ends; move the gauge onto the correlated surface"
+        raise InputError(None, "gauge", problem)
+    # Row 0: the line between the reference places; row 1: between the places in the frame.
+    reference = float(np.linalg.norm(whole[0]))
+    length = np.array([np.nan if pair is None else np.linalg.norm(pair[1]) for pair in pairs])
+    if not length[np.isfinite(length)].all():
+        raise InputError(None, "gauge", "the two ends meet in a frame; are the columns right?")
+    lost = tuple(i for i, pair in enumerate(pairs) if pair is None)
+    return GaugeRecord(
+        reference,
+        length,
+        length - reference,
+        (length - reference) / reference,
+        np.log(length / reference),
+        lost,
+        warnings,
+    )
+
+
+def _end(point: ArrayLike, name: str) -> Array:
+    end = np.asarray(point, dtype=float)
+    if end.shape != (2,) or not np.isfinite(end).all():
+        raise InputError(None, name, f"expected x and y in mm, got {point!r}")
+    return end
+
+
+def gauge_load_curve(
+    record: GaugeRecord,
+    loads: ArrayLike,
+    *,
+    direction: str,
+    specimen: str,
+    frame_times: ArrayLike | None = None,
+    load_times: ArrayLike | None = None,
+    path: Path | None = None,
+) -> LoadCurve:
+    """The machine's load against the gauge's elongation; lost frames are left out.
+
+    Without times, one load a frame. With times, the load is interpolated at the frames' times;
+    frames before the first or after the last load are left out, which is logged.
+
+    Parameters
+    ----------
+    loads : (n,) or, with times, (k,) N.
+    direction, specimen, path : of the curve; the direction by any of its names.
+    frame_times, load_times : (n,) and (k,) on the same clock and in the same unit; the latter
+        rising.
+
+    Raises
+    ------
+    InputError : counts that do not agree, times that do not rise, numbers that are not finite,
+        fewer than two frames left.
+    """
+    way = direction_named(direction)
+    load, count = np.asarray(loads, dtype=float), len(record.length)
+    if not np.isfinite(load).all():
+        raise InputError(path, "loads", "expected finite numbers; leave out rows without a load")
+    if (frame_times is None) != (load_times is None):
+        problem = "expected both frame_times and load_times, or neither"
+        raise InputError(path, "times", problem)
+    inside = np.ones(count, dtype=bool)
+    if frame_times is None or load_times is None:
+        if load.shape != (count,):
+            problem = f"expected one load a frame, got {load.size} for {count} frames; pair by time"
+            raise InputError(path, "loads", problem)
+    else:
+        load, inside = _at_times(load, np.asarray(frame_times), np.asarray(load_times), count, path)
+    early = int((~inside).sum())
+    if early:
+        which = ", ".join(map(str, np.flatnonzero(~inside)))
+        problem = "%s: %d of %d frames have no load at their time: %s"
+        log.warning(problem, specimen, early, count, which)
+    kept = inside & np.isfinite(record.elongation)
+    if kept.sum() < 2:
+        problem = f"only {kept.sum()} of {count} frames have both length and load; expected two"
+        raise InputError(path, f"specimen {specimen!r}", problem)
+    times = None if frame_times is None else np.asarray(frame_times, dtype=float)[kept]
+    frame = np.flatnonzero(kept)
+    return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times, frame)
+
+
+def _at_times(
+    load: Array, frame_times: Array, load_times: Array, count: int, path: Path | None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Loads (n,) at the frames' times, and which of them lie within the record."""
+    pairs = (("frame_times", frame_times, count), ("load_times", load_times, load.size))
+    for name, times, expected in pairs:
+        if times.shape != (expected,) or not np.isfinite(times).all():
+            problem = f"expected {expected} finite numbers, got {times.size}"
+            raise InputError(path, name, problem)
+    if load.size < 2 or (np.diff(load_times) <= 0).any():
+        raise InputError(path, "load_times", "expected two or more, each later than the one before")
+    inside = (frame_times >= load_times[0]) & (frame_times <= load_times[-1])
+    return np.interp(frame_times, load_times, load), inside
+
+
+@dataclass(frozen=True)
+class PairedLoads:
+    """A machine's loads, and how they belong to the frames of a gauge.
+
+    Parameters
+    ----------
+    path : the machine's export.
+    direction, specimen : of the strip; the direction by any of its names.
+    load_column, time_column : names in the export, where they are not found by themselves.
+    load_unit : N or kN, where the export names none.
+    decimal : the mark in the export and in the table of times, where it is not clear.
+    format : of the export, found by its content unless given.
+    frame_times : a table of the frames' times: pairs the loads by time. frame_time_column : name
+        of its column.
+    frame_interval : s between frames, the first at 0: pairs the loads by time too.
+    time_offset : s, the machine's clock less the frames'.
+
+    Raises
+    ------
+    InputError : naming what is out of range, contradicts another, or would have no effect.
+    """
+
+    path: Path
+    direction: str
+    specimen: str
+    load_column: str | None = None
+    load_unit: Literal["N", "kN"] | None = None
+    decimal: Literal[".", ","] | None = None
+    format: str | None = None
+    frame_times: Path | None = None
+    frame_time_column: str | None = None
+    frame_interval: float | None = None
+    time_column: str | None = None
+    time_offset: float | None = None
+
+    def __post_init__(self) -> None:
+        direction_named(self.direction)
+        if self.frame_times is not None and self.frame_interval is not None:
+            raise InputError(None, "frame_times, frame_interval", "give one of them, not both")
+        if not self.timed:
+            self._refuse("time_column", "time_offset", needs="frame_times or frame_interval")
+        if self.frame_times is None:
+            self._refuse("frame_time_column", needs="frame_times")
+        for name in ("frame_interval", "time_offset"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise InputError(None, name, f"expected a finite number, got {value:g}")
+        if not (self.specimen.strip() and self.specimen.isprintable()):
+            problem = f"expected a name on one line, got {self.specimen!r}"
+            raise InputError(None, "specimen", problem)
+
+    @property
+    def timed(self) -> bool:
+        """Whether loads and frames are paired by time."""
+        return self.frame_times is not None or self.frame_interval is not None
+
+    def _refuse(self, *useless: str, needs: str) -> None:
+        for name in useless:
+            if getattr(self, name) is not None:
+                raise InputError(None, name, f"means nothing without {needs}")
+
+
+def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
+    """The load curve of a gauge.
+
+    Raises
+    ------
+    InputError : naming the file of loads or of times; counts that do not agree.
+    """
+    count, times = len(record.length), None
+    if loads.frame_interval is not None:
+        times = loads.frame_interval * np.arange(count)
+    if loads.frame_times is not None:
+        with _naming("frame_time_column"):
+            times = read_times(loads.frame_times, loads.frame_time_column, decimal=loads.decimal)
+        if len(times) != count:
+            problem = f"expected one time for each of the {count} frames, got {len(times)}"
+            raise InputError(loads.frame_times, "", problem)
+    named = {"load": loads.load_column, "time": loads.time_column}
+    with _naming("load_column, time_column" if loads.timed else "load_column"):
+        machine = read_machine_loads(
+            loads.path,
+            columns={quantity: column for quantity, column in named.items() if column is not None},
+            timed=loads.timed,
+            load_unit=loads.load_unit,
+            decimal=loads.decimal,
+            format=loads.format,
+        )
+    if not loads.timed and len(machine.load) != count:
+        problem = (
+            f"expected one load for each of the {count} frames, got {len(machine.load)};"
+            " frame_times or frame_interval pair by time"
+        )
+        raise InputError(loads.path, "", problem)
+    return gauge_load_curve(
+        record,
+        machine.load,
+        direction=loads.direction,
+        specimen=loads.specimen.strip(),
+        frame_times=None if times is None else times + (loads.time_offset or 0.0),
+        load_times=machine.time,
+        path=loads.path,
+    )
+
+
+@contextmanager
+def _naming(fields: str) -> Iterator[None]:
+    """Readers ask for their argument `columns`, which is called otherwise here."""
+    try:
+        yield
+    except InputError as error:
+        problem = error.problem.replace("with columns", f"with {fields}")
+        raise InputError(error.path, error.field, problem) from None
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeTable:
+    """A gauge through the frames of a test, with the machine's loads where there are any.
+
+    Parameters
+    ----------
+    files : names of the frames, one each.
+    lower, upper : (x, y) mm of the ends in the reference state.
+    record : of the gauge.
+    curve : its loads; frames where correlation was lost, or without a load, are not in it.
+    note : what looks unmeant in the order of the frames.
+    """
+
+    files: Sequence[str]
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    record: GaugeRecord
+    curve: LoadCurve | None = None
+    note: str | None = None
+
+    @property
+    def notes(self) -> list[Note]:
+        """Lost ends of the gauge, the order of the frames, frames that have no load."""
+        notes = [*self.record.warnings, *([as_note(self.note)] if self.note else [])]
+        if without := self.without_load:
+            words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
+            words += f"are left out: {', '.join(without)}"
+            notes.append(Note(NoteKind.NO_LOAD, words))
+        return notes
+
+    @property
+    def without_load(self) -> list[str]:
+        """Files of the frames that the load curve leaves out, though the gauge has a length."""
+        if self.curve is None:
+            return []
+        seen = np.flatnonzero(np.isfinite(self.record.length))
+        return [self.files[i] for i in sorted({*seen.tolist()} - {*self._used().tolist()})]
+
+    def frame(self) -> pd.DataFrame:
+        """A row a frame, NaN where the gauge was lost; with loads only the frames of the curve."""
+        import pandas as pd
+
+        record, curve = self.record, self.curve
+        rows = np.arange(len(self.files)) if curve is None else self._used()
+        table = pd.DataFrame(
+            {
+                "frame": rows,
+                "file": [self.files[i] for i in rows],
+                "length_mm": record.length[rows],
+                "elongation_mm": record.elongation[rows],
+                "strain": record.strain[rows],
+                "log_strain": record.log_strain[rows],
+            }
+        )
+        if curve is not None:
+            table["load_N"] = curve.load
+            table["specimen"], table["direction"] = curve.specimen, curve.direction
+        return table
+
+    def write(self, path: Path | str) -> None:
+        """Write the table with its notes; with loads, strips of a project read it as a curve.
+
+        Raises
+        ------
+        OutputError : it cannot be written; what was there is still there.
+        """
+        ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
+        about = (
+            f"# virtual strain gauge between {ends[0]} and {ends[1]} mm,"
+            f" {self.record.reference_length:.6g} mm long in the reference state\n"
+        )
+        # A line each, whatever the names of the files hold.
+        about += "".join(f"# note: {' '.join(note.split())}\n" for note in self.notes)
+        with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
+            stream.write(about)
+            self.frame().to_csv(stream, index=False, lineterminator="\n")
+
+    def numbers(self) -> dict[str, Any]:
+        """The outcome as plain data; frames by the names of their files."""
+        record, curve = self.record, self.curve
+        seen = np.flatnonzero(np.isfinite(record.length))
+        last = seen[np.argmax(record.length[seen])]
+        numbers: dict[str, Any] = {
+            "gauge_length_mm": record.reference_length,
+            "longest": {
+                "file": self.files[last],
+                "length_mm": float(record.length[last]),
+                "elongation_mm": float(record.elongation[last]),
+                "strain": float(record.strain[last]),
+                "log_strain": float(record.log_strain[last]),
+            },
+            "frames": len(self.files),
+            "lost": [self.files[i] for i in record.lost],
+            "warnings": [note.line for note in self.notes],
+            "notes": rows(self.notes),
+        }
+        if curve is not None:
+            numbers |= {
+                "direction": curve.direction,
+                "specimen": curve.specimen,
+                "points": len(curve.load),
+                "largest_load_N": float(curve.load.max()),
+                "without_load": self.without_load,
+            }
+        return numbers
+
+    def _used(self) -> NDArray[np.intp]:
+        """The frames (points,) of the curve."""
+        if self.curve is None or self.curve.frame is None:
+            return np.flatnonzero(np.isfinite(self.record.length))
+        return self.curve.frame

@@ -1,0 +1,337 @@
+"""How good a fit is: moduli against a known solution, and what the data could not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.forms.base import COMPONENTS, modulus_rows
+from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind
+from .discretisation import Limit
+from .linear import LEFT, POINTS, PRIOR, Order, Second, along, moduli_of, posteriors_of, sizes_of
+from .misfit import Discrepancy, differences_of_all, discrepancies, notes_of_discrepancies
+from .noise import Noise
+from .posterior import Posterior, bands_of
+from .problem import Evaluation, FitProblem
+
+Array = NDArray[np.float64]
+
+#: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
+UNCERTAIN = 0.25
+ON_BOUND = 1e-6
+
+
+def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
+    """Largest relative error of each modulus up to the strains reached (3,)."""
+    errors = {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, reached[component], POINTS)
+        errors[name] = float(
+            np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
+        )
+    return errors
+
+
+@dataclass(frozen=True, eq=False)
+class Certainty:
+    """How sure each modulus is up to the strains reached, and plain words.
+
+    noise : by comparison, in the unit of its data (mm, N); alike : by comparison, how many
+    neighbouring values err as one. strain, sigma : (n,) by modulus, 1 sigma by noise, relative.
+    undetermined : what the data do not determine, and what lies on its bound. mesh : (n,) by
+    modulus, by how much it would be another on ever finer meshes, relative, than on that of the
+    fit; None where that is not known. posterior : of all unknowns, from the noise alone. fine : of
+    those of ever finer meshes, with what may be left of their error; None as `mesh`. rows : (m,)
+    of each residual the noise that as many independent ones would have. band : (2, n) MPa by
+    modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
+    whether the law reported is that of ever finer meshes. discrepancy : by comparison, what of a
+    sheet's residual is too smooth for noise, or of strips' alike in all specimens. second : what it
+    was computed with beside the first derivatives, None where it is of first order. order : what
+    was found of that; None where nobody looked, because little more than noise is left.
+    """
+
+    noise: dict[str, float]
+    strain: dict[str, Array]
+    sigma: dict[str, Array]
+    undetermined: tuple[Note, ...]
+    mesh: dict[str, Array] | None = None
+    alike: dict[str, float] = field(default_factory=dict)
+    posterior: Posterior | None = None
+    fine: Posterior | None = None
+    rows: Array | None = None
+    band: dict[str, Array] = field(default_factory=dict)
+    taken_out: bool = False
+    discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
+    second: Second | None = None
+    order: Order | None = None
+
+    @property
+    def reported(self) -> Posterior | None:
+        """Of the law that is reported: of ever finer meshes where their error is taken out."""
+        return self.fine if self.taken_out else self.posterior
+
+    @property
+    def total(self) -> dict[str, Array]:
+        """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma.
+
+        Of a mesh whose error is taken out, what may be left of it.
+        """
+        if self.mesh is None:
+            return dict(self.sigma)
+        share = LEFT if self.taken_out else 1.0
+        return {
+            name: np.hypot(sigma, share * self.mesh[name]) for name, sigma in self.sigma.items()
+        }
+
+    def laws(
+        self, law: HypoelasticLaw, count: int, random: np.random.Generator
+    ) -> list[HypoelasticLaw]:
+        """`count` laws as data and mesh leave them: `law` with other numbers, within its bounds.
+
+        Raises
+        ------
+        ValueError : the posterior is not there (a certainty made by hand).
+        """
+        known = self.fine or self.posterior
+        if known is None:
+            raise ValueError("this certainty has no posterior to draw laws from")
+        return known.laws(law, count, random)
+
+
+def certainty(
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    limit: Limit | None = None,
+    second: Second | None = None,
+) -> Certainty:
+    """Linear propagation of the noise of every comparison to the moduli.
+
+    Parameters
+    ----------
+    law : that is reported. limit : of ever finer models, where it is known: what it leaves counts
+        as noise (see `Noise.of`), else what the best fit leaves. second : what is of second
+        order (see `Linear.of`).
+    """
+    noise = Noise.of(problem, best.residual if limit is None else limit.residual)
+    posterior, fine = posteriors_of(problem, best, noise, limit, second)
+    strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
+    first = problem.comparisons[0]
+    which = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
+    if len(problem.comparisons) > 1:
+        which = "with the tests' noise"
+    words = [
+        Note(
+            NoteKind.UNCERTAIN,
+            f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
+            f"worst at strain {strains[name][relative.argmax()]:.3f}",
+        )
+        for name, relative in sigmas.items()
+        if relative.max() > UNCERTAIN
+    ]
+    left = best.residual if limit is None else limit.residual
+    wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
+    wrong |= differences_of_all(problem, left, best.jacobian)
+    told = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
+    mesh = None
+    if limit is not None:
+        moduli = moduli_of(problem.unknowns, best.unknowns, strains)
+        there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
+        mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
+    return Certainty(
+        noise.level,
+        strains,
+        sigmas,
+        told,
+        mesh,
+        noise.alike,
+        posterior,
+        fine,
+        noise.rows,
+        bands_of(fine or posterior, law, strains),
+        discrepancy=wrong,
+        second=second,
+    )
+
+
+def pinned_by(
+    problem: FitProblem,
+    best: Evaluation,
+    law: HypoelasticLaw,
+    reached: Array,
+    numbers: Sequence[int],
+    noise: Array,
+) -> dict[str, Array]:
+    """1-sigma relative uncertainty of each modulus from some comparisons alone, by their numbers.
+
+    The best estimate that those would allow (weights do not count), beside hardly any knowledge
+    before: each modulus at its control strains to 1000 % of its own size, and each nuisance to
+    its prior, or to ten times the width of its bounds. noise : (m,) of each residual, as
+    `Certainty.rows` has it.
+    """
+    assert best.jacobian is not None
+    rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
+    j = best.jacobian[rows] / noise[rows, None]
+    before = PRIOR * sizes_of(problem.unknowns, best.unknowns)
+    for k, nuisance in enumerate(problem.unknowns.nuisance.all, start=problem.unknowns.size):
+        if nuisance.prior is not None:
+            before[k] = nuisance.prior
+    covariance = np.linalg.inv(j.T @ j + np.diag(before**-2.0))
+    return along(problem.unknowns, law, reached, covariance)[1]
+
+
+def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
+    """Moduli on their margins or bounds, coefficients and nuisance on theirs."""
+    p, notes = problem.unknowns, []
+    for name, rows in p.moduli.items():
+        moduli, least = rows @ best.coefficients, p.bounds.least[name]
+        if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
+            words = f"{name} touches its positivity margin: the data ask for less stiffness"
+            notes.append(Note(NoteKind.MARGIN, words))
+        if p.bounds.largest is not None:
+            most = p.bounds.largest[name]
+            if (most - moduli <= ON_BOUND * most).any():
+                words = f"{name} touches its upper bound: the data ask for more stiffness"
+                notes.append(Note(NoteKind.BOUND, words))
+    if p.bounds.largest is None:
+        notes += _on_bounds(p.labels, best.coefficients, *p.box)
+    return notes + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
+
+
+def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
+    width = upper - lower
+    low = values - lower <= ON_BOUND * width
+    high = upper - values <= ON_BOUND * width
+    return [
+        Note(NoteKind.BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
+        for i in np.flatnonzero(low | high).tolist()
+    ]
+
+
+#: Of the width of the bounds: as uncertain as a number that may be anywhere between them.
+ANYWHERE = 12**-0.5
+#: Of a prior: the data add next to nothing to it.
+AS_BEFORE = 0.9
+#: Correlations that are worth saying.
+CORRELATED = 0.5
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One unknown beside the moduli.
+
+    Parameters
+    ----------
+    name : with its comparison where it is of one among several. value, sigma, lower, upper, prior :
+        in `unit`; prior None where nothing was known of it.
+    correlation : with each modulus in the middle of its strains, -1 to 1.
+    shared : whether it is one for all tests. why : the data say nothing of it, if they do not.
+    """
+
+    name: str
+    unit: str
+    value: float
+    sigma: float
+    lower: float
+    upper: float
+    prior: float | None
+    correlation: dict[str, float]
+    shared: bool
+    why: str = ""
+
+    @property
+    def on(self) -> str:
+        """The bound that it lies on ("lower", "upper"), "" for none."""
+        room = ON_BOUND * (self.upper - self.lower)
+        if self.value - self.lower <= room:
+            return "lower"
+        return "upper" if self.upper - self.value <= room else ""
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data say anything of it."""
+        if self.prior is not None:
+            return self.sigma < AS_BEFORE * self.prior
+        return self.sigma < ANYWHERE * (self.upper - self.lower)
+
+    @property
+    def words(self) -> str:
+        """What the data say of it."""
+        unit = f" {self.unit}" if self.unit else ""
+        value = f"{self.value:.4g}{unit}" + (f", on its {self.on} bound" if self.on else "")
+        if not self.determined:
+            known = (
+                f"it may be {self.lower:.4g} to {self.upper:.4g}{unit}"
+                if self.prior is None
+                else f"known to {self.prior:.2g}{unit} before"
+            )
+            why = f"; {self.why}" if self.why else ""
+            return f"{value}: the data say nothing of it ({known}){why}"
+        return f"{value}, 1 sigma {self.sigma:.2g}{unit}{self._together}"
+
+    @property
+    def _together(self) -> str:
+        name = max(self.correlation, key=lambda name: abs(self.correlation[name]))
+        if abs(self.correlation[name]) < CORRELATED:
+            return ""
+        return f", correlation {self.correlation[name]:.2f} with {name}"
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """For result.json."""
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "sigma": self.sigma,
+            "bounds": [self.lower, self.upper],
+            "prior": self.prior,
+            "on_bound": self.on or None,
+            "determined": self.determined,
+            "correlation": self.correlation,
+            "verdict": self.words,
+        }
+
+
+def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
+    """Of all unknowns beside the moduli.
+
+    ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known.
+    """
+    unknowns, covariance = posterior.unknowns, posterior.covariance
+    size, free = unknowns.size, list(unknowns.free)
+    slopes = {}
+    for modulus, component in COMPONENTS.items():
+        middle = [0.5 * float(ends[component])]
+        row = modulus_rows(unknowns.form, modulus, middle, unknowns.strain_range)[0, free]
+        slopes[modulus] = row @ unknowns.to_coefficients
+    of_law = covariance[:size, :size]
+    spread = {m: float(np.sqrt(slope @ of_law @ slope)) for m, slope in slopes.items()}
+    found = []
+    pairs = zip(unknowns.nuisance_names, unknowns.nuisance.all, strict=True)
+    for place, (name, one) in enumerate(pairs, start=size):
+        sigma = float(np.sqrt(covariance[place, place]))
+        correlation = {
+            modulus: float(slope @ covariance[:size, place]) / max(sigma * spread[modulus], 1e-300)
+            for modulus, slope in slopes.items()
+        }
+        value = float(posterior.best[place])
+        found.append(
+            Verdict(name, one.unit, value, sigma, one.lower, one.upper, one.prior, correlation,
+                    one.shared, one.why)
+        )  # fmt: skip
+    return tuple(found)
+
+
+def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
+    """What the data say nothing of; what lies on a bound is told with the moduli that do."""
+    return [
+        Note(NoteKind.UNCERTAIN, f"{verdict.name} is {verdict.words}")
+        for verdict in found
+        if not verdict.determined and (verdict.shared or verdict.prior is None)
+    ]

@@ -1,0 +1,184 @@
+"""Profile likelihood of a number that is linear in the unknowns of a fit, as a modulus is.
+
+The number is held at values ever farther from its best, and the others are fitted anew each time.
+What the weighted sum of squares then grows by is -2 log of the likelihood ratio, once it is divided
+by how much more it grows than a likelihood of the noise would (`Linear.spread_over_curvature`): to
+first order it passes a given level just where the fit's own posterior does. What it shows beyond
+that is curvature: ends that lie unevenly about the best, or that do not exist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import linprog
+from scipy.stats import chi2
+
+from ..materials.forms.base import modulus_rows
+from .methods.descent import bounded_step
+from .posterior import LEVEL
+from .problem import Evaluation, FitProblem
+from .unknowns import Unknowns
+
+Array = NDArray[np.float64]
+
+#: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
+THRESHOLD = float(chi2.ppf(LEVEL, 1))
+#: Roots of -2 log L from place to place, and places of a side.
+STEP, MOST_PLACES = 0.5, 16
+#: From one step to the next; a step that fails is halved so many times.
+MOST_GROWTH, HALVINGS = 3.0, 4
+#: Of -2 log L: what one more step would bring, which is not worth an analysis; analyses of a place.
+SETTLED, MOST_ANALYSES = 0.02, 5
+#: Of the way to the bounds, at most, for the first step.
+FIRST = 0.25
+#: How a side ends that does not pass the threshold.
+BOUND = "bound"
+FAILED = "no analysis"
+FAR = "too many steps"
+
+
+def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
+    """(unknowns,): this @ unknowns is a modulus (MPa) at a strain."""
+    at = np.array([strain])
+    rows = modulus_rows(unknowns.form, name, at, unknowns.strain_range)[:, list(unknowns.free)]
+    extra = np.zeros(unknowns.count - unknowns.size)
+    return np.concatenate([rows[0] @ unknowns.to_coefficients, extra])
+
+
+@dataclass(frozen=True)
+class Side:
+    """A profile to one side of the best.
+
+    values : MPa, from the best on; ratios : -2 log L there. why : BOUND, FAILED or FAR where it
+    does not pass the threshold, "" where it does. analyses : that it took.
+    """
+
+    values: tuple[float, ...]
+    ratios: tuple[float, ...]
+    why: str
+    analyses: int
+
+    @property
+    def end(self) -> float | None:
+        """Where the threshold is passed, by a monotone curve of the root; None where it is not."""
+        if self.why:
+            return None
+        values = np.array(self.values)
+        roots = np.maximum.accumulate(np.sqrt(np.maximum(self.ratios, 0.0)))
+        away = np.abs(values - values[0])
+        keep = np.concatenate([[True], np.diff(roots) > 0])
+        out = float(PchipInterpolator(roots[keep], away[keep])(np.sqrt(THRESHOLD)))
+        return float(values[0] + np.sign(values[-1] - values[0]) * out)
+
+
+def extreme(unknowns: Unknowns, row: Array, sign: float) -> float:
+    """Largest (sign 1) or smallest (-1) row @ unknowns that bounds and inequalities allow."""
+    a, c = unknowns.inequalities
+    found = linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
+    return float(row @ found.x) if found.status == 0 else float(sign * np.inf)
+
+
+def profile_side(
+    problem: FitProblem,
+    best: Evaluation,
+    row: Array,
+    sign: float,
+    sigma: float,
+    tell: Callable[[], None] = lambda: None,
+) -> Side:
+    """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
+
+    Parameters
+    ----------
+    problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
+    sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : is called
+        after each place.
+    """
+    before, end = problem.analyses, extreme(problem.unknowns, row, sign)
+    start = float(row @ best.unknowns)
+    least = float(best.residual @ best.residual)
+    values, ratios, why = [start], [0.0], FAR
+    step = min(STEP * sigma, FIRST * abs(end - start))
+    point = best
+    for _ in range(MOST_PLACES):
+        room = sign * (end - values[-1])
+        if not room > 1e-9 * max(abs(start), 1e-9):
+            why = BOUND
+            break
+        found = None
+        for _ in range(HALVINGS + 1):
+            target = values[-1] + sign * step
+            # The last step lands on the bound, not just before it.
+            if step > room / (1.0 + FIRST):
+                target = end
+            found = fitted_at(problem, point, row, target)
+            if found is not None:
+                break
+            step = 0.5 * abs(target - values[-1])
+        if found is None:
+            why = FAILED
+            break
+        point = found
+        values.append(target)
+        ratios.append(float(point.residual @ point.residual) - least)
+        tell()
+        if ratios[-1] >= THRESHOLD:
+            why = ""
+            break
+        step = _next(values, ratios)
+    return Side(tuple(values), tuple(ratios), why, problem.analyses - before)
+
+
+def _next(values: list[float], ratios: list[float]) -> float:
+    """The step in which the root of -2 log L should grow by `STEP`."""
+    last = abs(values[-1] - values[-2])
+    roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
+    grown = float(roots[1] - roots[0])
+    return last * min(STEP / grown if grown > 0 else np.inf, MOST_GROWTH)
+
+
+def fitted_at(
+    problem: FitProblem, point: Evaluation, row: Array, target: float
+) -> Evaluation | None:
+    """The least sum of squares where row @ unknowns is the target, from a neighbour's optimum.
+
+    None where the analyses do not end well, in an equilibrium that a test could show.
+    """
+    a, c = problem.unknowns.inequalities
+    limit = problem.analyses + MOST_ANALYSES
+    y, (curvature, gradient) = point.unknowns, _squares(point)
+    step = bounded_step(curvature, gradient, a, c, y, (row, target))
+    if step is None:
+        return None
+    here = _stable(problem, y + step)
+    while here is not None and problem.analyses < limit:
+        curvature, gradient = _squares(here)
+        step = bounded_step(curvature, gradient, a, c, here.unknowns, (row, target))
+        if step is None or -(2.0 * gradient @ step + step @ curvature @ step) < SETTLED:
+            break
+        value = float(here.residual @ here.residual)
+        there = _stable(problem, here.unknowns + step)
+        if there is None or not float(there.residual @ there.residual) < value:
+            there = _stable(problem, here.unknowns + 0.5 * step)
+        if there is None or not float(there.residual @ there.residual) < value:
+            break
+        here = there
+    return here
+
+
+def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
+    point = problem.evaluate(y, True)
+    return point if point is not None and point.stable else None
+
+
+def _squares(point: Evaluation) -> tuple[Array, Array]:
+    """Half the curvature and half the slope of the sum of squares; flat directions stay put."""
+    assert point.jacobian is not None
+    curvature = point.jacobian.T @ point.jacobian
+    curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
+    return curvature, point.jacobian.T @ point.residual

@@ -1,0 +1,410 @@
+"""A fit near its optimum: what its data say of its unknowns, by its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.forms.base import COMPONENTS, modulus_rows
+from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind
+from ..solvers.base import History
+from .comparison import Comparison, Nuisance
+from .discretisation import Limit
+from .noise import Noise, misfits
+from .posterior import Posterior
+from .problem import Evaluation, FitProblem
+from .unknowns import Unknowns
+
+Array = NDArray[np.float64]
+
+#: Of the largest curvature of the misfit: below, the data say nothing of a direction.
+FLAT = 1e-13
+#: Of the largest norm of a block: smaller ones weigh no more than this one does.
+SMALLEST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Second:
+    """What the sum of the blocks' norms has of second order beside the squares of its slopes.
+
+    Parameters
+    ----------
+    added : (unknowns, unknowns) in the sizes of a `Linear`, to half of the curvature of the
+        weighted sum of squares. left : (m,) the residual of each block over its norm, zero where
+        the block's weight is its noise's: along it a norm is not curved, and noise along it does
+        not turn its slope. directions, analyses : with how many it was found.
+    """
+
+    added: Array
+    left: Array
+    directions: int
+    analyses: int
+
+    def slopes(self, problem: FitProblem, jacobian: Array) -> Array:
+        """(m, unknowns) slope of each residual's block along what is left of it."""
+        blocks = problem.blocks
+        return np.asarray(np.add.reduceat(self.left[:, None] * jacobian, blocks.starts)[blocks.of])
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A fit near its optimum: least squares, in which every block weighs the inverse of its norm.
+
+    Parameters
+    ----------
+    sizes : (unknowns,) in which they are counted. weights : (m,) roots of the weights of the
+        squares. sharp, flat : (unknowns, some) directions of which the data say something, and
+        nothing. curvature : (sharp,) of half the weighted sum of squares along the former, by the
+        first derivatives.
+        estimator : (unknowns, m) from weighted residuals to what they move the unknowns by, less
+        the sign. moved : (unknowns, m) the same of the noise of each residual.
+    """
+
+    sizes: Array
+    weights: Array
+    sharp: Array
+    flat: Array
+    curvature: Array
+    estimator: Array
+    moved: Array
+
+    @classmethod
+    def of(
+        cls, problem: FitProblem, best: Evaluation, noise: Noise, second: Second | None = None
+    ) -> Linear:
+        """At the optimum, evaluated with its Jacobian; second : with what is of second order."""
+        assert best.jacobian is not None
+        weights = np.sqrt(weights_of(problem, best.residual, noise))
+        sizes = sizes_of(problem.unknowns, best.unknowns)
+        j = best.jacobian * sizes * weights[:, None]
+        curvature, directions = np.linalg.eigh(j.T @ j)
+        good = curvature > FLAT * curvature[-1]
+        sharp, flat = directions[:, good], directions[:, ~good]
+        whole, answering = np.diag(curvature[good]), j
+        if second is not None:
+            whole = whole + sharp.T @ second.added @ sharp
+            answering = j - second.left[:, None] * second.slopes(problem, j)
+        estimator, answer = (
+            sharp @ np.linalg.solve(whole, sharp.T @ one.T) for one in (j, answering)
+        )
+        moved = answer * (weights * noise.rows)
+        return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
+
+    def spread_over_curvature(self, row: Array) -> float:
+        """Of one number, row @ unknowns: its variance over that of weighted squares of noise one.
+
+        By so much a weighted sum of squares grows too fast along it for a likelihood ratio (J. T.
+        Kent, Robust properties of likelihood ratio tests, Biometrika 69, 1982). Not a number where
+        the data say nothing of it.
+        """
+        scaled = row * self.sizes
+        along = self.sharp.T @ scaled
+        curved = float(along**2 @ (1.0 / self.curvature))
+        return float(np.sum((scaled @ self.moved) ** 2)) / curved if curved > 0 else np.nan
+
+
+def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
+    """(m,) of the squares of the residuals, near the least sum of the norms of their blocks."""
+    blocks = problem.blocks
+    norms = np.maximum(blocks.norms(residual), blocks.norms(noise.least))
+    largest = norms.max()
+    if not largest > 0:
+        return np.ones_like(residual)
+    return np.asarray(1.0 / np.maximum(norms, SMALLEST * largest)[blocks.of])
+
+
+def sizes_of(unknowns: Unknowns, best: Array) -> Array:
+    """(unknowns,) what each is large or small beside: itself, or the width of its bounds."""
+    lower, upper = unknowns.nuisance.bounds
+    law = np.abs(best[: unknowns.size])
+    return np.concatenate([np.maximum(law, 1e-3), np.maximum(upper - lower, 1e-3)])
+
+
+#: Strains at which a modulus is looked at.
+POINTS = 61
+#: Relative uncertainty of a modulus of which nothing is known.
+PRIOR = 10.0
+#: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
+#: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
+#: (benchmarks/bench_bias.py).
+LEFT = 0.1
+
+
+def posteriors_of(
+    problem: FitProblem,
+    best: Evaluation,
+    noise: Noise,
+    limit: Limit | None = None,
+    second: Second | None = None,
+) -> tuple[Posterior, Posterior | None]:
+    """The unknowns as the noise leaves them, to first order, and those of ever finer models.
+
+    second : as for `Linear.of`: to second order.
+
+    The second have what may be left of the model's error in their covariance, too; None where
+    the limit is not known.
+
+    A fit makes the sum of the norms of its blocks small: near its optimum it is a least squares
+    fit in which every block weighs the inverse of its norm, and it is that estimate which the
+    noise moves. A block that is fitted better than its noise allows has the norm of the noise.
+    A direction of which the data say nothing is as uncertain as a modulus of which nothing is
+    known.
+    """
+    linear = Linear.of(problem, best, noise, second)
+    weights, sizes, moved = linear.weights, linear.sizes, linear.moved
+    scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
+    covariance = np.asarray(scaled * sizes[:, None] * sizes)
+
+    def centre(residual: Array) -> Array:
+        return np.asarray(best.unknowns - sizes * (linear.estimator @ (weights * residual)))
+
+    own = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
+    if limit is None:
+        return own, None
+    return own, own.moved(limit.step, centre(best.residual + limit.error), LEFT)
+
+
+def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
+    """(n,) MPa by modulus at strains (n,), of the law at unknowns y."""
+    coefficients = unknowns.to_coefficients @ y[: unknowns.size]
+    rows = {
+        name: modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
+        for name, strain in strains.items()
+    }
+    return {name: own[:, list(unknowns.free)] @ coefficients for name, own in rows.items()}
+
+
+def along(
+    unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Strains and 1-sigma relative uncertainty of each modulus, from that of the unknowns."""
+    p, size = unknowns, unknowns.size
+    moved = p.to_coefficients @ covariance[:size, :size] @ p.to_coefficients.T
+    strains, sigmas = {}, {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, reached[component], POINTS)
+        rows = modulus_rows(p.form, name, strain, p.strain_range)[:, list(p.free)]
+        sigma = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", rows, moved, rows), 0.0))
+        strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)
+    return strains, sigmas
+
+
+# What a fit's objective has of second order beside the squares of its slopes.
+#
+# Where much is left of the residual, two things are no longer small. The slopes change from place
+# to place, and each counts by what is left there: that comes from differences of the exact slopes,
+# each over half of a standard deviation, along the directions that the data determine worst (the
+# others have curvature enough). And the norm of a block is not curved along the block's own
+# residual: a fit of the sum of norms follows noise otherwise than one of squares with fixed
+# weights. That costs nothing. Near a residual of noise alone both are nothing.
+
+#: Times the noise of the data that is left of a comparison, from which on it is looked at.
+LARGE = 2.0
+#: Directions that are looked at, an analysis each.
+MOST = 8
+#: Of a step, in standard deviations; its least and largest size, relative to the unknowns.
+STEP, LEAST_STEP, LARGEST_STEP = 0.5, 1e-3, 0.05
+#: Curvature that must be left of that of the first derivatives, for the sum to be taken for it.
+LEFT_SECOND_ORDER = 0.05
+#: Change of a modulus' sigma, relative, that is worth telling, and taking.
+WORTH = 0.1
+NOT_DEFINITE = "not positive definite"
+TOO_LITTLE = "too little changes"
+
+
+@dataclass(frozen=True)
+class Order:
+    """Whether the uncertainty is of first or of second order.
+
+    used : it is of second order. why : "" where it is; else NOT_DEFINITE or TOO_LITTLE. change : by
+    modulus, by how much the second order changes its sigma, relative, where it does most; empty
+    where it has none. directions : along which it was looked at. analyses : that it took.
+    """
+
+    used: bool
+    why: str
+    change: Mapping[str, float]
+    directions: int
+    analyses: int
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """For result.json."""
+        return {
+            "order": 2 if self.used else 1,
+            "why": self.why,
+            "change_of_sigma": dict(self.change),
+            "directions": self.directions,
+            "analyses": self.analyses,
+        }
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        changes = ", ".join(f"{name} {100 * by:+.0f} %" for name, by in self.change.items())
+        if self.used:
+            return f"second order: 1 sigma against that of the first derivatives: {changes}"
+        if self.why == NOT_DEFINITE:
+            return (
+                "first order, although much is left of the residual: to second order the optimum "
+                "is no minimum along some direction, and 1 sigma may be far too small (a profile "
+                "likelihood tells)"
+            )
+        return f"first order: the second would change 1 sigma by {changes}"
+
+    @property
+    def notes(self) -> list[Note]:
+        """Where the second order matters."""
+        if not self.used and self.why != NOT_DEFINITE:
+            return []
+        return [Note(NoteKind.SECOND_ORDER, f"the uncertainty is of {self.words}")]
+
+
+def large(problem: FitProblem, residual: Array) -> bool:
+    """Whether so much is left of any comparison that the second order may matter."""
+    return any(misfit.ratio > LARGE for misfit in misfits(problem, residual).values())
+
+
+def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
+    """At the optimum: from differences of the exact slopes, along the worst determined directions.
+
+    A direction along which no analysis ends well, to neither side, counts as if its slopes did not
+    change.
+    """
+    assert best.jacobian is not None
+    before, linear = problem.analyses, Linear.of(problem, best, noise)
+    along = linear.sharp[:, np.argsort(linear.curvature)[:MOST]]
+    spread = np.linalg.norm(along.T @ linear.moved, axis=1)
+    steps = np.clip(STEP * spread, LEAST_STEP, LARGEST_STEP)
+    weighted = linear.weights**2 * best.residual
+    changes, known = [], []
+    for k, (direction, step) in enumerate(zip(along.T, steps, strict=True)):
+        there, way = _beside(problem, best, linear.sizes * direction * step)
+        if there is None or there.jacobian is None:
+            continue
+        slope = (there.jacobian - best.jacobian).T @ weighted / (way * step)
+        changes.append(linear.sizes * slope)
+        known.append(k)
+    added = np.zeros((len(linear.sizes),) * 2)
+    if changes:
+        v, t = along[:, known], np.array(changes).T
+        inner = v.T @ t
+        # Symmetric, and t along every direction v, which are orthonormal.
+        added = t @ v.T + v @ t.T - 0.5 * v @ (inner + inner.T) @ v.T
+        added = 0.5 * (added + added.T)
+    found = Second(added, _left(problem, best, noise), len(known), problem.analyses - before)
+    norms = found.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
+    blocks = norms[problem.blocks.starts]
+    return replace(found, added=added - blocks.T @ blocks)
+
+
+def definite(linear: Linear, second: Second) -> bool:
+    """Whether enough of the curvature of the first derivatives is left along every direction."""
+    unit = linear.sharp / np.sqrt(linear.curvature)
+    return bool(np.linalg.eigvalsh(unit.T @ second.added @ unit).min() > LEFT_SECOND_ORDER - 1.0)
+
+
+def _left(problem: FitProblem, best: Evaluation, noise: Noise) -> Array:
+    """(m,) the residual of each block over its norm; zero where the block weighs by its noise."""
+    blocks = problem.blocks
+    norms = blocks.norms(best.residual)
+    own = norms > blocks.norms(noise.least)
+    return np.asarray(best.residual * (own / np.where(own, norms, 1.0))[blocks.of])
+
+
+def _beside(problem: FitProblem, best: Evaluation, step: Array) -> tuple[Evaluation | None, float]:
+    """A point a step to either side that is allowed and ends well, and to which side."""
+    a, c = problem.unknowns.inequalities
+    for way in (1.0, -1.0):
+        y = best.unknowns + way * step
+        if (a @ y < c - 1e-9).any():
+            continue
+        there = problem.evaluate(y, True)
+        if there is not None:
+            return there, way
+    return None, 1.0
+
+
+# What measured values say of a law, as information that adds up from test to test.
+#
+# Information is J'J, J (m, unknowns) the slope of the values over their noise, without what a
+# test's own nuisance takes up of it: the best estimate from several tests has the inverse of the
+# sum as its covariance (Fisher). Every value counts by its noise, not by a weight of the
+# objective.
+
+#: Of the width of the bounds of a nuisance: less is none.
+LEAST_WIDTH = 1e-3
+
+
+def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance] = ()) -> Array:
+    """(n, n): what values say of the n unknowns of the law, whatever the nuisance is.
+
+    Parameters
+    ----------
+    slopes : (m, n + nuisance) of the values by the law's unknowns, then by the nuisance.
+    sigma : noise of the values, (m,) or one for all, in their unit.
+    nuisance : with a prior each, or known to ten times the width of its bounds.
+    """
+    count = slopes.shape[1] - len(nuisance)
+    before = [n.prior or PRIOR * max(n.upper - n.lower, LEAST_WIDTH) for n in nuisance]
+    known = np.zeros((len(nuisance), slopes.shape[1]))
+    known[:, count:] = np.diag(1.0 / np.array(before))
+    rows = np.concatenate([slopes / np.reshape(sigma, (-1, 1)), known])
+    law, own = rows[:, :count], rows[:, count:]
+    if len(nuisance):
+        span = np.linalg.qr(own / np.linalg.norm(own, axis=0))[0]
+        law = law - span @ (span.T @ law)
+    return np.asarray(law.T @ law)
+
+
+def information_of(
+    comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
+) -> tuple[Array, History]:
+    """(n, n) of a comparison that is run with a law, and the run: nuisance at zero, least noise.
+
+    Raises
+    ------
+    SolverFailure : it does not end well, or its solver gives no derivatives.
+    """
+    at_zero = {n.name: 0.0 for n in comparison.nuisance}
+    history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
+    slope = slope * comparison.objective.scale[:, None]
+    size = unknowns.size
+    by_unknowns = np.hstack([slope[:, :size] @ unknowns.to_coefficients, slope[:, size:]])
+    known = information(by_unknowns, comparison.objective.least_noise, comparison.nuisance)
+    return known, history
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The law at which, and the strains up to which, its moduli are asked for.
+
+    y : unknowns of the law. ends : (3,) strains (eps1, eps2, gamma12).
+    """
+
+    unknowns: Unknowns
+    law: HypoelasticLaw
+    y: Array
+    ends: Array
+
+    def sigma(self, known: Array) -> dict[str, Array]:
+        """1-sigma relative uncertainty (n,) of each modulus from information (unknowns, unknowns).
+
+        Before any test each unknown of the law is known to 1000 % of itself: so a modulus of which
+        the tests say nothing comes out as unknown, not as certain.
+        """
+        count = len(known)
+        sizes = PRIOR * sizes_of(self.unknowns, self.y)[:count]
+        scaled = known * sizes[:, None] * sizes + np.eye(count)
+        covariance = np.linalg.inv(0.5 * (scaled + scaled.T)) * sizes[:, None] * sizes
+        return along(self.unknowns, self.law, self.ends, covariance)[1]
+
+
+def summary(sigma: Mapping[str, Array]) -> dict[str, float]:
+    """One figure a modulus: the root of the mean square of its relative sigma along its strain."""
+    return {name: float(np.sqrt(np.mean(values**2))) for name, values in sigma.items()}

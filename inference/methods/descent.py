@@ -1,0 +1,161 @@
+"""One descent of Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
+
+Damping is scaled by diag(J'J) (Marquardt), modulus values at control strains are the unknowns,
+positivity and bounds the constraints, so every iterate is feasible; and every iterate is a stable
+equilibrium (Eq. 4.9's "analysis ends well"): a soft membrane can fold, and what no test under
+pressure can show must not lead the fit astray.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import quadprog
+from numpy.typing import NDArray
+
+from ..problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FIRST_DAMPING = 1e-2
+MOST_TRIALS = 12  # of one step, with growing damping
+NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
+NO_PROGRESS = 1e-4  # relative decrease that counts as none ...
+PATIENCE = 3  # ... when it happens so often in a row
+SMALLEST_DROP = 1e-3  # of the shear modulus, relative, that can explain a loss of stability
+
+
+def descend(
+    problem: FitProblem,
+    point: Evaluation,
+    tolerance: float,
+    max_analyses: int,
+    norms: bool = False,
+    only: Flags | None = None,
+    damping: float = FIRST_DAMPING,
+    negligible: float = NEGLIGIBLE,
+) -> tuple[Evaluation, str]:
+    """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
+
+    Parameters
+    ----------
+    point : evaluated with its Jacobian.
+    norms : minimise e itself, the sum of the blocks' norms, not that of their squares.
+    only : (unknowns,) which may change; all unless given.
+    damping : to begin with. negligible : predicted relative decrease of the sum of squares that is
+        not worth an analysis.
+
+    Returns
+    -------
+    The last (best) point, and how it ended: CONVERGED, LEVEL or ANALYSES_USED_UP.
+    """
+    end = CONVERGED if norms else LEVEL
+    growth, idle = 2.0, 0
+    scale: Array | None = None
+    while True:
+        if point.value < tolerance:
+            return point, CONVERGED
+        root = _block_weights(problem, point, norms)
+        r, j = point.residual * root, _jacobian(point) * root[:, None]
+        if only is not None:
+            j[:, ~only] = 0.0
+        merit = float(r @ r)
+        curvature = j.T @ j
+        diagonal = np.diag(curvature) + 1e-14 * np.trace(curvature)
+        if only is not None:
+            diagonal[~only] = 1e6 * np.trace(curvature)
+        # Half-life of one iteration: directions that went flat keep some damping.
+        scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
+        gradient = j.T @ r
+        a, c = problem.unknowns.inequalities
+        for _ in range(MOST_TRIALS):
+            if problem.analyses >= max_analyses:
+                return point, ANALYSES_USED_UP
+            step = bounded_step(
+                curvature + damping * np.diag(scale), gradient, a, c, point.unknowns
+            )
+            if step is None:
+                damping *= 10.0
+                continue
+            predicted = -(2.0 * gradient @ step + step @ curvature @ step)
+            if predicted < negligible * merit:
+                return point, end
+            trial = problem.evaluate(point.unknowns + step, True)
+            if trial is not None and not trial.stable:
+                cut = _cut(problem, point.unknowns, trial.unknowns)
+                if cut is not None:
+                    a, c = np.vstack([a, cut[0]]), np.append(c, cut[1])
+                    continue
+            elif trial is not None:
+                gained = merit - float(np.sum((trial.residual * root) ** 2))
+                if gained > 0:
+                    break
+            damping, growth = damping * growth, min(2.0 * growth, 64.0)
+        else:
+            return point, end
+        ratio = float(gained / max(float(predicted), 1e-300))
+        damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
+        growth = 2.0
+        idle = idle + 1 if gained < NO_PROGRESS * merit else 0
+        point = trial
+        if idle >= PATIENCE:
+            return point, end
+
+
+def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
+    """An inequality that keeps the next step half as far from the largest drop in shear.
+
+    A membrane loses its stability in shear: so a refused step says where that modulus was too low,
+    and the fit can slide along that border instead of stopping at it. None when it did not drop.
+    """
+    rows = problem.unknowns.stability_rows
+    before, after = rows @ stable, rows @ unstable
+    drop = (before - after) / before
+    k = int(np.argmax(drop))
+    if drop[k] < SMALLEST_DROP:
+        return None
+    return rows[k], float(0.5 * (before[k] + after[k]))
+
+
+def _jacobian(point: Evaluation) -> Array:
+    assert point.jacobian is not None
+    return point.jacobian
+
+
+def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:
+    """Square roots of the weights of the squared residuals, (m,).
+
+    1/norm of each block majorises e: its weighted sum of squares decreases only if e does.
+    """
+    if not norms:
+        return np.ones_like(point.residual)
+    sizes = problem.blocks.norms(point.residual)
+    sizes = np.maximum(sizes, 1e-6 * sizes.max())
+    return np.asarray(1.0 / np.sqrt(sizes))[problem.blocks.of]
+
+
+def bounded_step(
+    hessian: Array,
+    gradient: Array,
+    a: Array,
+    c: Array,
+    y: Array,
+    plane: tuple[Array, float] | None = None,
+) -> Array | None:
+    """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer.
+
+    plane : (row, value), to which the step leads: row (y + s) = value.
+    """
+    unit = 1.0 / np.sqrt(np.diag(hessian))
+    scaled = hessian * unit[:, None] * unit[None, :]
+    room = np.minimum(c - a @ y, 0.0) - 1e-12
+    if plane is not None:
+        row, value = plane
+        a, room = np.vstack([row, a]), np.concatenate([[value - row @ y], room])
+    try:
+        solution = quadprog.solve_qp(
+            scaled, -gradient * unit, (a * unit).T, room, int(plane is not None)
+        )[0]
+    except ValueError:
+        return None
+    return np.asarray(solution * unit)

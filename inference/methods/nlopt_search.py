@@ -1,0 +1,225 @@
+"""A search by one of NLopt's algorithms on the objective e, with linear or boolean constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import nlopt
+import numpy as np
+from numpy.typing import NDArray
+
+from ..problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
+from .base import FitOptions
+
+# What NLopt is told of a fit, and what is remembered of it.
+#
+# What is respected, because NLopt does not say it: a NaN makes SLSQP run on to maxeval and COBYLA
+# report success at the start; boolean +-1 constraints have no slope; COBYLA can return an
+# infeasible point as a success. So NLopt never sees NaN or infinity, always has limits, and the
+# best feasible point is our own record, not NLopt's answer.
+
+Array = NDArray[np.float64]
+
+# An analysis that failed or ended unstable, or a point that may not be analysed, is this many times
+# worse than the start: finite, and worse than anything a line search would accept.
+WORSE = 10.0
+DIFFERENCE = 1e-4  # forward difference, of the width of the bounds
+CONSTRAINT_TOLERANCE = 1e-9
+
+
+class NoMoreAnalyses(Exception):
+    """The allowed number of analyses was spent."""
+
+
+class BelowTolerance(Exception):
+    """e fell below the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What is known of one point: e, its slope (empty unless asked for), whether its moduli are
+    positive, whether its analysis ended well, in a stable equilibrium.
+    """
+
+    value: float
+    slope: Array
+    positive: bool
+    analysed: bool
+
+
+class Record:
+    """Maps NLopt's variables to unknowns, evaluates once a point, remembers the best feasible."""
+
+    def __init__(self, problem: FitProblem, start: Evaluation, options: FitOptions) -> None:
+        self.problem, self.best, self.options = problem, start, options
+        self.bad = WORSE * max(start.value, 1.0)
+        # Differences where the solver has no exact slope to give.
+        self.exact = options.gradient == "exact" and problem.differentiates
+        p = problem.unknowns
+        # Linear constraints: modulus values, well conditioned. Boolean: coefficients in their
+        # bounds' unit box.
+        self.basis, self.origin = np.eye(p.count), np.zeros(p.count)
+        if options.constraints == "boolean":
+            lower, upper = p.box
+            to_values = np.linalg.inv(p.to_coefficients)
+            self.basis[: p.size, : p.size] = to_values * (upper - lower)
+            self.origin[: p.size] = to_values @ lower
+        self._last: tuple[bytes, Look] | None = None
+
+    def unknowns(self, x: Array) -> Array:
+        """Unknowns of NLopt's variables."""
+        return np.asarray(self.origin + self.basis @ x)
+
+    def variables(self, y: Array) -> Array:
+        """NLopt's variables of unknowns."""
+        return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
+
+    def box(self) -> tuple[Array, Array]:
+        """Bounds of the variables where the constraints are boolean."""
+        p = self.problem.unknowns
+        low, high = p.nuisance.bounds
+        return np.concatenate([np.zeros(p.size), low]), np.concatenate([np.ones(p.size), high])
+
+    def at(self, x: Array, with_slope: bool) -> Look:
+        """What is known of the variables `x`; the same point is run only once.
+
+        Raises
+        ------
+        NoMoreAnalyses, BelowTolerance : to end NLopt's search.
+        """
+        key = x.tobytes()
+        if self._last is not None and self._last[0] == key:
+            before = self._last[1]
+            if not with_slope or len(before.slope):
+                return before
+        look = self._fresh(x, with_slope)
+        self._last = (key, look)
+        return look
+
+    def _fresh(self, x: Array, with_slope: bool) -> Look:
+        y, none = self.unknowns(x), np.zeros(len(x) if with_slope else 0)
+        positive = self._feasible(y)
+        # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
+        flags = self.options.constraints == "boolean"
+        if not np.isfinite(y).all() or (flags and not positive):
+            return Look(self.bad, none, positive, False)
+        point = self._evaluate(y, with_slope and self.exact)
+        # What no test can show is no point to go to, however well it fits.
+        if point is None or not point.stable:
+            return Look(self.bad, none, positive, False)
+        if positive and (point.value < self.best.value or not self.best.stable):
+            self.best = point
+        if self.best.value < self.options.tolerance:
+            raise BelowTolerance
+        return Look(point.value, self._slope(point, x) if with_slope else none, positive, True)
+
+    def _feasible(self, y: Array) -> bool:
+        a, c = self.problem.unknowns.inequalities
+        return bool(np.isfinite(y).all() and (a @ y >= c - 10 * CONSTRAINT_TOLERANCE).all())
+
+    def _evaluate(self, y: Array, with_jacobian: bool) -> Evaluation | None:
+        if self.problem.analyses >= self.options.max_analyses:
+            raise NoMoreAnalyses
+        return self.problem.evaluate(y, with_jacobian)
+
+    def _slope(self, point: Evaluation, x: Array) -> Array:
+        if point.jacobian is not None:
+            gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
+            return np.asarray(gradient @ self.basis)
+        slope = np.zeros(len(x))
+        for i in range(len(x)):
+            other = x.copy()
+            other[i] += DIFFERENCE
+            beside = self._evaluate(self.unknowns(other), False)
+            # A neighbour that is no point leaves this direction alone rather than poison the step.
+            if beside is not None and beside.stable:
+                slope[i] = (beside.value - point.value) / DIFFERENCE
+        return slope
+
+
+FLAG_TOLERANCE = 1e-8
+RELATIVE_E, RELATIVE_X = 1e-10, 1e-12
+
+
+def nlopt_minimise(
+    algorithm: int,
+    problem: FitProblem,
+    start: Array,
+    options: FitOptions,
+    first_step: float | None = None,
+) -> Optimum | None:
+    """Minimise e from the unknowns `start`; None when the analysis at the start fails.
+
+    The returned point is the best feasible, stable one that was seen, whatever NLopt itself says.
+
+    Parameters
+    ----------
+    algorithm : NLopt's number. first_step : of each bound's width; NLopt's own unless given.
+    """
+    problem.warm_starts = False  # e has to be a function of the point alone
+    first = problem.evaluate(start, False)
+    if first is None:
+        return None
+    record = Record(problem, first, options)
+    optimiser = nlopt.opt(algorithm, len(start))
+
+    def objective(x: Array, gradient: Array) -> float:
+        look = record.at(x, gradient.size > 0)
+        if gradient.size:
+            gradient[:] = look.slope
+        return look.value
+
+    optimiser.set_min_objective(objective)
+    x = record.variables(start)
+    if options.constraints == "margin":
+        _constrain(optimiser, record)
+    else:
+        low, high = record.box()
+        x = np.clip(x, low, high)
+        optimiser.set_lower_bounds(low)
+        optimiser.set_upper_bounds(high)
+        _flag(optimiser, record)
+    optimiser.set_maxeval(options.max_analyses)
+    optimiser.set_ftol_rel(RELATIVE_E)
+    optimiser.set_xtol_rel(RELATIVE_X)
+    if first_step is not None:
+        optimiser.set_initial_step(first_step)
+    try:
+        optimiser.optimize(x)
+        status = f"nlopt {optimiser.last_optimize_result()}"
+    except BelowTolerance:
+        status = CONVERGED
+    except NoMoreAnalyses:
+        status = ANALYSES_USED_UP
+    except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
+        status = f"nlopt stopped: {type(error).__name__}"
+    return Optimum(record.best, status, problem.analyses)
+
+
+def _constrain(optimiser: nlopt.opt, record: Record) -> None:
+    """The linear inequalities of the unknowns, as NLopt's variables see them."""
+    a, c = record.problem.unknowns.inequalities
+    rows = a @ record.basis
+    limit = c - a @ record.origin
+
+    def linear(result: Array, x: Array, gradient: Array) -> None:
+        result[:] = limit - rows @ x
+        if gradient.size:
+            gradient[:] = -rows
+
+    optimiser.add_inequality_mconstraint(linear, np.full(len(rows), CONSTRAINT_TOLERANCE))
+
+
+def _flag(optimiser: nlopt.opt, record: Record) -> None:
+    """Two flags without a slope: positive moduli, and an analysis that ends well (Eq. 4.9)."""
+
+    def positive(x: Array, gradient: Array) -> float:
+        gradient[:] = 0.0
+        return -1.0 if record.at(x, False).positive else 1.0
+
+    def analysed(x: Array, gradient: Array) -> float:
+        gradient[:] = 0.0
+        return -1.0 if record.at(x, False).analysed else 1.0
+
+    optimiser.add_inequality_constraint(positive, FLAG_TOLERANCE)
+    optimiser.add_inequality_constraint(analysed, FLAG_TOLERANCE)

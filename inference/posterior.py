@@ -1,0 +1,297 @@
+"""What a fit knows of its unknowns: a normal distribution within their bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import quadprog
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr, ndtri_exp
+
+from ..materials.forms.base import modulus_rows
+from ..materials.law import HypoelasticLaw
+from .unknowns import Unknowns
+
+# Draws from a normal distribution within linear inequalities.
+#
+# Draws outside are drawn again as long as enough of them lie inside. Where hardly any does (the
+# optimum lies on bounds), every draw is the end of a walk of its own inside, along random
+# directions, to a place drawn from the normal distribution on that line between its ends (hit and
+# run). The directions are those of the shape of what is allowed and likely, so that bounds that
+# are close to each other do not stop the walk.
+
+Array = NDArray[np.float64]
+
+#: Draws a wanted one, before it is a walk.
+MOST_DRAWS = 20
+#: Steps of a walk: some a dimension, and some in any case.
+STEPS_A_DIMENSION, STEPS = 12, 50
+#: Standard deviations inside that a walk begins, as far as there is room.
+INSIDE = (0.5, 0.1, 0.02, 1e-3, 1e-6)
+#: Steps of Newton's method, and halvings of one.
+NEWTON, HALVINGS = 40, 30
+#: Standard deviations beyond a point inside that no draw goes.
+BEYOND = 8.0
+#: Of the largest variance: less is none.
+NONE = 1e-14
+#: In standard deviations: bounds closer than this leave no room between them; what lies outside by
+#: less is inside.
+CLOSE, ROUNDING = 1e-9, 1e-9
+#: Standard deviations from the mean beyond which a place is no longer drawn.
+FAR = 1e6
+
+
+def truncated_draws(
+    mean: Array,
+    covariance: Array,
+    inequalities: tuple[Array, Array],
+    allowed: Array,
+    count: int,
+    random: np.random.Generator,
+) -> Array:
+    """`count` draws (count, n) of a normal distribution, given A y >= c.
+
+    Parameters
+    ----------
+    mean : (n,), which may lie outside. covariance : (n, n). inequalities : A (k, n), c (k,).
+    allowed : (n,) a point that keeps them, up to rounding.
+    """
+    a, c = inequalities
+    c = np.minimum(c, a @ allowed)
+    variance, axes = np.linalg.eigh(covariance)
+    some = variance > NONE * max(variance[-1], 0.0)
+    if not some.any():
+        return np.tile(allowed, (count, 1))
+    root = axes[:, some] * np.sqrt(variance[some])
+    # In standard deviations z, seen from the allowed point: rows @ z >= least.
+    rows, least = a @ root, c - a @ allowed
+    size = np.linalg.norm(rows, axis=1)
+    real = size > NONE * size.max(initial=0.0)
+    rows, least = rows[real] / size[real, None], least[real] / size[real]
+    centre = (axes[:, some].T @ (mean - allowed)) / np.sqrt(variance[some])
+    rows, least, centre, back = _without_equalities(rows, least, centre)
+    drawn = _drawn_again(rows, least, centre, count, random)
+    if len(drawn) < count:
+        drawn = _walked(rows, least, centre, count, random)
+    return np.asarray(allowed + (drawn @ back.T) @ root.T)
+
+
+def _without_equalities(
+    rows: Array, least: Array, centre: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The same within the plane that pairs of opposite inequalities leave."""
+    if not len(rows):
+        return rows, least, centre, np.eye(len(centre))
+    opposite = rows @ rows.T < -1 + CLOSE
+    held = np.flatnonzero((opposite & (least[:, None] + least > -CLOSE)).any(axis=1))
+    if not len(held):
+        return rows, least, centre, np.eye(len(centre))
+    _, size, right = np.linalg.svd(rows[held])
+    free = right[int((size > 1e-6).sum()) :].T
+    others = rows @ free
+    some = np.linalg.norm(others, axis=1) > 1e-6
+    return others[some], least[some], free.T @ centre, free
+
+
+def _drawn_again(
+    rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
+) -> Array:
+    """Up to `count` draws that are inside, of so many as are worth it."""
+    inside: list[Array] = []
+    for _ in range(MOST_DRAWS):
+        draws = centre + random.standard_normal((count, len(centre)))
+        inside.append(draws[(draws @ rows.T >= least - ROUNDING).all(axis=1)])
+        if sum(map(len, inside)) >= count:
+            break
+    return np.concatenate(inside)[:count]
+
+
+def _walked(
+    rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
+) -> Array:
+    """Ends of `count` walks side by side."""
+    start, root = _start(rows, least, centre)
+    # Most inequalities are so far away that no walk meets them.
+    near = rows @ centre - least < np.linalg.norm(start - centre) + BEYOND
+    rows, least = rows[near], least[near]
+    place = np.tile(start, (count, 1))
+    for _ in range(STEPS + STEPS_A_DIMENSION * len(centre)):
+        way = random.standard_normal(place.shape) @ root.T
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        room, slope = np.minimum(least - place @ rows.T, 0.0), way @ rows.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = room / slope
+        ahead = np.where(slope < 0, reach, FAR).min(axis=1, initial=FAR)
+        behind = np.where(slope > 0, reach, -FAR).max(axis=1, initial=-FAR)
+        nearest = np.einsum("ij,ij->i", way, centre - place)
+        place += _between(behind - nearest, ahead - nearest, random)[:, None] * way
+        place += nearest[:, None] * way
+    return place
+
+
+def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
+    """Standard normal numbers between ends (n,), drawn by their distribution function."""
+    flip = lower > 0  # the lower tail has the digits
+    low, high = np.where(flip, -upper, lower), np.where(flip, -lower, upper)
+    share = random.random(len(low))
+    below, above = log_ndtr(low), log_ndtr(high)
+    # log((1 - share) P(low) + share P(high))
+    mixed = above + np.log(share + (1 - share) * np.exp(np.minimum(below - above, 0.0)))
+    drawn = np.clip(ndtri_exp(mixed), low, high)
+    return np.where(flip, -drawn, drawn)
+
+
+def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
+    """A point inside, and a root (n, n) of the shape of what is likely around it.
+
+    It is where  |z - centre|^2 / 2 - sum log(rows z - least)  is least, by Newton's method, and the
+    inverse of the curvature there: round in a wide place, flat between bounds that are close.
+    """
+    place = _inside(rows, least, centre)
+    value, slope, factor = _barrier(rows, least, centre, place)
+    for _ in range(NEWTON):
+        root = _root(factor)
+        step, share = -root @ (root.T @ slope), 1.0
+        for _ in range(HALVINGS):
+            trial = _barrier(rows, least, centre, place + share * step)
+            if trial[0] < value:
+                place = place + share * step
+                value, slope, factor = trial
+                break
+            share /= 2
+        else:
+            break
+    return place, _root(factor)
+
+
+def _root(factor: Array) -> Array:
+    """A root of the inverse of factor' factor, which itself would lose all digits between bounds
+    that nearly meet."""
+    upper: Array = np.linalg.qr(factor).R
+    upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
+    return np.asarray(solve_triangular(upper, np.eye(len(upper))))
+
+
+def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
+    """Value (infinite outside), slope, and a factor F of the curvature F' F."""
+    away, room = place - centre, rows @ place - least
+    if (room <= 0).any():
+        return np.inf, away, np.eye(len(away))
+    by_room = rows / room[:, None]
+    factor = np.vstack([np.eye(len(away)), by_room])
+    return float(away @ away / 2 - np.log(room).sum()), away - by_room.sum(axis=0), factor
+
+
+def _inside(rows: Array, least: Array, centre: Array) -> Array:
+    """The point nearest to the centre that is some way inside."""
+    for way in INSIDE:
+        try:
+            return np.asarray(
+                quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, least + way)[0]
+            )
+        except ValueError:
+            continue
+    return np.zeros_like(centre)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The unknowns as the noise of the data leaves them.
+
+    Parameters
+    ----------
+    unknowns : their order, units, bounds and inequalities.
+    best : (n,) the best of them, which keep the inequalities.
+    centre : (n,) where they would be without inequalities: where none binds, the best.
+    covariance : (n, n) in the products of their units, without inequalities.
+    """
+
+    unknowns: Unknowns
+    best: Array
+    centre: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Array:
+        """(n,) one standard deviation of each unknown, in its unit."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(size + nuisance, same): of the free coefficients, MPa, and the nuisance in its units."""
+        n, size = self.unknowns.count, self.unknowns.size
+        t = np.eye(n)
+        t[:size, :size] = self.unknowns.to_coefficients
+        return np.asarray(t @ self.covariance @ t.T)
+
+    @property
+    def of_law(self) -> Array:
+        """(size, size) MPa^2, covariance of the law's free coefficients, in their order."""
+        return self.coefficients[: self.unknowns.size, : self.unknowns.size]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Of the rows of `coefficients`."""
+        return (*self.unknowns.labels, *self.unknowns.nuisance_names)
+
+    @property
+    def correlations(self) -> Array:
+        """The same as `coefficients`, each in its own standard deviation: between -1 and 1."""
+        sigma = np.sqrt(np.diag(self.coefficients))
+        unit = np.where(sigma > 0, sigma, 1.0)
+        return np.asarray(self.coefficients / unit / unit[:, None])
+
+    def moved(self, step: Array, centre: Array, share: float) -> Posterior:
+        """The same about other unknowns.
+
+        Parameters
+        ----------
+        step : (n,) from the best to the other best. centre : (n,) the other centre. share : of the
+            step, by which the other best is uncertain (one standard deviation).
+        """
+        covariance = self.covariance + share**2 * np.outer(step, step)
+        return Posterior(self.unknowns, self.best + step, centre, covariance)
+
+    def sample(self, count: int, random: np.random.Generator) -> Array:
+        """`count` draws of all unknowns (count, n), all of which keep the inequalities.
+
+        They are of the normal distribution within the inequalities (see `truncated`).
+        """
+        return truncated_draws(
+            self.centre, self.covariance, self.unknowns.inequalities, self.best, count, random
+        )
+
+    def laws(
+        self, law: HypoelasticLaw, count: int, random: np.random.Generator
+    ) -> list[HypoelasticLaw]:
+        """`count` laws as the data leave them, all within the bounds: `law` with other numbers."""
+        return [self.unknowns.law(law, y) for y in self.sample(count, random)]
+
+
+#: Share of the draws inside a band, and draws.
+LEVEL, DRAWS = 0.95, 1000
+
+
+def bands_of(
+    posterior: Posterior, law: HypoelasticLaw, strains: dict[str, Array]
+) -> dict[str, Array]:
+    """(2, n) MPa by modulus: lower and upper end of its band at strains (n,).
+
+    Of draws from the posterior, which keep the inequalities of the fit, so that what lies on a
+    bound is uncertain to one side. The law's own modulus is always inside: where the mesh's error
+    is told and not taken out, the band reaches from there to what finer meshes would give.
+    """
+    unknowns = posterior.unknowns
+    drawn = posterior.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
+    coefficients = drawn @ unknowns.to_coefficients.T
+    bands = {}
+    for name, strain in strains.items():
+        rows = modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
+        moduli = coefficients @ rows[:, list(unknowns.free)].T
+        ends = np.quantile(moduli, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+        own = law.modulus(name, strain)
+        bands[name] = np.array([np.minimum(ends[0], own), np.maximum(ends[1], own)])
+    return bands

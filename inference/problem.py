@@ -1,0 +1,288 @@
+"""One fit as a function of its unknowns: residuals, Jacobian, feasibility, and a count."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, SolverFailure
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import DifferentiatingSolver, History, Solver, instability
+from .comparison import Blocks, Comparison
+from .unknowns import RandomStarts, Starts, Unknowns
+
+Array = NDArray[np.float64]
+
+#: Status of an analysis that was kept earlier, and ended well then.
+FROM_CACHE = "ok, from the cache"
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """An analysis that ended well, seen by the optimiser.
+
+    coefficients (free,) MPa; residual (m,); jacobian (m, unknowns) or None; value: e of Eq. 3.7
+    or 4.8; histories: one a comparison; stable: every equilibrium that has to be
+    (`Comparison.must_be_stable`), as far as the solver looked.
+    """
+
+    unknowns: Array
+    coefficients: Array
+    residual: Array
+    value: float
+    jacobian: Array | None
+    histories: tuple[History, ...]
+    stable: bool = True
+
+    @property
+    def from_cache(self) -> bool:
+        """Whether nothing ran: every run of it was kept earlier."""
+        return bool(self.histories) and all(h.from_cache for h in self.histories)
+
+    @property
+    def status(self) -> str:
+        """What a history says of it."""
+        if self.stable:
+            return FROM_CACHE if self.from_cache else "ok"
+        return next(filter(None, (instability(h.unstable) for h in self.histories)))
+
+
+#: Called after every analysis with unknowns, e (None when it failed), what happened, who ran it.
+Watch = Callable[[Array, float | None, str, str], None]
+
+
+@dataclass(eq=False)
+class FitProblem:
+    """Comparisons, a law and unknowns of one fit; an analysis runs every comparison once.
+
+    After the blocks of the comparisons comes one of the nuisance unknowns that have a prior.
+
+    `law` carries nu12, strain range and thickness option; its beta is replaced, and nu12 where it
+    is an unknown. `surrogate`: the
+    same problem for a solver that differentiates, where this one's does not. `starts`: where starts
+    begin.
+
+    Raises
+    ------
+    InputError : no comparison, two of one name, or one whose nuisance is not among the unknowns.
+    """
+
+    comparisons: tuple[Comparison, ...]
+    law: HypoelasticLaw
+    unknowns: Unknowns
+    watch: Watch | None = None
+    surrogate: FitProblem | None = None
+    starts: Starts = field(default_factory=RandomStarts)
+    analyses: int = 0
+    unstable: int = 0  # of them, ended in an equilibrium that no test can show
+    cached: int = 0  # of them, from the cache of runs
+    failure: str = ""  # why the last one that failed did
+    warm_starts: bool = True
+    blocks: Blocks = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        names = [c.name for c in self.comparisons]
+        if not names or len(set(names)) < len(names):
+            problem = f"expected comparisons with a name of their own each, got {names}"
+            raise InputError(None, "comparisons", problem)
+        for comparison in self.comparisons:
+            if comparison.nuisance != self.unknowns.nuisance.comparisons.get(comparison.name, ()):
+                problem = f"the nuisance of {comparison.name} is not among the unknowns"
+                raise InputError(None, "unknowns", problem)
+        sizes = [n for c in self.comparisons for n in c.objective.sizes]
+        priors = len(self.unknowns.nuisance.priors[0])
+        self.blocks = Blocks([*sizes, priors] if priors else sizes)
+
+    @property
+    def solver(self) -> Solver:
+        """The solver that counts (each comparison has one of its own, of the same kind)."""
+        return self.comparisons[0].solver
+
+    @property
+    def differentiates(self) -> bool:
+        """Whether its solver gives exact derivatives."""
+        return isinstance(self.solver, DifferentiatingSolver)
+
+    @property
+    def scale(self) -> Array:
+        """(m,): units of its data (mm, N), or of the unknown, in one unit of each residual."""
+        own = [c.objective.scale for c in self.comparisons]
+        return np.concatenate([*own, 1.0 / self.unknowns.nuisance.priors[1]])
+
+    def rows(self, number: int) -> slice:
+        """Rows of the residual that belong to comparison `number`."""
+        sizes = [sum(c.objective.sizes) for c in self.comparisons]
+        return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
+
+    def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
+        """The same problem for other solvers, one a comparison: a surrogate."""
+        pairs = zip(self.comparisons, solvers, strict=True)
+        others = tuple(comparison.by(solver) for comparison, solver in pairs)
+        return FitProblem(others, self.law, self.unknowns)
+
+    def part(self, numbers: Sequence[int]) -> FitProblem:
+        """The fit to some of the comparisons, by their numbers; whoever watches hears which."""
+        some = tuple(self.comparisons[k] for k in numbers)
+        names = ", ".join(c.name for c in some)
+
+        def watch(y: Array, value: float | None, status: str, solver: str) -> None:
+            if self.watch is not None:
+                # Of another sum than this problem's e: it must not stand beside that.
+                end = status if value is None else f"{status}, e = {value:.6g}"
+                self.watch(y, None, f"{names} alone: {end}", solver)
+
+        return FitProblem(some, self.law, self.unknowns, watch, analyses=self.analyses)
+
+    def shift(self, here: Sequence[History], there: Sequence[History]) -> None:
+        """From now on reckon as if the solver gave `here` where it gives `there`."""
+        for comparison, h, t in zip(self.comparisons, here, there, strict=True):
+            comparison.objective = comparison.objective.shifted(h, t)
+
+    def reset(self) -> None:
+        """Forget the warm start and the count: every start of a study begins alike."""
+        self.analyses, self.unstable, self.cached = 0, 0, 0
+        self.failure, self.warm_starts = "", True
+        for comparison in self.comparisons:
+            comparison.forget()
+        if self.surrogate is not None:
+            self.surrogate.reset()
+
+    def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
+        """Run every comparison at unknowns y; None when one did not end well (Eqs 3.8, 4.9).
+
+        `warm`: start each increment from the last differentiated solution and its slope.
+        """
+        self.analyses += 1
+        law = self.unknowns.law(self.law, y)
+        free = self.unknowns.free
+        warm = warm and self.warm_starts
+        histories, residuals, jacobians = [], [], []
+        for comparison in self.comparisons:
+            nuisance = self.unknowns.nuisance_values(comparison.name, y)
+            try:
+                if with_jacobian:
+                    history, slope = comparison.differentiate(law, free, nuisance, warm)
+                    jacobians.append(self._by_unknowns(comparison, slope))
+                else:
+                    history = comparison.run(law, free, nuisance, warm)
+            except SolverFailure as failure:
+                self._failed(y, comparison, failure.line)
+                return None
+            residual = comparison.objective.residual(history, nuisance)
+            if not np.isfinite(residual).all():
+                self._failed(y, comparison, "the results are not finite")
+                return None
+            histories.append(history)
+            residuals.append(residual)
+        places, cost = self.unknowns.nuisance.priors
+        away = y[self.unknowns.size :] - self.unknowns.nuisance.start
+        whole = np.concatenate([*residuals, cost * away[places]])
+        places = self.unknowns.size + places
+        value = self.blocks.value(whole)
+        jacobian = None
+        if with_jacobian:
+            of_priors = cost[:, None] * np.eye(self.unknowns.count)[places]
+            jacobian = np.concatenate([*jacobians, of_priors])
+        pairs = zip(self.comparisons, histories, strict=True)
+        point = Evaluation(
+            y.copy(),
+            law.beta[list(free)],
+            whole,
+            value,
+            jacobian,
+            tuple(histories),
+            all(h.stable is not False for c, h in pairs if c.must_be_stable),
+        )
+        self.unstable += not point.stable
+        self.cached += point.from_cache
+        self._report(y, value, point.status)
+        return point
+
+    def _by_unknowns(self, comparison: Comparison, slope: Array) -> Array:
+        """(m, unknowns) from the slope by free entries of beta and the comparison's nuisance."""
+        p = self.unknowns
+        jacobian = np.zeros((len(slope), p.count))
+        jacobian[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
+        jacobian[:, p.nuisance_places(comparison.name)] = slope[:, p.size :]
+        return jacobian
+
+    def _failed(self, y: Array, comparison: Comparison, reason: str) -> None:
+        several = f"{comparison.name}: " if len(self.comparisons) > 1 else ""
+        self.failure = several + reason
+        self._report(y, None, self.failure)
+
+    def _report(self, y: Array, value: float | None, status: str) -> None:
+        if self.watch is not None:
+            self.watch(y, value, status, self.solver.name)
+
+
+@dataclass(eq=False)
+class WeightedProblem(FitProblem):
+    """The same comparisons and unknowns; every residual is multiplied by a factor.
+
+    Parameters
+    ----------
+    factors : (m,), zero for what does not count.
+    """
+
+    factors: Array = field(default_factory=lambda: np.empty(0))
+
+    @classmethod
+    def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
+        """The fit to a problem's data, weighted anew; the other problem is left as it is.
+
+        What was differentiated last in the other problem is where the first analysis starts from.
+        """
+        comparisons = tuple(replace(comparison) for comparison in problem.comparisons)
+        return cls(comparisons, problem.law, problem.unknowns, factors=factors)
+
+    def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
+        """Run every comparison at unknowns y; None when one did not end well."""
+        point = super().evaluate(y, with_jacobian, warm)
+        return None if point is None else self.seen(point)
+
+    def seen(self, point: Evaluation) -> Evaluation:
+        """An analysis of the problem without factors as this one sees it: nothing is run."""
+        residual, slope = self.factors * point.residual, point.jacobian
+        return replace(
+            point,
+            residual=residual,
+            value=self.blocks.value(residual),
+            jacobian=None if slope is None else self.factors[:, None] * slope,
+        )
+
+
+# How a fit ends, as a user reads it.
+CONVERGED = "converged"
+LEVEL = "settled"
+ANALYSES_USED_UP = "analyses used up"
+RUNS_USED_UP = "runs used up"
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The best feasible point of one start.
+
+    status : how the fit ended. analyses : all of them; runs : those of them that the solver that
+    counts ran while a surrogate led (0 where there is none). failure : why the solver that counts
+    failed, where that and nothing else ended the fit.
+    """
+
+    best: Evaluation
+    status: str
+    analyses: int
+    runs: int = 0
+    failure: str = ""
+
+    @property
+    def value(self) -> float:
+        """The objective e at the best feasible point."""
+        return self.best.value
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """The law's free coefficients (MPa) at the best feasible point."""
+        return self.best.coefficients

@@ -1,0 +1,221 @@
+"""One fit from one start, by any method, for any solver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoFeasibleStart
+from ..materials.law import HypoelasticLaw
+from .comparison import Comparison, Objective
+from .methods import method_named
+from .methods.base import FitOptions, Method
+from .methods.descent import descend
+from .problem import CONVERGED, LEVEL, RUNS_USED_UP, Evaluation, FitProblem, Optimum
+from .unknowns import MOST_DRAWS, LawBounds, Unknowns
+
+Array = NDArray[np.float64]
+
+
+def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
+    """Unknowns at the least of the misfit of the comparisons that lead in; `start` without any.
+
+    Those of the lowest stage are matched first, then those of the lowest two, and so on; the fit
+    of all begins where the last but one ended. From a random start nearly every step of a fit of
+    several tests can end without an equilibrium of one that is hard to run, and the fit creeps:
+    strips along the yarns get to their optimum from anywhere; from there a bias strip does, which
+    mostly has the shear modulus to find; and from there all tests together. `start` also where a
+    comparison fails, or is unstable, at the optimum of the others.
+    """
+    stages = sorted({c.stage for c in problem.comparisons})
+    if len(stages) < 2:
+        return start
+    y = start
+    for last in stages[:-1]:
+        part = problem.part([k for k, c in enumerate(problem.comparisons) if c.stage <= last])
+        optimum = method.minimise(part, y, options)
+        problem.analyses = part.analyses
+        if problem.analyses >= options.max_analyses:
+            return start
+        y = start if optimum is None else optimum.best.unknowns
+    point = problem.evaluate(y, False, warm=False)
+    return y if point is not None and point.stable else start
+
+
+# A fit to a solver without derivatives: a surrogate leads, the other corrects it.
+#
+# Minimised is surrogate(beta) + [other(beta_k) - surrogate(beta_k)] - data , with the surrogate's
+# exact Jacobian; the other solver then runs once at the new beta, and so on until its own
+# objective is level. A step that worsens that objective is shortened (trust region). What counts,
+# and what is returned, is always the other solver's objective.
+
+NOT_WORTH_A_RUN = 0.1  # relative decrease of e by one run
+SHORTER = 0.5
+MOST_SHORTER = 3  # steps in a row
+
+
+def corrected_fit(
+    problem: FitProblem, start: Array, method: Method, options: FitOptions
+) -> Optimum | None:
+    """Fit from the unknowns `start`; None when the other solver fails wherever the surrogate leads.
+
+    Parameters
+    ----------
+    problem : with the solver that counts, and a `surrogate` that differentiates.
+    method : for the surrogate's fits.
+    options : `max_analyses` of the surrogate in each of its fits, `max_runs` of the solver that
+        counts.
+    """
+    surrogate = problem.surrogate
+    assert surrogate is not None
+    with _corrections_of(surrogate) as objectives:
+        best: Evaluation | None = None
+        status, shorter, failure = RUNS_USED_UP, 0, ""
+        y = _lead(surrogate, start, method, options)
+        while y is not None and problem.analyses < options.max_runs:
+            point = problem.evaluate(y, False)
+            worse = point is not None and best is not None and point.value >= best.value
+            if point is None or not point.stable or worse:
+                if shorter == MOST_SHORTER or _is_level(point, best):
+                    status, failure = LEVEL, problem.failure if point is None else ""
+                    break
+                shorter += 1
+                origin = start if best is None else best.unknowns
+                y = origin + SHORTER * (y - origin)
+                continue
+            level = best is not None and point.value > (1 - NOT_WORTH_A_RUN) * best.value
+            best, shorter = point, 0
+            if level or best.value < options.tolerance:
+                status = LEVEL if level else CONVERGED
+                break
+            beside = surrogate.evaluate(y, False, warm=False)
+            if beside is None:
+                status = f"{surrogate.solver.name} failed"
+                break
+            _restore(surrogate, objectives)
+            surrogate.shift(point.histories, beside.histories)
+            y = _lead(surrogate, y, method, options)
+    if best is None:
+        return None
+    status = f"{problem.solver.name} failed: {failure}" if failure else status
+    runs = problem.analyses
+    return Optimum(best, status, runs + surrogate.analyses, runs, failure)
+
+
+def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:
+    """Whether a run that went wrong was not much worse than the best."""
+    if point is None or best is None or not point.stable:
+        return False
+    return point.value < (1 + NOT_WORTH_A_RUN) * best.value
+
+
+@contextmanager
+def _corrections_of(surrogate: FitProblem) -> Iterator[list[Objective]]:
+    """The surrogate's own objectives, which it has again at the end."""
+    objectives = [comparison.objective for comparison in surrogate.comparisons]
+    try:
+        yield objectives
+    finally:
+        _restore(surrogate, objectives)
+
+
+def _restore(surrogate: FitProblem, objectives: Sequence[Objective]) -> None:
+    for comparison, objective in zip(surrogate.comparisons, objectives, strict=True):
+        comparison.objective = objective
+
+
+def _lead(surrogate: FitProblem, y: Array, method: Method, options: FitOptions) -> Array | None:
+    """Unknowns at the least of the surrogate's (corrected) objective."""
+    surrogate.warm_starts = True
+    most = surrogate.analyses + options.max_analyses
+    optimum = method.minimise(surrogate, y, replace(options, max_analyses=most))
+    return None if optimum is None else optimum.best.unknowns
+
+
+def fit_from(
+    problem: FitProblem, start: Array, options: FitOptions, near: bool = False
+) -> Optimum | None:
+    """Fit from the unknowns `start`; None when the analysis at the start fails.
+
+    near : an optimum is near (a fit on another mesh ended there), so that nothing leads in.
+
+    Raises
+    ------
+    InputError : there is no such method.
+    """
+    method = method_named(options.method)
+    if not method.needs_slope:
+        return method.minimise(problem, start, options)
+    y = start if near else approach(problem.surrogate or problem, start, method, options)
+    if problem.surrogate is not None:
+        return corrected_fit(problem, y, method, options)
+    return method.minimise(problem, y, options)
+
+
+MOST_ANALYSES = 50
+
+
+def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
+    """Unknowns of start `number` of the study `seed`: the same on any machine.
+
+    Candidates of the problem's `starts`, whose moduli are positive over the strain range, are tried
+    until an analysis ends well, in a stable equilibrium.
+
+    Raises
+    ------
+    NoFeasibleStart : none in 200,000 draws or 50 analyses.
+    """
+    # Where another solver counts, its runs are not spent on draws.
+    starts, problem = problem.starts, problem.surrogate or problem
+    unknowns = problem.unknowns
+    tried = 0
+    for coefficients in starts.candidates(unknowns, seed, number):
+        tried += 1
+        y = unknowns.at(coefficients)
+        point = problem.evaluate(y, False, warm=False)
+        if point is not None and point.stable:
+            return y
+        if tried >= MOST_ANALYSES:
+            raise NoFeasibleStart(
+                f"start {number}: the analysis failed at all of {tried} random points with "
+                "positive moduli; raise the lower bounds or add increments"
+            )
+    raise NoFeasibleStart(
+        f"start {number}: none of {MOST_DRAWS} random points inside the bounds has positive "
+        "moduli over the strain range; check the bounds and the strain range"
+    )
+
+
+#: MPa: the law is given and not looked for; bounds only size the unknowns.
+ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
+
+#: Analyses in which what is no law (offsets, the sheet's surface) is fitted to the tests.
+MOST = 40
+TOLERANCE = 1e-9
+
+
+def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[FitProblem, Array]:
+    """Comparisons with a law that is given, and its unknowns (count,), nuisance at its start."""
+    ends = law.strain_range.tolist()
+    unknowns = Unknowns.of(law.form, law.nu12, ends, LawBounds.of_moduli(ANY), comparisons)
+    y = unknowns.at(law.beta[list(unknowns.free)])
+    return FitProblem(tuple(comparisons), law, unknowns), y
+
+
+def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
+    """At the law of unknowns y, the nuisance where it fits best; None where an analysis failed.
+
+    The nuisance stays as in y where the problem's solver gives no derivatives.
+    """
+    if not problem.unknowns.nuisance.all or not problem.differentiates:
+        return problem.evaluate(y, with_jacobian, warm=False)
+    first = problem.evaluate(y, True)
+    if first is None:
+        return None
+    free = np.arange(problem.unknowns.count) >= problem.unknowns.size
+    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, only=free)
+    return best

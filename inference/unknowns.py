@@ -1,0 +1,491 @@
+"""The unknowns of a fit: moduli at the control strains of the law's form, and nuisance.
+
+The coefficients of a law (the free entries of its beta, in MPa) may be badly scaled (monomials:
+condition 1e8 against 6e3 in modulus values), so the fit works in values of the moduli at control
+strains. Bounds on the coefficients and on the moduli are linear in either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import islice
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+from ..errors import InputError
+from ..materials.forms.base import SHEAR, Form, moduli_on_grid
+from ..materials.law import HypoelasticLaw, definite_rows
+from .comparison import Comparison, NuisanceOf
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LawBounds:
+    """Bounds of a law's numbers; made by `of_moduli` or `of_entries`.
+
+    Parameters
+    ----------
+    least : MPa, by modulus: nowhere on the strain range may it be less.
+    largest : MPa, by modulus: nor may it be more; None where the coefficients are bounded.
+    lower, upper : (free,) MPa, of the free coefficients; None where the moduli are bounded.
+    """
+
+    least: Mapping[str, float]
+    largest: Mapping[str, float] | None = None
+    lower: Array | None = None
+    upper: Array | None = None
+
+    @classmethod
+    def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
+        """Every modulus between its (least, largest), MPa; starts are drawn from modulus values.
+
+        Raises
+        ------
+        InputError : a least modulus that is not positive and below the largest.
+        """
+        for name, (low, high) in ranges.items():
+            if not 0 < low < high:
+                problem = f"expected 0 < least < largest, got [{low:g}, {high:g}]"
+                raise InputError(None, f"bounds.{name}", problem)
+        return cls(
+            {name: float(low) for name, (low, _) in ranges.items()},
+            {name: float(high) for name, (_, high) in ranges.items()},
+        )
+
+    @classmethod
+    def of_entries(
+        cls, lower: ArrayLike, upper: ArrayLike, margins: Mapping[str, float]
+    ) -> LawBounds:
+        """Every coefficient between `lower` and `upper` (free,) MPa; starts are drawn from there.
+
+        margins : MPa, by modulus, the least that it may be anywhere on the strain range.
+
+        Raises
+        ------
+        InputError : a lower bound above its upper one.
+        """
+        low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        if low.shape != high.shape or not (low <= high).all():
+            problem = f"expected lower <= upper, got {low.tolist()} and {high.tolist()}"
+            raise InputError(None, "bounds", problem)
+        return cls(dict(margins), None, low, high)
+
+    def check(self, form: Form) -> None:
+        """Say what does not go with a form.
+
+        Raises
+        ------
+        InputError : a modulus without bounds, or bounds of another number of coefficients.
+        """
+        missing = [name for name in dict.fromkeys(form.modulus_of) if name not in self.least]
+        if missing:
+            raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
+        count = len(form.free)
+        if self.lower is not None and self.lower.shape != (count,):
+            problem = f"expected {count} of a {form.name} law, got {len(self.lower)}"
+            raise InputError(None, "bounds.lower", problem)
+
+    def box(self, form: Form, from_values: Array) -> tuple[Array, Array]:
+        """Lower and upper (free,) of the free coefficients, MPa.
+
+        Where the moduli are bounded this is the smallest box that holds every law whose moduli
+        are between their bounds at the form's control strains.
+        """
+        if self.lower is not None and self.upper is not None:
+            return self.lower, self.upper
+        ends = self.control(form)
+        low, high = from_values * ends[0], from_values * ends[1]
+        return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
+
+    def control(self, form: Form) -> tuple[Array, Array]:
+        """Least and largest (free,) modulus at the form's control strains, MPa."""
+        assert self.largest is not None
+        least = np.array([self.least[name] for name in form.modulus_of])
+        return least, np.array([self.largest[name] for name in form.modulus_of])
+
+
+Flags = NDArray[np.bool_]
+
+#: MPa; a bound that is zero or negative says nothing of the size of a modulus.
+SMALLEST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What a fit may change, between which bounds, and how the optimisers see it.
+
+    Unknowns y (count,) are moduli at control strains, each in units of its modulus' own size, then
+    the nuisance in its units: what comparisons share, then comparison by comparison.
+
+    Parameters
+    ----------
+    form : how the law's numbers make its moduli.
+    strain_range : ends (eps1, eps2, gamma12) over which bounds are asked.
+    bounds : of the law.
+    nuisance : of the comparisons.
+    definite_nu12 : Poisson's ratio of a law that has to be positive definite where the fabric
+        contracts, None where it need not.
+    """
+
+    form: Form
+    strain_range: tuple[float, ...]
+    bounds: LawBounds
+    nuisance: NuisanceOf = field(default_factory=NuisanceOf)
+    definite_nu12: float | None = None
+
+    @classmethod
+    def of(
+        cls,
+        form: Form,
+        nu12: float,
+        strain_range: ArrayLike,
+        bounds: LawBounds,
+        comparisons: Iterable[Comparison] = (),
+    ) -> Unknowns:
+        """Of a fit: the law's, and what its comparisons add.
+
+        Raises
+        ------
+        InputError : bounds that do not go with the form.
+        """
+        bounds.check(form)
+        several = tuple(comparisons)
+        nuisance = NuisanceOf({c.name: c.nuisance for c in several})
+        # Where it is unknown, whatever it may be: the largest is the strictest.
+        most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
+        return cls(
+            form,
+            tuple(np.asarray(strain_range, dtype=float).tolist()),
+            bounds,
+            nuisance,
+            most if any(c.contracts for c in several) else None,
+        )
+
+    # Their places and names
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Place of each free coefficient in the law's beta."""
+        return self.form.free
+
+    @property
+    def size(self) -> int:
+        """Number of the law's unknowns."""
+        return len(self.form.free)
+
+    @property
+    def count(self) -> int:
+        """Number of all unknowns."""
+        return self.size + len(self.nuisance.all)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Of the free coefficients, for histories and tables."""
+        return tuple(self.form.labels[i] for i in self.free)
+
+    @property
+    def nuisance_names(self) -> tuple[str, ...]:
+        """Of the nuisance, with its comparison where there are several."""
+        return self.nuisance.names
+
+    def nuisance_values(self, comparison: str, y: Array) -> dict[str, float]:
+        """The nuisance of a comparison by plain name at unknowns y, in its units."""
+        return self.nuisance.values(comparison, y[self.size :])
+
+    def nuisance_places(self, comparison: str) -> NDArray[np.intp]:
+        """Where the nuisance of a comparison lies among the unknowns."""
+        return self.size + self.nuisance.places(comparison)
+
+    @cached_property
+    def shear(self) -> Flags:
+        """(count,) which unknowns make the modulus that a loss of stability hangs on."""
+        extra = self.count - self.size
+        return np.array([*(name == SHEAR for name in self.form.modulus_of), *[False] * extra])
+
+    # From unknowns to the law and back
+
+    @cached_property
+    def from_values(self) -> Array:
+        """(size, size): free coefficients = this @ moduli (MPa) at the control strains."""
+        return self.form.from_values(self.strain_range)
+
+    @cached_property
+    def to_coefficients(self) -> Array:
+        """(size, size): free coefficients (MPa) = this @ unknowns."""
+        return self.from_values * self._sizes
+
+    @cached_property
+    def _sizes(self) -> Array:
+        """(size,) MPa: geometric mean of the bounds of each unknown's modulus."""
+        if self.bounds.largest is not None:
+            least, largest = self.bounds.control(self.form)
+            return np.sqrt(least * largest)
+        lower, upper = self.box
+        sizes = {}
+        for name, rows in self.moduli.items():
+            # At zero strain, where the box says what a modulus can be.
+            at_lower, at_upper = rows[0] * lower, rows[0] * upper
+            ends = np.minimum(at_lower, at_upper).sum(), np.maximum(at_lower, at_upper).sum()
+            sizes[name] = np.sqrt(max(ends[0], SMALLEST) * max(ends[1], SMALLEST))
+        return np.array([sizes[name] for name in self.form.modulus_of])
+
+    def beta(self, y: Array) -> Array:
+        """The law's beta (MPa) at unknowns y (count,)."""
+        full = np.zeros(self.form.size)
+        full[list(self.free)] = self.to_coefficients @ y[: self.size]
+        return full
+
+    def law(self, law: HypoelasticLaw, y: Array) -> HypoelasticLaw:
+        """A law with the numbers that unknowns y (count,) say, nu12 where it is one of them."""
+        numbers: dict[str, Any] = {"beta": self.beta(y), **self.nuisance.of_law(y[self.size :])}
+        return replace(law, **numbers)
+
+    def at(self, coefficients: Array) -> Array:
+        """Unknowns (count,) of free coefficients (size,) MPa, nuisance where a fit starts."""
+        values = np.linalg.solve(self.to_coefficients, coefficients)
+        return np.concatenate([values, self.nuisance.start])
+
+    # What is allowed
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Lower and upper (size,) of the free coefficients, MPa."""
+        return self.bounds.box(self.form, self.from_values)
+
+    @cached_property
+    def moduli(self) -> dict[str, Array]:
+        """By modulus, rows (n, size): rows @ free coefficients are moduli on a strain grid."""
+        columns = list(self.free)
+        grids = moduli_on_grid(self.form, self.strain_range)
+        return {name: rows[:, columns] for name, rows in grids.items()}
+
+    @cached_property
+    def positivity(self) -> tuple[Array, Array]:
+        """A, margin of `A @ coefficients >= margin`: the moduli on their strain grids, MPa."""
+        margin = [np.full(len(rows), self.bounds.least[name]) for name, rows in self.moduli.items()]
+        return np.vstack(list(self.moduli.values())), np.concatenate(margin)
+
+    @cached_property
+    def ceiling(self) -> Array | None:
+        """The largest modulus allowed in each row of `positivity`, MPa."""
+        most = self.bounds.largest
+        if most is None:
+            return None
+        return np.concatenate([np.full(len(r), most[name]) for name, r in self.moduli.items()])
+
+    @cached_property
+    def inequalities(self) -> tuple[Array, Array]:
+        """A, c of `A @ y >= c`: what the law and the nuisance are allowed; rows scaled.
+
+        The first rows are the moduli of `positivity`.
+        """
+        t, (grid, margin), (lower, upper) = self.to_coefficients, self.positivity, self.box
+        # A coefficient between equal bounds is scaled by itself.
+        width = upper - lower
+        width = np.where(width > 0, width, np.maximum(np.abs(upper), 1.0))
+        moduli = grid @ t
+        unit = 1.0 / np.abs(moduli).max(axis=1)
+        a = [moduli * unit[:, None], t / width[:, None], -t / width[:, None]]
+        c = [margin * unit, lower / width, -upper / width]
+        if self.ceiling is not None:
+            a.append(-moduli * unit[:, None])
+            c.append(-self.ceiling * unit)
+        if self.definite_nu12 is not None:
+            rows = definite_rows(self.form, self.definite_nu12, self.strain_range)
+            definite = rows[:, list(self.free)] @ t
+            a.append(definite / np.abs(definite).max(axis=1, keepdims=True))
+            c.append(np.zeros(len(definite)))
+        law, extra = np.vstack(a), self.count - self.size
+        whole = np.zeros((len(law) + 2 * extra, self.count))
+        whole[: len(law), : self.size] = law
+        whole[len(law) :, self.size :] = np.vstack([np.eye(extra), -np.eye(extra)])
+        low, high = self.nuisance.bounds
+        return whole, np.concatenate([*c, low, -high])
+
+    @cached_property
+    def stability_rows(self) -> Array:
+        """The rows of `inequalities` that keep up the modulus that stability hangs on."""
+        names = np.concatenate([[name] * len(rows) for name, rows in self.moduli.items()])
+        return self.inequalities[0][: len(names)][names == SHEAR]
+
+    def is_positive(self, coefficients: Array) -> bool:
+        """Every modulus above its margin on the grid, at coefficients (size,) MPa (Eq. 4.9)."""
+        grid, margin = self.positivity
+        return bool((grid @ coefficients >= margin).all())
+
+
+#: Values of one modulus that are drawn.
+MOST_VALUES = 4
+
+
+def draw(unknowns: Unknowns, random: np.random.Generator, count: int) -> Array:
+    """`count` random free coefficients (count, size) MPa, not all of them feasible."""
+    return coefficients_at(unknowns, random.random((count, dimensions(unknowns))))
+
+
+def dimensions(unknowns: Unknowns) -> int:
+    """How many numbers between 0 and 1 say where a law is inside the bounds."""
+    if unknowns.bounds.largest is None:
+        return unknowns.size
+    return _between(unknowns.form.modulus_of).shape[1]
+
+
+def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
+    """Free coefficients (count, size) MPa at places (count, dimensions) between 0 and 1.
+
+    Even in the box of their bounds; where the moduli themselves are bounded, even in the
+    logarithm of their values at the control strains.
+    """
+    if unknowns.bounds.largest is None:
+        lower, upper = unknowns.box
+        return np.asarray(lower + (upper - lower) * share)
+    between = _between(unknowns.form.modulus_of)
+    ends = [np.log(end) for end in unknowns.bounds.control(unknowns.form)]
+    values = np.exp(ends[0] + (ends[1] - ends[0]) * (share @ between.T))
+    return np.asarray(values @ unknowns.from_values.T)
+
+
+def _between(modulus_of: Sequence[str]) -> Array:
+    """(size, drawn): from what is drawn to the control values of every modulus.
+
+    Values of their own where a modulus has few; more are interpolated, because a curve through
+    many independent ones hardly ever stays inside its bounds between them.
+    """
+    blocks = []
+    for name in dict.fromkeys(modulus_of):
+        count = sum(own == name for own in modulus_of)
+        few = min(count, MOST_VALUES)
+        at = np.linspace(0.0, few - 1.0, count)
+        blocks.append(np.column_stack([np.interp(at, range(few), row) for row in np.eye(few)]))
+    return np.asarray(block_diag(*blocks))
+
+
+def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:
+    """Which of the free coefficients (n, size) MPa make moduli inside their bounds, (n,)."""
+    grid, margin = unknowns.positivity
+    moduli = coefficients @ grid.T
+    good = (moduli >= margin).all(axis=1)
+    if unknowns.ceiling is not None:
+        good &= (moduli <= unknowns.ceiling).all(axis=1)
+    return np.asarray(good)
+
+
+# Where starts begin: at random, at the points of a Sobol sequence, or where earlier ones led.
+#
+# Each gives the candidates of a start by its number alone, in order: the same on any machine, and
+# whichever other starts there are.
+
+MOST_DRAWS = 200_000
+BATCH = 500
+#: Points of a Sobol sequence that are even in every box come in powers of two.
+SOBOL_BATCH = 512
+#: Random candidates among which the most promising is a proposed start, and evaluations that a
+#: prediction is made of.
+CANDIDATES, NEIGHBOURS = 64, 5
+EXTRA = "scikit-learn is not installed; pip install 'bubblefit[proposals]'"
+
+
+class Starts(Protocol):
+    """A way to choose starts."""
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """Free coefficients (size,) MPa of allowed moduli, the one to begin at first."""
+        ...
+
+
+@dataclass(frozen=True)
+class RandomStarts:
+    """Every start is drawn by itself."""
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """As many as there are among 200,000 draws."""
+        random = np.random.default_rng([seed, number])
+        for _ in range(MOST_DRAWS // BATCH):
+            draws = draw(unknowns, random, BATCH)
+            yield from draws[allowed(unknowns, draws)]
+
+
+@dataclass(frozen=True)
+class SobolStarts:
+    """Starts spread evenly: start k is allowed point k of the sequence that the seed scrambles.
+
+    Where that cannot be analysed, random points follow.
+    """
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """The point, and random ones after it."""
+        from scipy.stats import qmc
+
+        sequence, before = qmc.Sobol(dimensions(unknowns), seed=seed), 0
+        for _ in range(MOST_DRAWS // SOBOL_BATCH):
+            points = coefficients_at(unknowns, sequence.random(SOBOL_BATCH))
+            good = points[allowed(unknowns, points)]
+            if number < before + len(good):
+                yield good[number - before]
+                break
+            before += len(good)
+        yield from RandomStarts().candidates(unknowns, seed, number)
+
+
+@dataclass(frozen=True, eq=False)
+class ProposedStarts:
+    """Starts where earlier evaluations of the same model were good.
+
+    Start k is the one of 64 random candidates for which least is predicted: starts differ, since
+    each has candidates of its own.
+
+    Parameters
+    ----------
+    coefficients : (n, size) MPa, of the earlier evaluations. objectives : (n,).
+
+    Raises
+    ------
+    InputError : scikit-learn is not installed.
+    """
+
+    coefficients: Array
+    objectives: Array
+
+    def __post_init__(self) -> None:
+        try:
+            import sklearn  # noqa: F401
+        except ImportError:
+            raise InputError(None, "fit.starts_from", EXTRA) from None
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        """The most promising first."""
+        random = RandomStarts().candidates(unknowns, seed, number)
+        first = list(islice(random, CANDIDATES))
+        if first:
+            expected = self.predicted(unknowns, np.array(first))
+            yield from (first[k] for k in np.argsort(expected, kind="stable"))
+        yield from random
+
+    def predicted(self, unknowns: Unknowns, coefficients: Array) -> Array:
+        """(n,) decadic logarithm of the objective to be expected at coefficients (n, size)."""
+        return np.asarray(self._regression(unknowns).predict(_places(unknowns, coefficients)))
+
+    def _regression(self, unknowns: Unknowns) -> Any:
+        from sklearn.neighbors import KNeighborsRegressor
+
+        if "regression" not in self._made:
+            near = KNeighborsRegressor(min(NEIGHBOURS, len(self.objectives)), weights="distance")
+            values = np.log10(np.maximum(self.objectives, np.finfo(float).tiny))
+            self._made["regression"] = near.fit(_places(unknowns, self.coefficients), values)
+        return self._made["regression"]
+
+    @cached_property
+    def _made(self) -> dict[str, Any]:
+        return {}
+
+
+def _places(unknowns: Unknowns, coefficients: Array) -> Array:
+    """(n, size) logarithm of the moduli at the control strains: equal steps mean equal ratios."""
+    moduli = np.linalg.solve(unknowns.from_values, coefficients.T).T
+    return np.asarray(np.log(np.maximum(moduli, 1e-6)))

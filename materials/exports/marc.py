@@ -1,0 +1,176 @@
+"""MSC Marc: the law as user subroutine HYPELA2."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...files import render
+from ..card import MaterialCard
+from ..law import HypoelasticLaw
+from ..responses import bar
+from ..tables import JUMP, ModulusTable, modulus_tables
+from .base import (
+    Export,
+    Format,
+    NoOptions,
+    Says,
+    TableOptions,
+    double,
+    heading,
+    law_constants,
+    logical,
+    range_remarks,
+)
+
+#: STATE VARS, temperature included: strain, stress, and the transverse shears of thick shells.
+STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
+#: Least transverse shear modulus of thick shells, MPa.
+LEAST = 1e-3
+#: The check of a licence holder: engineering strain of one element, in equal increments.
+ELONGATION, INCREMENTS, SHEAR = 0.1, 100, 0.01
+
+SAYS = Says(
+    carries=(
+        "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
+        "hold",
+    ),
+    loses=("the transverse shear of thick shells is linear, with G12 at no strain",),
+    confirm=("the conventions listed below; no Marc was at hand",),
+)
+
+
+def hypela2(card: MaterialCard, options: NoOptions) -> Export:
+    """The subroutine for one card, whatever the number of its material in Marc."""
+    head = heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
+    return Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
+
+
+def hypela2_source(
+    laws: Mapping[int, HypoelasticLaw],
+    head: str = "! MSC Marc user subroutine HYPELA2",
+    own_state: bool = True,
+    symmetric: bool = True,
+) -> str:
+    """Fortran source, good as fixed and as free form.
+
+    Parameters
+    ----------
+    laws : by user material identification number (MATUS(1)); a single one is for all numbers.
+    head : comment lines.
+    own_state : strain and stress at the start from state variables, else from Marc's e and s.
+    symmetric : hand over the symmetric part of the tangent, as Marc's default solver needs.
+    """
+    written: list[dict[str, Any]] = [
+        {
+            "id": number,
+            "constants": law_constants(law),
+            "across": max(float(law.G12(0.0)), LEAST),
+            "power": law.area_power,
+        }
+        for number, law in laws.items()
+    ]
+    return render(
+        "marc/hypela2.f.j2",
+        head=head,
+        laws=written,
+        bar=_check(next(iter(laws.values()))),
+        power=next(iter(laws.values())).area_power,
+        states=STATE_VARIABLES,
+        size=max(len(law["constants"]) for law in written),
+        own_state=own_state,
+        symmetric=symmetric,
+        double=double,
+        fortran=logical,
+    )
+
+
+def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
+    """What one element has to answer; None where the law fails on the way."""
+    elongation = float(np.expm1(min(np.log1p(ELONGATION), law.strain_range[0])))
+    ends = np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
+    try:
+        strain, stress = bar(law, 0, ends)
+    except InputError:
+        return None
+    shear, _ = law.increment(np.zeros(3), np.array([0.0, 0.0, SHEAR]), np.zeros(3))
+    thinning = math.exp((law.area_power - 1) * (strain[-1, 0] + strain[-1, 1]))
+    return {
+        "elongation": elongation,
+        "increments": INCREMENTS,
+        "stress": stress[-1, 0] * thinning,
+        "shear": float(shear[0, 2]),
+    }
+
+
+FORMAT = Format("marc-hypela2", hypela2)
+
+
+#: Table numbers in the deck, by modulus.
+NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
+#: The modulus is held as far as this from the ends of its table, whether or not Marc extrapolates.
+GUARD = 1.0
+
+
+def nlelast(card: MaterialCard, options: TableOptions) -> Export:
+    """TABLE and NLELAST blocks of an extended-format deck."""
+    tables = modulus_tables(card.law, options.points, options.reach)
+    largest = max(table.error for table in tables.values())
+    loses = [
+        f"moduli are straight lines between {options.points} points (more where a modulus has "
+        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most",
+    ]
+    if any(len(table.jumps) for table in tables.values()):
+        loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")
+    if card.law.area_power == 0:
+        loses.append("the card's incompressible thickness: NLELAST has no such choice")
+    says = Says(
+        carries=(
+            "tangent moduli of log strain, nu12, moduli held outside their range",
+            "stress is Cauchy stress under LARGE STRAIN; published Marc results of this law "
+            "agree with the integral of E over log strain",
+        ),
+        loses=(*loses, *range_remarks(card, options.reach)),
+        confirm=(
+            "the data blocks of NLELAST and the variable type 73 of its tables: no public deck "
+            "shows them (bubblefit docs marc-deck)",
+            "that tables of G12 are looked up with the engineering shear, sign included",
+        ),
+    )
+    text = render(
+        "marc/nlelast_card.dat.j2",
+        head=heading(card, "MSC Marc NLELAST, extended format", says, "$"),
+        tables=[
+            {"name": name.lower(), "number": NUMBERS[name], "rows": _rows(tables[name])}
+            for name in NUMBERS
+        ],
+        nu12=card.law.nu12,
+        name=_name(card),
+        real=_real,
+    )
+    return Export({".dat": text}, says)
+
+
+def _rows(table: ModulusTable) -> list[tuple[float, float]]:
+    strain, modulus = table.strain.tolist(), table.modulus.tolist()
+    before = (strain[0] - GUARD, modulus[0])
+    after = (strain[-1] + GUARD, modulus[-1])
+    return [before, *zip(strain, modulus, strict=True), after]
+
+
+def _name(card: MaterialCard) -> str:
+    """A name of at most 24 characters that Marc takes."""
+    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
+    return kept.strip("_")[:24] or "fabric"
+
+
+def _real(value: float) -> str:
+    """20 columns with 13 digits."""
+    return f"{value:20.13E}"
+
+
+FORMAT_MARC_NLELAST = Format("marc", nlelast, TableOptions)

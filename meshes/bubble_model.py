@@ -1,0 +1,225 @@
+"""The inflated circular membrane (thesis chapter 4) as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .mesh import Mesh
+
+THICKNESS = "thickness"
+
+
+def changes_anything(known: Sequence[str], values: Mapping[str, float]) -> bool:
+    """Whether values added to parameters change a model.
+
+    Raises
+    ------
+    InputError : no such parameter.
+    """
+    unknown = [name for name in values if name not in known]
+    if unknown:
+        raise InputError(None, "parameters", f"{unknown} not among {tuple(known)}")
+    return any(values.values())
+
+
+class OfThickness:
+    """A model, a dataclass with a `thickness`, of which nothing else is a parameter."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What `with_parameters` changes: thickness (mm)."""
+        return (THICKNESS,)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """The same model with `values` added to its `parameters`; itself where all are zero.
+
+        Raises
+        ------
+        InputError : no such parameter, or the thickness would not be positive.
+        """
+        if not changes_anything(self.parameters, values):
+            return self
+        model: Any = self
+        changed: Self = replace(model, thickness=model.thickness + values[THICKNESS])
+        return changed
+
+
+Array = NDArray[np.float64]
+
+#: Pinned rim; symmetry lines where the mesh has them.
+RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
+    "rim": (0, 1, 2),
+    "symmetry_x": (0,),
+    "symmetry_y": (1,),
+}
+
+
+#: Parameters of the stress-free sheet beside its modes.
+SLACK = ("slack_warp", "slack_fill")
+PRESSURE_OFFSET = "pressure_offset"
+
+
+@dataclass(frozen=True, eq=False)
+class BubbleModel:
+    """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
+
+    Parameters
+    ----------
+    mesh : mm; warp is x, fill is y. z is the surface of the sheet in the reference picture, from
+        which displacements are counted.
+    thickness : mm, in the reference state.
+    pressures : MPa, strictly increasing: the frames to report.
+    increments : MPa, strictly increasing, containing every pressure: the steps over which the
+        hypoelastic law is integrated; the pressures unless given. They hardly matter to the
+        result (benchmarks/bench_increments.py).
+    supports : degrees of freedom held at zero, by node set; those of the rim where it moves.
+    modes : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm.
+    slack : how much longer the stress-free sheet is than the reference picture along x (warp) and
+        y (fill), as a share: 0.001 is 0.1 %.
+    rim_motion : (increments, rim nodes, 3) mm, where the rim is at the end of every increment,
+        counted from the reference picture; None for a rim that stays.
+
+    Raises
+    ------
+    InputError : pressures that do not increase, increments without one of the pressures, a
+        support on a set that the mesh does not have (symmetry sets excepted), a motion or a mode
+        of another number of nodes, a sheet shorter than nothing.
+    """
+
+    mesh: Mesh
+    thickness: float
+    pressures: Sequence[float]
+    increments: Sequence[float] = ()
+    supports: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: RIM_AND_SYMMETRY)
+    modes: Mapping[str, Array] = field(default_factory=dict)
+    slack: tuple[float, float] = (0.0, 0.0)
+    rim_motion: Array | None = None
+
+    def __post_init__(self) -> None:
+        steps = np.array(self.increments if len(self.increments) else self.pressures, float)
+        wanted = np.array(self.pressures, float)
+        for name, values in (("pressures", wanted), ("increments", steps)):
+            if not len(values) or not (np.diff(values, prepend=0.0) > 0).all():
+                raise InputError(None, name, f"expected positive, increasing, got {values} MPa")
+        near = np.abs(steps[:, None] - wanted).min(axis=0) if len(steps) else wanted
+        if (near > 1e-9 * wanted).any():
+            raise InputError(None, "increments", "must contain every reported pressure")
+        if not self.thickness > 0:
+            raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
+        if "rim" in self.supports and "rim" not in self.mesh.node_sets:
+            raise InputError(None, "mesh", "has no node set 'rim' to pin")
+        object.__setattr__(self, "pressures", tuple(wanted.tolist()))
+        object.__setattr__(self, "increments", tuple(steps.tolist()))
+        self._check_sheet()
+
+    def _check_sheet(self) -> None:
+        if not min(self.slack) > -1:
+            raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
+        for name, mode in self.modes.items():
+            if mode.shape != (len(self.mesh.points),):
+                raise InputError(None, f"modes.{name}", "expected one height a node")
+        if self.rim_motion is not None:
+            wanted = (len(self.increments), len(self.mesh.node_sets["rim"]), 3)
+            if self.rim_motion.shape != wanted or not np.isfinite(self.rim_motion).all():
+                problem = f"expected finite numbers {wanted}, got {self.rim_motion.shape}"
+                raise InputError(None, "rim_motion", problem)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What `with_parameters` changes: pressure_offset (MPa), thickness (mm), slack_warp and
+        slack_fill (shares), and the modes (mm)."""
+        return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)
+
+    def with_parameters(self, values: Mapping[str, float]) -> BubbleModel:
+        """The same model with `values` added to its `parameters`; itself where all are zero.
+
+        Raises
+        ------
+        InputError : no such parameter, or the first increment, or the thickness, would not be
+            positive.
+        """
+        if not changes_anything(self.parameters, values):
+            return self
+        points = np.array(self.mesh.points, dtype=float)
+        for name, mode in self.modes.items():
+            points[:, 2] += values.get(name, 0.0) * mode
+        offset = values.get(PRESSURE_OFFSET, 0.0)
+        warp, fill = (
+            own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
+        )
+        return replace(
+            self,
+            mesh=replace(self.mesh, points=points),
+            thickness=self.thickness + values.get(THICKNESS, 0.0),
+            pressures=[p + offset for p in self.pressures],
+            increments=[p + offset for p in self.increments],
+            slack=(warp, fill),
+        )
+
+    @property
+    def stress_free(self) -> Array:
+        """(nodes, 3) mm, where the nodes of the sheet are without any stress."""
+        warp, fill = self.slack
+        return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
+
+    def sheet_slope(self, name: str) -> tuple[Array, Array]:
+        """Derivatives (nodes, 3) of the reference surface and of `stress_free` by a parameter."""
+        surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
+        if name in self.modes:
+            surface[:, 2] = sheet[:, 2] = self.modes[name]
+        elif name in SLACK:
+            axis = SLACK.index(name)
+            sheet[:, axis] = self.mesh.points[:, axis]
+        return surface, sheet
+
+    def held(self, pressure: float) -> Array:
+        """(fixed,) mm, displacement of the held degrees of freedom at a pressure (MPa)."""
+        values = np.zeros((len(self.mesh.points), 3))
+        if self.rim_motion is not None:
+            ends = np.array([0.0, *self.increments])
+            motion = np.concatenate([np.zeros((1, *self.rim_motion.shape[1:])), self.rim_motion])
+            k = int(np.clip(np.searchsorted(ends, pressure), 1, len(ends) - 1))
+            share = (pressure - ends[k - 1]) / (ends[k] - ends[k - 1])
+            values[self.mesh.node_sets["rim"]] = motion[k - 1] + share * (motion[k] - motion[k - 1])
+            for name, directions in self.supports.items():
+                if name != "rim" and name in self.mesh.node_sets:
+                    for direction in directions:
+                        values[self.mesh.node_sets[name], direction] = 0.0
+        return np.asarray(values.reshape(-1)[self.fixed])
+
+    @property
+    def reported(self) -> NDArray[np.intp]:
+        """Index of each reported pressure in `increments`, (frames,)."""
+        steps = np.array(self.increments)
+        return np.array([int(np.argmin(np.abs(steps - p))) for p in self.pressures])
+
+    @property
+    def fixed(self) -> NDArray[np.intp]:
+        """Held degrees of freedom, 3 * node + direction, sorted."""
+        dofs = [
+            3 * self.mesh.node_sets[name] + direction
+            for name, directions in self.supports.items()
+            if name in self.mesh.node_sets
+            for direction in directions
+        ]
+        return np.unique(np.concatenate(dofs)).astype(np.intp)
+
+
+def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
+    """The pressures, with small first steps so that no step is more than about 3 times the last.
+
+    22, 59, 97 ... kPa becomes 6, 22, 40, 59, 97 ... The two more are not for accuracy: from a flat
+    sheet Newton reaches a high first pressure in as many iterations as two lower ones: 20 starts
+    of the known-solution example cost the same with either.
+    """
+    first = pressures[0]
+    steps = [first * 6.0 / 22.0, *pressures]
+    if len(pressures) > 1 and pressures[1] > 1.5 * first:
+        steps.append(first + (pressures[1] - first) * 18.0 / 37.0)
+    return tuple(sorted(steps))

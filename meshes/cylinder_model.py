@@ -1,0 +1,524 @@
+"""The inflated cylinder in three-point bending as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .mesh import Mesh
+from .tube import Refinement, cylinder_mesh
+
+#: Inner diameter and length (mm) of the collar by the largest diameter of cylinder it is for: those
+#: of thesis section 6.2, which goes no further.
+COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
+
+
+@dataclass(frozen=True)
+class RigidSupports:
+    """Two cylinders along x under the tube, frictionless, at z = span / 2 and -span / 2.
+
+    Parameters
+    ----------
+    span : mm between their axes.
+    diameter : mm, outer.
+    """
+
+    span: float = 2000.0
+    diameter: float = 100.0
+
+    def __post_init__(self) -> None:
+        _check(self, "supports")
+
+
+@dataclass(frozen=True)
+class Collar:
+    """A ring around the middle of the tube, its axis along z, frictionless, pulled down.
+
+    Parameters
+    ----------
+    inner_diameter, length : mm. fillet : mm, radius of its inner edges.
+    """
+
+    inner_diameter: float
+    length: float
+    fillet: float = 10.0
+
+    def __post_init__(self) -> None:
+        _check(self, "collar")
+        if self.fillet > 0.5 * self.length:
+            problem = f"{self.fillet:g} mm is more than half the collar's length, {self.length:g}"
+            raise InputError(None, "collar.fillet", problem)
+
+
+def usual_collar(diameter: float) -> Collar:
+    """The collar for a cylinder of this diameter (mm) where none is given.
+
+    Raises
+    ------
+    InputError : the cylinder is larger than any that there is one for.
+    """
+    for largest, (inner, length) in COLLARS.items():
+        if diameter <= largest:
+            return Collar(inner, length)
+    problem = f"there is none for {diameter:g} mm; give inner_diameter and length"
+    raise InputError(None, "collar", problem)
+
+
+def _check(body: RigidSupports | Collar, name: str) -> None:
+    for field in fields(body):
+        value = getattr(body, field.name)
+        if not 0 < value < math.inf:
+            problem = f"expected a length above 0 mm, got {value!r}"
+            raise InputError(None, f"{name}.{field.name}", problem)
+
+
+@dataclass(frozen=True)
+class Gas:
+    """Air as the thesis has it; gauge pressures are above `ambient`.
+
+    Parameters
+    ----------
+    ambient : MPa, the pressure around and the reference of the density.
+    temperature : K, constant. density : kg/m^3 at ambient pressure and this temperature.
+
+    Raises
+    ------
+    InputError : a value that is not a positive number.
+    """
+
+    ambient: float = 0.101
+    temperature: float = 300.0
+    density: float = 1.2041
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0 < value < math.inf:
+                raise InputError(None, f"gas.{field.name}", f"expected > 0, got {value!r}")
+
+    def mass(self, gauge: float, volume: float) -> float:
+        """Mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""
+        return self.density * 1e-9 * volume * (gauge + self.ambient) / self.ambient
+
+    def closed_in(self, gauge: float, volume: float) -> ClosedGas:
+        """The gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
+        return ClosedGas((gauge + self.ambient) * volume, self.ambient)
+
+
+@dataclass(frozen=True)
+class ClosedGas:
+    """A constant mass at constant temperature: absolute pressure times volume stays.
+
+    Parameters
+    ----------
+    amount : MPa mm^3, absolute pressure times volume. ambient : MPa outside.
+    """
+
+    amount: float
+    ambient: float
+
+    def pressure(self, volume: float) -> float:
+        """Gauge pressure (MPa) in `volume` (mm^3)."""
+        return self.amount / volume - self.ambient
+
+    def stiffness(self, volume: float) -> float:
+        """Loss of pressure per volume, -dp/dV (MPa/mm^3)."""
+        return self.amount / volume**2
+
+
+#: Unless given, in diameters of the cylinder: where loads are listed, and the deflection over which
+#: a slope is taken.
+PLACES, SLOPE_OVER = (0.25, 0.5, 1.0), 0.1
+
+
+@dataclass(frozen=True)
+class CurveReading:
+    """Where a curve is read.
+
+    Parameters
+    ----------
+    places : mm of deflection, by what they are called ("40 mm", "0.25 diameters").
+    slope_over : mm of deflection: the initial stiffness is the slope up to here, and the knee is
+        where the slope over as much has fallen.
+
+    Raises
+    ------
+    InputError : what is not above zero.
+    """
+
+    places: Mapping[str, float]
+    slope_over: float
+
+    def __post_init__(self) -> None:
+        for name, value in (*self.places.items(), ("slope_over", self.slope_over)):
+            if not value > 0:
+                raise InputError(None, name, f"expected more than 0 mm, got {value:g}")
+
+
+def curve_reading(
+    diameter: float, places: Sequence[float] | None = None, slope_over: float | None = None
+) -> CurveReading:
+    """Places and slopes that are given (mm), and those by the diameter (mm) where they are not."""
+    if places is None:
+        named = {f"{share:g} diameters": share * diameter for share in PLACES}
+    else:
+        named = {f"{place:g} mm": place for place in places}
+    return CurveReading(named, SLOPE_OVER * diameter if slope_over is None else slope_over)
+
+
+Array = NDArray[np.float64]
+
+NEAR = 1e-9  # of a length
+#: Node sets of the mesh beside those of the planes of symmetry.
+NEEDED = ("support", "support_bottom", "mid_span", "top_line", "bottom_line")
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderModel:
+    """A cylinder that is inflated, closed, and bent by a collar between two supports.
+
+    First the gauge pressure rises over `inflation`, the bottom held in height at the supports
+    (`held_on_inflation`). Then the gas is closed in, its mass constant, and the cylinder lies free
+    on the supports while the collar goes down.
+
+    Reported: the inflated state, then every one of `deflections`; load in N, pressure and volume,
+    all of the WHOLE cylinder (`copies` of what is meshed).
+
+    Parameters
+    ----------
+    mesh : mm, as `cylinder_mesh` makes it: z along the axis, y up, seam at the bottom, `warp` in
+        each quad, and the rows `support` and `support_bottom` at z = span / 2.
+    thickness : (quads,) mm in the reference state; the seam is three times as thick.
+    inflation : MPa, strictly increasing: the increments of gauge pressure; the last one is the
+        pressure at which the gas is closed in.
+    deflections : mm that the collar has gone down since it touched the inflated cylinder,
+        strictly increasing: the frames to report.
+    increments : mm, likewise, containing every deflection: the steps over which the hypoelastic
+        law is integrated. The deflections unless given.
+    supports, collar : rigid, frictionless.
+    gas : what is closed in.
+    reading : where the curve of load over deflection is read, which changes no result; by the
+        diameter unless given.
+
+    Raises
+    ------
+    InputError : a mesh without warp directions or one of the node sets, thicknesses that are not
+        positive or not one a quad, pressures or deflections that do not increase, increments
+        without one of the deflections, supports that are not under the cylinder, a collar that
+        does not go around it or reaches the supports.
+    """
+
+    mesh: Mesh
+    thickness: Array
+    inflation: Sequence[float]
+    deflections: Sequence[float]
+    collar: Collar
+    supports: RigidSupports = field(default_factory=RigidSupports)
+    gas: Gas = field(default_factory=Gas)
+    increments: Sequence[float] = ()
+    reading: CurveReading = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        self._check_mesh()
+        if self.reading is None:
+            object.__setattr__(self, "reading", curve_reading(self.diameter))
+        steps = np.array(self.increments if len(self.increments) else self.deflections, float)
+        levels = {
+            "inflation": np.array(self.inflation, float),
+            "deflections": np.array(self.deflections, float),
+            "increments": steps,
+        }
+        for name, values in levels.items():
+            good = len(values) and np.isfinite(values).all()
+            if not good or not (np.diff(values, prepend=0.0) > 0).all():
+                raise InputError(None, name, f"expected positive, increasing, got {values}")
+            object.__setattr__(self, name, tuple(values.tolist()))
+        near = np.abs(steps[:, None] - levels["deflections"]).min(axis=0)
+        if (near > 1e-9 * levels["deflections"]).any():
+            raise InputError(None, "increments", "must contain every reported deflection")
+        self._check_bodies()
+
+    def _check_mesh(self) -> None:
+        if self.mesh.warp is None or self.mesh.warp.shape != (len(self.mesh.quads), 3):
+            raise InputError(None, "mesh", "has no direction of the warp in each quad")
+        for name in NEEDED:
+            if not len(self.mesh.node_sets.get(name, ())):
+                raise InputError(None, "mesh", f"has no node set {name!r}")
+        thickness = np.array(self.thickness, float)
+        if thickness.shape != (len(self.mesh.quads),):
+            problem = f"expected one a quad, {len(self.mesh.quads)}, got shape {thickness.shape}"
+            raise InputError(None, "thickness", problem)
+        if not (np.isfinite(thickness) & (thickness > 0)).all():
+            raise InputError(None, "thickness", f"expected > 0 mm, got {thickness.min()}")
+        object.__setattr__(self, "thickness", thickness)
+
+    def _check_bodies(self) -> None:
+        p = self.mesh.points
+        half, diameter = np.abs(p[:, 2]).max(), self.diameter
+        row = np.abs(p[self.mesh.node_sets["support"], 2])
+        if not np.allclose(row, 0.5 * self.supports.span, rtol=NEAR):
+            problem = f"{self.supports.span:g} mm, but the mesh has its row at {row[0]:g} mm"
+            raise InputError(None, "supports.span", problem)
+        if not 0.5 * (self.supports.span + self.supports.diameter) < half:
+            problem = f"{self.supports.span:g} mm does not fit under {2 * half:g} mm of cylinder"
+            raise InputError(None, "supports.span", problem)
+        if not self.collar.inner_diameter > diameter * (1 + NEAR):
+            problem = f"expected more than the cylinder's {diameter:g} mm"
+            raise InputError(None, "collar.inner_diameter", problem)
+        if not self.collar.length < self.supports.span - self.supports.diameter:
+            problem = f"{self.collar.length:g} mm reaches the supports"
+            raise InputError(None, "collar.length", problem)
+
+    @property
+    def diameter(self) -> float:
+        """mm, before inflation."""
+        return self.diameter_at(self.mesh.points)
+
+    def diameter_at(self, points: Array) -> float:
+        """Of the circle (mm) with the area that the ring at mid-span encloses.
+
+        points : (n, 3) mm, where the nodes are.
+        """
+        ring = self.mesh.node_sets["mid_span"]
+        across, up = self.mesh.points[ring, :2].T
+        x, y = points[ring[np.argsort(np.arctan2(across, -up))], :2].T
+        # On a quarter the last side, from the top to the bottom, lies in the plane of symmetry.
+        area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return float(np.sqrt((8.0 if self._cut("x") else 4.0) * area / np.pi))
+
+    @property
+    def pressure(self) -> float:
+        """Gauge pressure of the inflated cylinder, MPa."""
+        return self.inflation[-1]
+
+    @property
+    def copies(self) -> int:
+        """How many times the mesh makes the whole cylinder: 4 for a quarter."""
+        return int(2 ** sum(f"symmetry_{axis}" in self.mesh.node_sets for axis in "xz"))
+
+    @property
+    def reported(self) -> NDArray[np.intp]:
+        """Index of each reported deflection in `increments`, (frames - 1,)."""
+        steps = np.array(self.increments)
+        return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
+
+    @property
+    def guides(self) -> Mapping[str, tuple[int, ...]]:
+        """Directions held at zero throughout, by node set: the planes of symmetry.
+
+        On the whole cylinder top and bottom line stay in the plane x = 0 and the ring at mid-span
+        in z = 0, where symmetry has them anyway: frictionless supports hold it in height only.
+        """
+        sideways = ("symmetry_x",) if self._cut("x") else ("top_line", "bottom_line")
+        along = "symmetry_z" if self._cut("z") else "mid_span"
+        return {**{name: (0,) for name in sideways}, along: (2,)}
+
+    @property
+    def fixed(self) -> NDArray[np.intp]:
+        """Degrees of freedom held at zero throughout, 3 * node + direction, sorted."""
+        held = [3 * self.mesh.node_sets[n] + k for n, ks in self.guides.items() for k in ks]
+        return np.unique(np.concatenate(held)).astype(np.intp)
+
+    @property
+    def held_on_inflation(self) -> NDArray[np.intp]:
+        """Degrees of freedom held at zero until the cylinder is inflated, sorted."""
+        bottom = 3 * self.mesh.node_sets["support_bottom"] + 1
+        return np.union1d(self.fixed, bottom).astype(np.intp)
+
+    def _cut(self, axis: str) -> bool:
+        return f"symmetry_{axis}" in self.mesh.node_sets
+
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class RigidCylinder:
+    """A rigid post (infinitely long) that the membrane lies on, or a ring around it.
+
+    Parameters
+    ----------
+    name : of its reaction in the history; bodies of one name are added up.
+    axis : unit vector. centre : mm.
+    radius : mm, outside of a post, inside of a ring.
+    ring : the membrane is inside.
+    length, fillet : mm, of a ring: how long it is and how its mouth is rounded.
+    """
+
+    name: str
+    axis: Vector
+    centre: Vector
+    radius: float
+    ring: bool = False
+    length: float = np.inf
+    fillet: float = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Bending:
+    """Rigid cylinders that bend an inflated membrane with a constant mass of gas in it.
+
+    Parameters
+    ----------
+    supports : bodies at rest; each is brought up along minus `direction` to touch first.
+    collar : the body that moves along `direction`; it is brought down to touch first.
+    displacements : mm of the collar from touching, increasing: the increments.
+    reported : index of each of them that is a frame; all unless given.
+    released : node set held only while inflating.
+    penalty : MPa/mm of contact. gas : what is closed in.
+    """
+
+    supports: Sequence[RigidCylinder]
+    collar: RigidCylinder
+    displacements: Sequence[float]
+    direction: Vector = (0.0, -1.0, 0.0)
+    released: str | None = None
+    penalty: float = 5.0
+    gas: Gas = field(default_factory=Gas)
+    reported: Sequence[int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class InflatedModel:
+    """A closed membrane of any shape, or the part of one that symmetry planes close.
+
+    Parameters
+    ----------
+    mesh : mm; quads counter-clockwise seen from outside.
+    thickness : mm, one or (elements,). warp : (3,) or (elements, 3) direction of the warp yarn,
+        projected on each facet.
+    pressures : MPa, increasing: the increments of inflation, and frames where nothing bends it.
+    supports : degrees of freedom held at zero, by node set; symmetry planes among them.
+    copies : how many times the mesh makes the whole (4 for a quarter): forces and volume are
+        reported for the whole.
+    bending : what happens after inflation.
+
+    Raises
+    ------
+    InputError : pressures or displacements that do not increase, a thickness that is not
+        positive, a node set that the mesh does not have.
+    """
+
+    mesh: Mesh
+    thickness: ArrayLike
+    warp: ArrayLike
+    pressures: Sequence[float]
+    supports: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    copies: int = 1
+    bending: Bending | None = None
+
+    def __post_init__(self) -> None:
+        schedules = {"pressures": (self.pressures, "MPa")}
+        sets = list(self.supports)
+        if self.bending is not None:
+            schedules["displacements"] = (self.bending.displacements, "mm")
+            sets += [self.bending.released] if self.bending.released else []
+        for name, (values, unit) in schedules.items():
+            if not len(values) or not (np.diff(values, prepend=0.0) > 0).all():
+                raise InputError(None, name, f"expected positive, increasing, got {values} {unit}")
+        if not (np.asarray(self.thickness, dtype=float) > 0).all():
+            raise InputError(None, "thickness", "expected > 0 mm in every element")
+        for name in sets:
+            if name not in self.mesh.node_sets:
+                raise InputError(
+                    None, "supports", f"no node set {name!r} in the mesh; it has "
+                    f"{', '.join(sorted(self.mesh.node_sets)) or 'none'}",
+                )  # fmt: skip
+
+    def fixed(self, bent: bool = False) -> NDArray[np.intp]:
+        """Held unknowns, 3 * node + direction, sorted; fewer once `bent`."""
+        released = self.bending.released if bent and self.bending else None
+        dofs = [
+            3 * self.mesh.node_sets[name] + direction
+            for name, directions in self.supports.items()
+            if name != released
+            for direction in directions
+        ]
+        return np.unique(np.concatenate(dofs or [np.empty(0, dtype=np.intp)])).astype(np.intp)
+
+
+#: mm, unless given; as many layers of fabric lie upon each other in the seam.
+LENGTH, SEAM_WIDTH, SEAM_LAYERS = 3000.0, 40.0, 3
+#: How far the collar goes, mm, and in how many equal steps, unless given.
+DEFLECTION, FRAMES = 240.0, 60
+#: Equal increments of pressure on inflation.
+INFLATION = 10
+#: Sides around the tube over mm of an element. How deep the collar dents the round tube at first is
+#: what goes wrong with long ones, at its top and its sides alike (shorter ones at the top alone do
+#: not help): with sides of 25 mm the load of the first millimetres was 3 % off that of fine meshes.
+AROUND = 0.4
+#: Elements next to collar and supports: mm along the axis over mm elsewhere, and mm beyond the
+#: edge of the collar or to either side of a support in which they are that small. With half of it
+#: the collar's mouth, whose edge is round with 10 mm, took hold of the wall row by row: the load
+#: went up and down by 2 % with 25 mm elements, and fell by 4 % where the beam folds.
+FINER, BESIDE_COLLAR, BESIDE_SUPPORT = 0.25, 15.0, 40.0
+
+
+def inflated_cylinder(
+    diameter: float,
+    pressure: float,
+    thickness: float,
+    size: float,
+    length: float = LENGTH,
+    seam_width: float = SEAM_WIDTH,
+    supports: RigidSupports | None = None,
+    collar: Collar | None = None,
+    deflections: Sequence[float] | None = None,
+    symmetry: Literal["quarter", "full"] = "quarter",
+    cap_warp: Literal["x", "y"] = "x",
+    gas: Gas | None = None,
+    reading: CurveReading | None = None,
+) -> CylinderModel:
+    """A cylinder that is inflated and bent.
+
+    Parameters
+    ----------
+    diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge.
+    thickness : mm of one layer; the seam has three.
+    size : mm of an element; around the tube 0.4 of that, and along it a quarter next to collar and
+        supports.
+    collar : `usual_collar` unless given.
+    deflections : mm; 60 equal ones to 240 mm unless given, each an increment.
+    reading : by the diameter unless given.
+
+    Raises
+    ------
+    InputError : as `CylinderModel` and `cylinder_mesh`; a pressure or thickness not above zero.
+    """
+    for name, value in (("pressure", pressure), ("thickness", thickness)):
+        if not 0 < value < math.inf:
+            raise InputError(None, name, f"expected > 0, got {value!r}")
+    supports = supports or RigidSupports()
+    collar = collar or usual_collar(diameter)
+    # Before the mesh is made, which would complain of rows where the supports are.
+    if not supports.span + supports.diameter < length:
+        problem = f"{supports.span:g} mm does not fit under {length:g} mm of cylinder"
+        raise InputError(None, "supports.span", problem)
+    fine = FINER * size
+    zones = (
+        Refinement("collar", 0.0, 0.5 * collar.length + BESIDE_COLLAR, fine),
+        Refinement("support", 0.5 * supports.span, BESIDE_SUPPORT, fine),
+    )
+    mesh = cylinder_mesh(length, diameter, size, seam_width, symmetry, zones, cap_warp, AROUND)
+    layers = np.ones(len(mesh.quads))
+    if "seam" in mesh.element_sets:
+        layers[mesh.element_sets["seam"]] = SEAM_LAYERS
+    if deflections is None:
+        deflections = np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:].tolist()
+    steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
+    return CylinderModel(
+        mesh,
+        thickness * layers,
+        steps,
+        deflections,
+        collar,
+        supports,
+        gas or Gas(),
+        reading=reading or curve_reading(diameter),
+    )

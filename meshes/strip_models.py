@@ -1,0 +1,326 @@
+"""The uniaxial strip tests (thesis chapter 3.3) as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .bubble_model import OfThickness
+from .mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def strip_mesh(
+    width: float,
+    length: float,
+    across: int,
+    along: int,
+    gauge_length: float | None = None,
+    symmetry: Literal["full", "half"] = "full",
+) -> Mesh:
+    """Rectangular quads in the xy plane, the middle of the width at x = 0, y from 0 to length.
+
+    Parameters
+    ----------
+    width : mm, of the WHOLE strip.
+    length : mm, between the lower and the upper end.
+    across, along : quads in each direction, across counted on what is meshed; even across on a
+        whole strip, so that there are nodes on its middle line.
+    gauge_length : mm between the two gauge nodes, which lie on the middle line at equal distance
+        from both ends; the rows between them are stretched or squeezed to meet it exactly. The
+        whole length unless given.
+    symmetry : the whole strip, or the half x >= 0.
+
+    Returns
+    -------
+    Mesh : quads counter-clockwise (normal +z). Node sets: `bottom`, `top` (the ends), `gauge` (two
+        nodes, the lower first), `free_edges`; on a half also `symmetry_x` (x = 0, where u_x = 0).
+
+    Raises
+    ------
+    InputError : lengths that are not positive, a gauge that does not fit, counts that are not
+        whole numbers above zero, an odd number of quads across a whole strip.
+    """
+    gauge = length if gauge_length is None else gauge_length
+    for name, value in (("width", width), ("length", length), ("gauge_length", gauge)):
+        if not 0 < value < math.inf:
+            raise InputError(None, name, f"expected a length above 0 mm, got {value!r}")
+    if gauge > length:
+        raise InputError(None, "gauge_length", f"{gauge} mm is longer than the strip, {length} mm")
+    for name, count in (("across", across), ("along", along)):
+        if count != int(count) or count < 1:
+            raise InputError(None, name, f"expected a whole number of quads, got {count!r}")
+    if symmetry == "full" and across % 2:
+        raise InputError(None, "across", f"expected an even number on a whole strip, got {across}")
+    y, lower = _levels(length, along, gauge)
+    x = np.linspace(0.0 if symmetry == "half" else -0.5 * width, 0.5 * width, across + 1)
+    middle = 0 if symmetry == "half" else across // 2
+    x[middle] = 0.0
+    row = across + 1
+    points = np.zeros((row * (along + 1), 3))
+    points[:, 0], points[:, 1] = np.tile(x, along + 1), np.repeat(y, row)
+    first = (row * np.arange(along)[:, None] + np.arange(across)).ravel()
+    quads = np.stack([first, first + 1, first + row + 1, first + row], axis=1).astype(np.intp)
+    nodes = np.arange(len(points)).reshape(along + 1, row)
+    sets = {
+        "bottom": nodes[0],
+        "top": nodes[-1],
+        "gauge": nodes[[lower, along - lower], middle],
+        "free_edges": nodes[:, -1] if symmetry == "half" else np.sort(nodes[:, [0, -1]].ravel()),
+    }
+    if symmetry == "half":
+        sets["symmetry_x"] = nodes[:, 0]
+    return Mesh(points, quads, sets)
+
+
+def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
+    """Heights of the rows of nodes (along + 1,), and the row of the lower gauge node.
+
+    The gauge gets the number of rows, as odd or even as `along`, that keeps the quads nearest to
+    one height.
+    """
+    if gauge == length:
+        return np.linspace(0.0, length, along + 1), 0
+    if along < 3:
+        raise InputError(None, "along", f"a gauge inside the strip needs 3 rows, got {along}")
+    inside = np.arange(2 - along % 2, along - 1, 2)
+    rows = int(inside[np.argmin(np.abs(inside / along - gauge / length))])
+    outside = (along - rows) // 2
+    ends = 0.5 * (length - gauge), 0.5 * (length + gauge)
+    return (
+        np.concatenate(
+            [
+                np.linspace(0.0, ends[0], outside + 1),
+                np.linspace(ends[0], ends[1], rows + 1)[1:-1],
+                np.linspace(ends[1], length, outside + 1),
+            ]
+        ),
+        outside,
+    )
+
+
+def yarn_direction(angle: float) -> Array:
+    """Unit vector (3,) of a yarn at `angle` degrees from the pull (y), turned towards x."""
+    turn = math.radians(angle)
+    return np.array([math.sin(turn), math.cos(turn), 0.0])
+
+
+#: Rollers on the top and on the symmetry line; the pulled end is free to get narrower.
+ROLLERS: Mapping[str, tuple[int, ...]] = {"top": (1,), "symmetry_x": (0,)}
+#: Ends held as in the jaws of the machine.
+GRIPS: Mapping[str, tuple[int, ...]] = {"top": (0, 1), "bottom": (0,)}
+#: Quads across and along: half a straight strip (Fig. 3.5), the whole bias strip (Fig. 3.6).
+QUADS = {"straight": (5, 8), "bias": (10, 30)}
+#: Thesis section 3.1: cut strips, and section 3.3: equal increments.
+WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
+
+
+@dataclass(frozen=True, eq=False)
+class UniaxialModel(OfThickness):
+    """A strip in its plane whose lower end is pulled down until the gauge has a given length.
+
+    The elongation of the gauge is prescribed, as it was measured; the displacement of the pulled
+    end that brings it about is part of the answer. Both are the same where the gauge is the
+    whole strip.
+
+    Parameters
+    ----------
+    mesh : mm, in the xy plane, pulled along y; node sets `gauge` (two nodes), `bottom` and those
+        in `supports`.
+    warp : (3,) direction of the warp yarn. The fill yarn is 90 degrees from it, counter-clockwise.
+    thickness : mm, in the reference state.
+    elongations : mm of the gauge, strictly increasing: the increments over which the law is
+        integrated, every one reported.
+    supports : degrees of freedom held at zero, by node set (every node stays in the plane).
+    pulled : the node set that moves along -y.
+    load_factor : what the reaction is multiplied with: 2 for one half of the width.
+
+    Raises
+    ------
+    InputError : a node set that is not there, elongations that do not increase, a thickness or
+        load factor that is not positive, a pulled set that is also supported along y.
+    """
+
+    mesh: Mesh
+    warp: NDArray[np.float64]
+    thickness: float
+    elongations: Sequence[float]
+    supports: Mapping[str, tuple[int, ...]]
+    pulled: str = "bottom"
+    load_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("gauge", self.pulled, *self.supports):
+            if name not in self.mesh.node_sets:
+                raise InputError(None, "mesh", f"has no node set {name!r}")
+        if len(self.mesh.node_sets["gauge"]) != 2:
+            raise InputError(None, "mesh", "the node set 'gauge' must hold two nodes")
+        levels = np.array(self.elongations, float)
+        if not len(levels) or not (np.diff(levels, prepend=0.0) > 0).all():
+            raise InputError(None, "elongations", f"expected positive, increasing, got {levels} mm")
+        for name in ("thickness", "load_factor"):
+            if not getattr(self, name) > 0:
+                raise InputError(None, name, f"expected > 0, got {getattr(self, name)}")
+        if np.isin(self.driven, self.fixed).any():
+            raise InputError(None, "supports", f"{self.pulled!r} is pulled along y and held there")
+        object.__setattr__(self, "elongations", tuple(levels.tolist()))
+        object.__setattr__(self, "warp", np.asarray(self.warp, float))
+
+    @property
+    def gauge_length(self) -> float:
+        """Distance of the two gauge nodes, mm."""
+        lower, upper = self.mesh.points[self.mesh.node_sets["gauge"]]
+        return float(np.linalg.norm(upper - lower))
+
+    @property
+    def driven(self) -> NDArray[np.intp]:
+        """Degrees of freedom that move with the pulled end, 3 * node + direction, sorted."""
+        return np.sort(3 * self.mesh.node_sets[self.pulled] + 1).astype(np.intp)
+
+    @property
+    def fixed(self) -> NDArray[np.intp]:
+        """Degrees of freedom held at zero, sorted: the supports, and all out of the plane."""
+        held = [3 * self.mesh.node_sets[n] + k for n, ks in self.supports.items() for k in ks]
+        return np.unique(np.concatenate([*held, 3 * np.arange(len(self.mesh.points)) + 2]))
+
+
+def straight_strip(
+    direction: Literal["warp", "fill"],
+    gauge_length: float,
+    final_length: float,
+    thickness: float,
+    width: float = WIDTH,
+    increments: int = INCREMENTS,
+    across: int = QUADS["straight"][0],
+    along: int = QUADS["straight"][1],
+) -> UniaxialModel:
+    """Warp or fill test: one half of the width over the gauge length (Fig. 3.5; 40 quads).
+
+    Parameters
+    ----------
+    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1).
+    width : mm, of the whole strip; the load is that of the whole strip, too.
+    across, along : quads on the half.
+    """
+    if direction not in ("warp", "fill"):
+        raise InputError(None, "direction", f"expected 'warp' or 'fill', got {direction!r}")
+    mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
+    levels = _equal(gauge_length, final_length, increments)
+    # Fill lies along the pull when warp is a quarter turn clockwise from it.
+    warp = yarn_direction(0.0 if direction == "warp" else 90.0)
+    return UniaxialModel(mesh, warp, thickness, levels, ROLLERS, load_factor=2.0)
+
+
+def bias_strip(
+    gauge_length: float,
+    final_length: float,
+    thickness: float,
+    width: float = WIDTH,
+    length: float = GRIP_DISTANCE,
+    angle: float = 45.0,
+    increments: int = INCREMENTS,
+    across: int = QUADS["bias"][0],
+    along: int = QUADS["bias"][1],
+) -> UniaxialModel:
+    """Bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
+
+    Parameters
+    ----------
+    gauge_length, final_length : mm, of the virtual strain gauge in the middle (Table 3.1).
+    length : mm, between the grips at the start.
+    angle : degrees from the pull to the warp yarn.
+    """
+    mesh = strip_mesh(width, length, across, along, gauge_length)
+    levels = _equal(gauge_length, final_length, increments)
+    return UniaxialModel(mesh, yarn_direction(angle), thickness, levels, GRIPS)
+
+
+def refined_quads(strip: Literal["straight", "bias"], factor: float) -> dict[str, int]:
+    """The thesis' `across` and `along` of a strip times a factor, to the nearest that can be made.
+
+    A bias strip is whole and has nodes on its middle line: an even number across.
+    """
+    across, along = (factor * count for count in QUADS[strip])
+    if strip == "bias":
+        return {"across": max(2, 2 * round(across / 2)), "along": max(3, round(along))}
+    return {"across": max(1, round(across)), "along": max(1, round(along))}
+
+
+def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[float, ...]:
+    if not final_length > gauge_length:
+        raise InputError(
+            None, "final_length", f"expected more than {gauge_length} mm, got {final_length}"
+        )
+    if increments != int(increments) or increments < 1:
+        raise InputError(None, "increments", f"expected a whole number, got {increments!r}")
+    return tuple(np.linspace(0.0, final_length - gauge_length, int(increments) + 1)[1:].tolist())
+
+
+#: mm; any square would do.
+SIDE = 100.0
+#: Degrees of freedom held at zero: the lines x = 0 and y = 0 stay where they are.
+ROLLERS_PATCH: Mapping[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_y": (1,)}
+#: Node sets of the edges that are pulled, along x and along y.
+PULLED = ("right", "top")
+#: The corner whose displacement over the side is the strain of the patch.
+FAR_CORNER = 2
+
+
+@dataclass(frozen=True, eq=False)
+class PatchModel(OfThickness):
+    """A square of the sheet, warp along x and fill along y, with loads per width on its edges.
+
+    Parameters
+    ----------
+    loads : (n, 2) N/mm (the same number as kN/m) along warp and fill, forces over the width before
+        the test: the increments over which the law is integrated, every one reported.
+    thickness : mm, before the test.
+
+    Raises
+    ------
+    InputError : loads that are not such numbers, a thickness that is not positive.
+    """
+
+    loads: Array
+    thickness: float
+
+    def __post_init__(self) -> None:
+        values = np.array(self.loads, dtype=float)
+        if values.ndim != 2 or values.shape[1:] != (2,) or not len(values):
+            raise InputError(None, "loads", f"expected loads (n, 2), got shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise InputError(None, "loads", "expected finite numbers")
+        if not self.thickness > 0:
+            raise InputError(None, "thickness", f"expected > 0, got {self.thickness}")
+        object.__setattr__(self, "loads", values)
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """One quad, for solvers that need a mesh."""
+        points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
+        return Mesh(
+            points,
+            np.array([[0, 1, 2, 3]]),
+            {name: np.array(nodes) for name, nodes in sets.items()},
+        )
+
+    def displacements(self, elongation: ArrayLike) -> Array:
+        """(n, 4, 3) mm of the corners at elongations (n, 2)."""
+        e = np.asarray(elongation, dtype=float)
+        moved = np.zeros((len(e), 4, 3))
+        moved[:, :, :2] = self.mesh.points[:, :2] * e[:, None, :]
+        return moved
+
+
+def elongations(displacement: ArrayLike) -> Array:
+    """(n, 2, ...) elongation along warp and fill from displacements (n, 4, 3, ...) of a patch."""
+    return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE

@@ -1,1 +1,0 @@
-"""Finite element problems as plain data, known to no solver."""

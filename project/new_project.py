@@ -1,0 +1,101 @@
+"""A commented project file for tests of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import InputError
+from ..experiments.registry import kind_named, kinds
+from ..files import TEMPLATES, render
+from ..materials.forms.registry import form_names
+from ..writing import write_text
+from .project import read_project
+
+#: What a test is like unless something else is said; mm and kPa.
+USUAL: Mapping[str, Any] = {
+    "radius": 100.0,
+    "pressures": (20, 60, 100, 150, 200, 250, 300),
+    "diameter": 150.0,
+    "pressure": 100.0,
+}
+
+
+def writable_kinds() -> list[str]:
+    """Kinds of test that a project file can be written for: those with a template."""
+    folder = TEMPLATES / "project"
+    return [name for name in kinds() if (folder / f"{name}.toml.j2").is_file()]
+
+
+def write_project(
+    path: Path,
+    tests: Mapping[str, int],
+    name: str = "My fabric",
+    thickness: float = 0.8,
+    form: str = "cubic",
+    **said: Any,
+) -> None:
+    """Write a project file and see that it can be read.
+
+    Parameters
+    ----------
+    tests : how many there are of each kind. name, thickness : of the fabric, mm. form : of the
+        moduli. said : `USUAL` things that are otherwise: `radius` and `pressures` of bubbles,
+        `diameter` and `pressure` of cylinders; mm and kPa.
+
+    Raises
+    ------
+    InputError : what is said makes no project. OutputError : the file cannot be written.
+    """
+    write_text(path, project_text(tests, name, thickness, form, **said))
+    try:
+        read_project(path, need_data=False)
+    except InputError:
+        path.unlink()
+        raise
+
+
+def project_text(
+    tests: Mapping[str, int], name: str, thickness: float, form: str, **said: Any
+) -> str:
+    """The text of a project file, see `write_project`."""
+    values = {**USUAL, **{key: value for key, value in said.items() if value is not None}}
+    asked = [kind for kind, count in tests.items() if count]
+    if not asked:
+        known = ", ".join(f"--{kind}" for kind in writable_kinds())
+        raise InputError(None, "--own", f"name at least one test: {known}")
+    if form not in form_names():
+        raise InputError(None, "--form", f"{form!r} is not one of: {', '.join(form_names())}")
+    fitted = [kind for kind in asked if kind_named(kind).fitted]
+    return _render(
+        "project",
+        name=_quoted(name),
+        version=__version__,
+        thickness=thickness,
+        form=_quoted(form),
+        fitted=bool(fitted),
+        predicted=len(fitted) < len(asked),
+        # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
+        strain_range="strips" not in asked,
+        tests=[
+            _render(kind, number=n, count=tests[kind], name=f"{kind}{n}", **_of(values))
+            for kind in asked
+            for n in range(1, tests[kind] + 1)
+        ],
+    )
+
+
+def _of(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {**values, "deflection": 1.6 * values["diameter"]}
+
+
+def _quoted(text: str) -> str:
+    """Text as it may stand between TOML's quotation marks."""
+    plain = "".join(c for c in text if c.isprintable())
+    return plain.replace("\\", "\\\\").replace('"', '\\"')
+
+
+def _render(template: str, /, **context: Any) -> str:
+    return render(f"project/{template}.toml.j2", **context)

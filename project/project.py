@@ -1,0 +1,395 @@
+"""A project: one fabric, its tests, its law, and how it is fitted; read from a TOML file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from ..errors import InputError
+from ..experiments.kinds import Fabric, Place, Scales, Test
+from ..experiments.registry import kinds
+from ..materials.forms.registry import form_settings
+from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
+from ..reading import content_of, is_file
+from ..runs.executor import Executor
+from ..solvers.registry import overridden, solver_sections, solver_settings
+from ..solvers.run_cache import RunCache, run_cache
+from ..solvers.settings import SCHEDULER
+from .cards import NamedCard, read_cards
+from .schema import FitSection, LawSection, ProjectFile, parse
+
+Settings = dict[str, Any]
+HEAD = "# As it was run: what the project says, with the options of the command.\n"
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a project file says, in its own units.
+
+    text : the file's own. common : [fabric] and [units]. tests : the section of each test by its
+    name, with the folder that its data were taken from; without what it leaves to defaults, which
+    need not go with each other when they are said. whole : each with its defaults. kinds : of the
+    tests, by name. cards : each [[card]], in the order of the file.
+    """
+
+    text: str
+    common: Mapping[str, Any]
+    tests: Mapping[str, Settings]
+    whole: Mapping[str, Settings]
+    kinds: Mapping[str, str]
+    cards: Sequence[Settings] = ()
+
+
+def section_as_run(
+    said: Mapping[str, Any], name: str, folder_key: str | None, base: Path, folder: Path | None
+) -> Settings:
+    """A test's section with its name, and with the folder of its files in full.
+
+    Parameters
+    ----------
+    folder_key : dotted key of the folder; None where the kind has none. base : the project's
+        folder. folder : what the command says instead of the section.
+    """
+    whole = {**plain(said), "name": name}
+    if folder_key is None:
+        return whole
+    *above, key = folder_key.split(".")
+    table: Any = whole
+    for part in above:
+        table = table.get(part)
+        if not isinstance(table, dict):
+            return whole  # its data are of another sort
+    given = base / os.path.expanduser(table.get(key, "")) if folder is None else folder
+    table[key] = os.path.abspath(given)
+    beside: Settings = _beside_project(whole, base, Path(table[key]))
+    return beside
+
+
+def _beside_project(value: Any, base: Path, folder: Path) -> Any:
+    """With the full path of files that are not in the data's folder and lie beside the project."""
+    if isinstance(value, dict):
+        return {key: _beside_project(own, base, folder) for key, own in value.items()}
+    if isinstance(value, list):
+        return [_beside_project(own, base, folder) for own in value]
+    if isinstance(value, str) and Path(value).suffix and not os.path.exists(folder / value):
+        return os.path.abspath(base / value) if is_file(base / value) else value
+    return value
+
+
+def settings_of(project: Project, tests: Sequence[str]) -> Settings:
+    """What a run of these tests is told, as a project file would say it: without cards.
+
+    Options of the command that change the project are in it; the tests are in the project's order.
+    """
+    written = project.written
+    assert written is not None
+    solver = project.fit.solver
+    settings: Settings = {
+        **written.common,
+        "law": plain(project.law.model_dump()),
+        "fit": plain(project.fit.model_dump()),
+    }
+    if isinstance(folder := settings["fit"].get("cache"), str):
+        settings["fit"]["cache"] = os.path.abspath(beside(project.path.parent, folder))
+    options = _solver_options(project)
+    if options:
+        settings["solver"] = {solver: options}
+    for name in tests:
+        if name not in written.tests:  # made from Python, beside the file
+            continue
+        settings.setdefault(written.kinds[name], []).append(written.tests[name])
+    return settings
+
+
+def settings_of_predictions(
+    project: Project, tests: Sequence[str], cards: Sequence[str | Path]
+) -> Settings:
+    """What a run of predictions is told, as a project file would say it, cards by their files.
+
+    cards : names of the project's cards, and files.
+    """
+    written = project.written
+    assert written is not None
+    settings = settings_of(project, tests)
+    del settings["law"]  # each card says its own
+    own = dict(zip(project.cards, written.cards, strict=True))
+    settings["card"] = []
+    for card in cards:
+        said = dict(own.get(str(card), {"file": os.path.abspath(card)}))
+        if "file" in said and str(card) in own:
+            said["file"] = os.path.abspath(project.path.parent / said["file"])
+        settings["card"].append(said)
+    return settings
+
+
+def project_text(settings: Mapping[str, Any]) -> str:
+    """Settings as a project file (TOML)."""
+    return HEAD + "\n" + tomli_w.dumps(settings)
+
+
+def _solver_options(project: Project) -> Settings:
+    """Of the solver that runs, those that its table may hold; what is there with its full path."""
+    name = project.fit.solver
+    section = solver_sections().get(name)
+    return {
+        key: _in_full(value)
+        for key, value in plain(project.solver_options.get(name, {})).items()
+        if section is None or key in section.model_fields
+    }
+
+
+def _in_full(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _in_full(own) for key, own in value.items()}
+    if isinstance(value, str) and os.sep in value and os.path.exists(value):
+        return os.path.abspath(value)
+    return value
+
+
+def plain(value: Any) -> Any:
+    """What TOML and JSON can say: without what is not said, tuples as lists, paths as text."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items() if v is not None}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+#: Data folders: of all tests, or by the name of a test.
+Folders = Path | Mapping[str, Path]
+
+
+NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Project:
+    """Everything that a project file says, in mm, N and MPa where it is not a section.
+
+    Parameters
+    ----------
+    path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
+    law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
+        of a solver, what it is made with. written : what the file says; None without one.
+    scheduler : address of the Dask scheduler whose workers do the runs; None: this machine does.
+
+    Raises
+    ------
+    InputError : settings that contradict each other (also after `with_fit`).
+    """
+
+    path: Path
+    fabric: Fabric
+    scales: Scales
+    tests: Mapping[str, Test]
+    law: LawSection
+    fit: FitSection
+    cards: Mapping[str, NamedCard]
+    solver_options: Mapping[str, Mapping[str, Any]]
+    written: Written | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.fit.method == "lm" and self.fit.constraints == "boolean":
+            problem = "boolean flags have no slope: use 'margin' with method 'lm', or 'slsqp'"
+            raise InputError(self.path, "fit.constraints", problem + " or 'cobyla'")
+
+    @property
+    def title(self) -> str:
+        """The fabric's name, else that of the folder."""
+        return self.fabric.name or self.path.parent.resolve().name
+
+    @property
+    def run_cache(self) -> RunCache | None:
+        """Where runs of another program are kept, for this project and all others; None: nowhere.
+
+        A folder that the project names is beside its file.
+        """
+        said = self.fit.cache
+        return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
+
+    @property
+    def executor(self) -> Executor:
+        """Where starts and other runs are done side by side."""
+        return Executor(self.fit.jobs, self.scheduler)
+
+    def options_of(self, solver: str) -> dict[str, Any]:
+        """What a solver is made with; a cluster counts its licences."""
+        counted = {} if self.scheduler is None else {SCHEDULER: self.scheduler}
+        return {**self.solver_options.get(solver, {}), **counted}
+
+    def with_scheduler(self, address: str | None) -> Project:
+        """The project, run by the workers of a Dask scheduler; as it is without an address."""
+        return self if address is None else replace(self, scheduler=address)
+
+    def with_fit(self, **changes: Any) -> Project:
+        """The project with other settings of its fit; None leaves a setting as it is."""
+        given = {key: value for key, value in changes.items() if value is not None}
+        return replace(self, fit=self.fit.model_copy(update=given))
+
+    def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
+        """The project with another form of the moduli.
+
+        settings : of the form; those that the project has for it stay unless they are given.
+
+        Raises
+        ------
+        InputError : no such form, or a setting that it does not know.
+        """
+        known, own = form_settings(form), self.law.model_extra or {}
+        said = self.law.model_dump(exclude=set(own), exclude_unset=True)
+        kept = {key: value for key, value in own.items() if key in known}
+        law = LawSection.model_validate({**said, **kept, **(settings or {}), "form": form})
+        return replace(self, law=law)
+
+    def with_solver(
+        self, name: str | None, options: Mapping[str, Any], settings: Sequence[str] = ()
+    ) -> Project:
+        """The project with another solver, or with more options for the one that it has.
+
+        Parameters
+        ----------
+        options : by name; None leaves an option as it is. settings : each "KEY=VALUE", as in
+            [solver.NAME].
+
+        Raises
+        ------
+        InputError : an option that means nothing to the solver that runs.
+        """
+        solver = name or self.fit.solver
+        changed = overridden(solver, self.solver_options.get(solver, {}), options, settings)
+        chosen = replace(self, solver_options={**self.solver_options, solver: changed})
+        return chosen.with_fit(solver=name)
+
+    def chosen(
+        self, which: str | Sequence[str] | None, fitted: bool | None = None
+    ) -> tuple[Test, ...]:
+        """Tests by name or by kind, in the project's order; all of them where none is named.
+
+        fitted : only those that a fit can match, or only those that are predicted.
+
+        Raises
+        ------
+        InputError : a name that is none, or nothing to choose from.
+        """
+        known = kinds()
+        names = None if which is None else [which] if isinstance(which, str) else list(which)
+        able = [t for t in self.tests.values() if fitted in (None, known[t.kind].fitted)]
+        for name in names or ():
+            if name not in self.tests and name not in known:
+                problem = f"there is no test {name!r}; the project has: {', '.join(self.tests)}"
+                raise InputError(self.path, "--test", problem)
+        tests = tuple(t for t in able if names is None or t.name in names or t.kind in names)
+        if not tests:
+            kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
+            of = "" if names is None else f" among {', '.join(names)}"
+            what = " or ".join(
+                f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)
+            )
+            problem = f"the project has no test{kind}{of}; add {what}"
+            raise InputError(self.path, "", problem)
+        return tests
+
+
+def read_project(path: Path | str, data: Folders | None = None, need_data: bool = True) -> Project:
+    """Read a project file (TOML).
+
+    Parameters
+    ----------
+    path : the file.
+    data : where measured files lie, instead of what the sections say: one folder for all tests, or
+        one by the name of a test.
+    need_data : whether measured files must be there (a forward analysis does without).
+
+    Raises
+    ------
+    InputError : one line naming the file and the dotted key: TOML syntax, missing or unknown
+        keys, wrong units, values out of order, missing data.
+    """
+    path = Path(path)
+    file = parse(path)
+    units = file.units
+    fabric = Fabric(
+        file.fabric.name,
+        file.fabric.thickness * LENGTH_UNITS[units.length],
+        file.fabric.thickness_change,
+    )
+    scales = Scales(
+        MODULUS_UNITS[units.modulus],
+        PRESSURE_UNITS[units.pressure],
+        LENGTH_UNITS[units.length],
+        units.modulus,
+        units.pressure,
+        units.length,
+    )
+    place = Place(path, "", fabric, scales, None, need_data)
+    tests = _tests(file, place, data)
+    return Project(
+        path=path,
+        fabric=fabric,
+        scales=scales,
+        tests=tests,
+        law=file.law,
+        fit=file.fit,
+        cards=read_cards(place, file.card),
+        solver_options=solver_settings(path, file.solver),
+        written=_written(file, path, tests, data),
+    )
+
+
+def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, Test]:
+    tests: dict[str, Test] = {}
+    names = [name for kind in kinds() for name in _names(kind, file.tests(kind))]
+    if isinstance(data, Mapping):
+        for name in data:
+            if name not in names:
+                problem = f"there is no test {name!r}; the project has: {', '.join(names)}"
+                raise InputError(place.path, "--data", problem)
+    for name, kind in kinds().items():
+        sections = file.tests(name)
+        for i, (section, own) in enumerate(zip(sections, _names(name, sections), strict=True)):
+            folder = data.get(own) if isinstance(data, Mapping) else data
+            here = replace(place, at=f"{name}[{i}]", data_folder=folder)
+            if own in tests:
+                raise here.error("name", f"{own!r} is there twice; give one of them another name")
+            tests[own] = kind.read(section, here, own)
+            if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
+                raise here.error("data", NO_FILES)
+    if isinstance(data, Path) and not any(map(_reads, tests.values())):
+        at = next((f"{k}[0].data" for k in kinds() if file.tests(k)), "data")
+        raise InputError(place.path, at, NO_FILES)
+    return tests
+
+
+def _written(
+    file: ProjectFile, path: Path, tests: Mapping[str, Test], data: Folders | None
+) -> Written:
+    sections, whole = {}, {}
+    for name, kind in kinds().items():
+        own = file.tests(name)
+        for section, test in zip(own, _names(name, own), strict=True):
+            folder = data.get(test) if isinstance(data, Mapping) else data
+            key = getattr(kind, "folder_key", None)
+            said = section.model_dump(exclude_unset=True)
+            sections[test] = section_as_run(said, test, key, path.parent, folder)
+            whole[test] = section.model_dump(exclude_none=True)
+    common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
+    cards = [card.model_dump(exclude_none=True) for card in file.card]
+    by_kind = {name: test.kind for name, test in tests.items()}
+    return Written(content_of(path).decode("utf-8"), common, sections, whole, by_kind, cards)
+
+
+def _reads(test: Test) -> bool:
+    # A kind of another distribution may have nothing to say of files.
+    return getattr(test, "reads_files", False)
+
+
+def _names(kind: str, sections: Sequence[Any]) -> list[str]:
+    """A test without a name is called by its kind, with a number where there are several."""
+    alone = len(sections) == 1
+    return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]

@@ -1,0 +1,309 @@
+"""The project file as it is written: what all tests share, in the file's own units."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from ..errors import InputError
+from ..experiments.registry import kind_named, kinds
+from ..files import plug_in_named, plug_ins
+from ..readers.sections import (
+    LengthUnit,
+    ModulusUnit,
+    Name,
+    Number,
+    Pair,
+    Positive,
+    PressureUnit,
+    Section,
+    StrainTriple,
+    first_error,
+)
+from ..reading import toml_of
+from ..solvers.registry import solver_sections
+from .cards import CardSection
+
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class FabricSection(Section):
+    """[fabric]: the one fabric that all tests are of."""
+
+    name: str = ""
+    thickness: Positive
+    thickness_change: Literal["constant", "incompressible"] = "constant"
+
+
+class UnitsSection(Section):
+    """[units]: of every number in the file."""
+
+    modulus: ModulusUnit = "GPa"
+    pressure: PressureUnit = "kPa"
+    length: LengthUnit = "mm"
+
+
+class BoundsSection(Section):
+    """[law.bounds]: least and largest of each modulus, or of each coefficient."""
+
+    E1: Pair | None = None
+    E2: Pair | None = None
+    G12: Pair | None = None
+    lower: list[Number] | None = None
+    upper: list[Number] | None = None
+
+
+class MarginSection(Section):
+    """[law.margin]: the smallest moduli allowed where coefficients are bounded."""
+
+    E: Positive
+    G12: Positive
+
+
+class LawSection(Section):
+    """[law]: the form of the moduli, and between what they are looked for.
+
+    Keys beyond these belong to a form (knots, breaks); it checks them.
+    """
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, Any] = Field(init=False)
+
+    form: Name = "cubic"
+    nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
+    strain_range: StrainTriple | None = None
+    bounds: BoundsSection | None = None
+    margin: MarginSection | None = None
+
+
+class UnknownSection(Section):
+    """[fit.unknowns.NAME]: between what it is looked for, and what is known of it before."""
+
+    bounds: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    prior: Positive | None = None
+
+
+class UnknownsSection(Section):
+    """[fit.unknowns]: what is fitted beside the moduli, one value for all tests."""
+
+    nu12: UnknownSection | None = None
+    thickness: UnknownSection | None = None
+
+
+class FitSection(Section):
+    """[fit]: how it is looked for."""
+
+    starts: Annotated[int, Field(ge=1)] = 50
+    seed: Annotated[int, Field(ge=0)] = 1
+    starts_from: Literal["random", "sobol", "proposed"] = "random"
+    earlier: Name | None = None
+    method: Name = "lm"
+    gradient: Literal["exact", "differences"] = "exact"
+    constraints: Literal["margin", "boolean"] = "margin"
+    solver: Name = "membrane"
+    max_analyses: Annotated[int, Field(ge=1)] | None = None
+    tolerance: Positive = 1e-7
+    coarse_to_fine: bool = False
+    jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
+    trust: list[Name] = Field(default=[])
+    unknowns: UnknownsSection = UnknownsSection()
+    mesh_error: Literal["told", "taken out"] = "told"
+    cache: bool | Name = True
+
+
+class CommonSections(Section):
+    """Everything of a project file but its tests, its cards and the solvers' own sections."""
+
+    fabric: FabricSection
+    units: UnitsSection = UnitsSection()
+    law: LawSection = LawSection()
+    fit: FitSection = FitSection()
+
+
+#: Most tables of one sort: more is a mistake in whatever wrote the file.
+MANY = 1000
+OLD = (
+    "is of version 0.1, which had a file for each kind of test; `bubblefit docs project-file`, "
+    '"From version 0.1", says how to write it now (or start from `bubblefit init`)'
+)
+
+
+class ProjectFile(CommonSections):
+    """A whole project file; its subclass from `project_file` has a list of tests a kind."""
+
+    card: Annotated[list[CardSection], Field(max_length=MANY, default_factory=list)]
+    solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
+
+    def tests(self, kind: str) -> Sequence[Any]:
+        """The sections of a kind, in the file's order."""
+        return cast(Sequence[Any], getattr(self, kind))
+
+
+@functools.cache
+def project_file() -> type[ProjectFile]:
+    """The model with the sections of all kinds that are there."""
+    tests: dict[str, Any] = {
+        name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
+        for name, kind in kinds().items()
+    }
+    tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in kinds()}
+    defaults = create_model("Defaults", **tables)
+    return create_model("Project", __base__=ProjectFile, defaults=(defaults, defaults()), **tests)
+
+
+def _list_of(section: type[BaseModel]) -> Any:
+    return list[section]  # type: ignore[valid-type]
+
+
+def parse(path: Path) -> ProjectFile:
+    """Parse a project file; tests have the keys of [defaults.KIND] that they do not say.
+
+    Raises
+    ------
+    InputError : one line naming the file and the dotted key: TOML syntax, a file of version 0.1,
+        missing or unknown keys, values that cannot be meant. PlugInFailure : a kind of test that
+        a plug-in offers, and that does not work.
+    """
+    content = _content(path)
+    if isinstance(content.get("project"), dict) and "kind" in content["project"]:
+        raise InputError(path, "project.kind", OLD)
+    model = project_file()
+    for name in content.keys() - model.model_fields.keys():
+        if plug_in_named("bubblefit.tests", name) is not None:
+            kind_named(name)  # says why it is not among the model's
+    try:
+        return model.model_validate(_with_defaults(content))
+    except ValidationError as errors:
+        raise first_error(path, errors, cast(type[BaseModel], model)) from None
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        return toml_of(path)
+    except FileNotFoundError:
+        problem = "no such file; `bubblefit init DIR` writes an example to start from"
+        raise InputError(path, "", problem) from None
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "", "is not a text file in UTF-8") from None
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
+        raise InputError(path, "TOML syntax", str(error)) from None
+
+
+def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
+    whole, defaults = dict(content), content.get("defaults")
+    if not isinstance(defaults, dict):
+        return whole
+    for kind, common in defaults.items():
+        tests = whole.get(kind)
+        if isinstance(common, dict) and isinstance(tests, list):
+            whole[kind] = [_merged(common, t) if isinstance(t, dict) else t for t in tests]
+    return whole
+
+
+def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """What is said in `own`, and in `common` where it is not; tables key by key."""
+    merged = {**common, **own}
+    for key in common.keys() & own.keys():
+        if isinstance(common[key], dict) and isinstance(own[key], dict):
+            merged[key] = _merged(common[key], own[key])
+    return merged
+
+
+#: As it is shipped: of the kinds of test and solvers that come with bubblefit.
+SHIPPED = Path(__file__).resolve().parent.parent / "templates" / "project" / "project.schema.json"
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+#: Where a table of one solver's settings is listed by its name.
+SOLVER = "Settings of solvers, by name: [solver.membrane] and so on."
+REFERENCE = "#/$defs/"
+
+
+def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
+    """The schema of a whole file, as plain data.
+
+    A test may have its keys from [defaults.KIND], so that none is required here; bubblefit itself
+    says which are missing.
+
+    Parameters
+    ----------
+    with_plug_ins : whether kinds of test that other distributions add are in it.
+    """
+    schema = project_file().model_json_schema()
+    definitions, properties = schema["$defs"], schema["properties"]
+    theirs = {plug_in.name for plug_in in plug_ins("bubblefit.tests")}
+    own = [name for name in kinds() if with_plug_ins or name not in theirs]
+    for name in kinds():
+        if name not in own:
+            del properties[name]
+    for name in own:
+        for used in _used(properties[name], definitions):
+            definitions[used].pop("required", None)
+    properties["defaults"] = {
+        "description": "Keys that every test of a kind has unless it says them itself.",
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {name: properties[name]["items"] for name in own},
+    }
+    sections = {name: s.model_json_schema() for name, s in solver_sections().items()}
+    for section in sections.values():
+        definitions.update(section.pop("$defs", {}))
+    properties["solver"] = {
+        "description": SOLVER,
+        "type": "object",
+        "properties": sections,
+        # Those of plug-ins check their own settings.
+        "additionalProperties": {"type": "object"},
+    }
+    needed = _used(properties, definitions)
+    schema["$defs"] = {name: definitions[name] for name in sorted(needed)}
+    plain: dict[str, Any] = _plain(schema)
+    return plain | {"$schema": DRAFT, "title": "bubblefit project"}
+
+
+def schema_text(with_plug_ins: bool = True) -> str:
+    """The schema as a file."""
+    return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
+
+
+def _plain(part: Any) -> Any:
+    """Without null, which TOML does not have, and without the titles that only repeat the keys."""
+    if isinstance(part, list):
+        return [_plain(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    choices = [one for one in part.get("anyOf", []) if one != {"type": "null"}]
+    rest = {
+        key: _plain(value)
+        for key, value in part.items()
+        if key != "anyOf"
+        and not (key == "title" and isinstance(value, str))
+        and not (key == "default" and value is None)
+    }
+    if len(choices) == 1:
+        return {**_plain(choices[0]), **rest}
+    return {**rest, "anyOf": [_plain(one) for one in choices]} if choices else rest
+
+
+def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
+    """Names of the definitions that a part of the schema leads to."""
+    used: set[str] = set()
+    waiting = [part]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, dict):
+            target = one.get("$ref")
+            if isinstance(target, str):
+                name = target.removeprefix(REFERENCE)
+                if name not in used:
+                    used.add(name)
+                    waiting.append(definitions[name])
+            waiting += one.values()
+        elif isinstance(one, Sequence) and not isinstance(one, str):
+            waiting += one
+    return used

@@ -1,0 +1,228 @@
+"""Load over deflection of three-point bending, as sensors or a notebook recorded it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .columns import LENGTH_UNITS, LOAD_UNITS
+from .frames import FrameSource
+from .machine_tables import (
+    AS_FOUND,
+    Channel,
+    TableOptions,
+    channel_values,
+    column_of,
+    read_machine_table,
+    source_of,
+)
+
+Array = NDArray[np.float64]
+Zero = Literal["none", "first", "line"]
+
+#: N per kg of the weights on the strap, and N in one of each unit of load.
+GRAVITY = 9.80665
+FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
+NEEDED = ("deflection", "load")
+#: Readings that the straight line of zero = "line" goes through.
+FIRST_READINGS = 4
+#: Of the largest load among them: what the line must rise by, to be more than rounding.
+RISES = 1e-6
+#: Why readings are left out.
+UNLOADING = "after the largest deflection"
+
+
+@dataclass(frozen=True, eq=False)
+class BendingCurve:
+    """One repetition of a bending test, as far as it was loaded.
+
+    Parameters
+    ----------
+    repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
+    dropped : how many readings of it are left out, by why. source : what of the file was read.
+    """
+
+    repetition: str
+    deflection: Array
+    load: Array
+    path: Path | None = None
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    source: FrameSource | None = None
+
+
+def read_bending_curves(
+    path: Path | str,
+    *,
+    deflection: Channel = AS_FOUND,
+    load: Channel = AS_FOUND,
+    repetition: str | None = None,
+    preload: float = 0.0,
+    zero: Zero = "none",
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> tuple[BendingCurve, ...]:
+    """Read the repetitions in one file, in its order; one where no column tells them apart.
+
+    The table is found as in the exports of test machines (`machine_tables`). Of each repetition
+    the readings up to the largest deflection are kept: what comes after is unloading.
+
+    Parameters
+    ----------
+    repetition : name of the column of repetitions, where there is one of another name.
+    preload : N on the beam beside what the readings say: collar and strap.
+    zero : of each repetition's deflection: "none", as read; "first", the first reading is zero;
+        "line", the straight line through the first four readings goes through the origin.
+    format : name of the file's format; found by its content unless given.
+
+    Raises
+    ------
+    InputError : naming file and line: columns that are not there or may be several, no or unknown
+        units, cells that are not numbers, a repetition of one reading, or whose first readings
+        show no stiffness to find a zero by.
+    """
+    path = Path(path)
+    named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
+    if repetition is not None:
+        named["repetition"] = repetition
+    found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
+    columns = {name: column_of(found, name, named, NEEDED) for name in (*NEEDED, "repetition")}
+    way = channel_values(found, columns["deflection"], deflection, LENGTH_UNITS)
+    force = channel_values(found, columns["load"], load, FORCE_UNITS) + preload
+    which = columns["repetition"]
+    asked = {"deflection": deflection.unit, "load": load.unit}
+    source = source_of(found, columns, asked, format)
+    names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
+    curves = []
+    for name in dict.fromkeys(names):
+        rows = [row for row, own in enumerate(names) if own == name]
+        at = f"line {found.table.lines[rows[0]]}"
+        if len(rows) < 2:
+            raise InputError(path, at, f"repetition {name!r} has one reading; expected two or more")
+        full = f"{path.stem} {name}" if which else name
+        own = BendingCurve(full, way[rows], force[rows], path, source=source)
+        curves.append(_zeroed(own, zero, at))
+    return tuple(_loading(curve) for curve in curves)
+
+
+def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
+    if zero == "none":
+        return curve
+    start = float(curve.deflection[0])
+    if zero == "line":
+        x, y = curve.deflection[:FIRST_READINGS], curve.load[:FIRST_READINGS]
+        slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
+        if not slope * np.ptp(x) > RISES * np.abs(y).max():
+            problem = f"the first readings of {curve.repetition!r} do not rise: no zero to be found"
+            raise InputError(curve.path, at, problem)
+        start = float(-intercept / slope)
+    return replace(curve, deflection=curve.deflection - start)
+
+
+def _loading(curve: BendingCurve) -> BendingCurve:
+    """The readings up to the largest deflection, sorted: a sensor's noise is no unloading."""
+    part = slice(int(np.argmax(curve.deflection)) + 1)
+    order = np.argsort(curve.deflection[part], kind="stable")
+    after = len(curve.load) - len(order)
+    return replace(
+        curve,
+        deflection=curve.deflection[part][order],
+        load=curve.load[part][order],
+        dropped={UNLOADING: after} if after else {},
+    )
+
+
+PLACES = 61  # of the grid
+
+
+@dataclass(frozen=True, eq=False)
+class BendingScatter:
+    """Repetitions on one grid of deflections (k,) mm.
+
+    mean, deviation : (k,) N over the repetitions that reach so far; the deviation is NaN where
+    that is one. count : (k,) how many do.
+    """
+
+    deflection: Array
+    mean: Array
+    deviation: Array
+    count: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class BendingError:
+    """How far a model's curve is from all readings that it reaches.
+
+    rms, mean : N; the mean is positive where the model is too stiff. relative : rms over the
+    largest load among these readings. compared, beyond : readings up to the model's last
+    deflection, and after it.
+    """
+
+    rms: float
+    mean: float
+    relative: float
+    compared: int
+    beyond: int
+
+
+def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScatter:
+    """Mean and sample standard deviation of the repetitions, interpolated between readings.
+
+    The grid goes from the smallest to the largest deflection read.
+
+    Raises
+    ------
+    ValueError : no curves.
+    """
+    if not curves:
+        raise ValueError("scatter: no repetitions")
+    low = min(float(c.deflection[0]) for c in curves)
+    high = max(float(c.deflection[-1]) for c in curves)
+    grid = np.linspace(low, high, places)
+    loads = np.array([np.interp(grid, *_single(c), left=np.nan, right=np.nan) for c in curves])
+    there = np.isfinite(loads)
+    count = there.sum(axis=0)
+    total = np.where(there, loads, 0.0).sum(axis=0)
+    mean = np.divide(total, count, out=np.full(places, np.nan), where=count > 0)
+    square = (np.where(there, loads - mean, 0.0) ** 2).sum(axis=0)
+    variance = np.divide(square, count - 1, out=np.full(places, np.nan), where=count > 1)
+    return BendingScatter(grid, mean, np.sqrt(variance), count)
+
+
+def model_error(
+    curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
+) -> BendingError | None:
+    """The model's load less that read, at every reading from zero to the model's end.
+
+    Parameters
+    ----------
+    deflection, load : (frames,) mm, rising, and N, of the model.
+
+    Returns
+    -------
+    None where the model reaches no reading of a load.
+    """
+    x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
+    way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
+    read = np.concatenate([c.load for c in curves]) if curves else np.empty(0)
+    inside = (way >= x[0]) & (way <= x[-1])
+    largest = float(np.abs(read[inside]).max(initial=0.0))
+    if not largest > 0:
+        return None
+    off = np.interp(way[inside], x, y) - read[inside]
+    rms = float(np.sqrt(np.mean(off**2)))
+    return BendingError(
+        rms, float(off.mean()), rms / largest, int(inside.sum()), int((way > x[-1]).sum())
+    )
+
+
+def _single(curve: BendingCurve) -> tuple[Array, Array]:
+    """Deflections without repeats, with the mean load of each."""
+    x, whose = np.unique(curve.deflection, return_inverse=True)
+    return x, np.bincount(whose, curve.load) / np.bincount(whose)

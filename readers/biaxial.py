@@ -1,0 +1,372 @@
+"""One file of a biaxial test: loads per width and strains along both yarns, row by row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..materials.designers import RATIOS, shares
+from .columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
+from .frames import FrameSource
+from .machine_tables import TableOptions, column_of, measured, read_machine_table, source_of
+
+#: Those that a pair of loads may be taken for.
+KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
+#: Degrees between the direction of a pair of loads and that of a ratio: no more than it.
+NEAR = 4.0
+
+
+def plain_ratio(ratio: str) -> str:
+    """The same name for each spelling of a ratio: "2:1" of "2/1", "2.0 : 1" and "4:2".
+
+    Raises
+    ------
+    InputError : no such ratio.
+    """
+    warp, fill = shares(ratio)
+    least = min(x for x in (warp, fill) if x > 0)
+    whole = [round(x / least, 3) for x in (warp, fill)]
+    for factor in range(1, 6):
+        if all(math.isclose(factor * x, round(factor * x), abs_tol=0.005 * factor) for x in whole):
+            return ":".join(f"{round(factor * x)}" for x in whole)
+    return ":".join(f"{x:g}" for x in (round(warp, 3), round(fill, 3)))
+
+
+def nearest_ratio(loads: Sequence[float]) -> str:
+    """The ratio that loads along warp and fill are of; their own numbers where it is none.
+
+    >>> nearest_ratio([30.0, 14.8]), nearest_ratio([25.0, 0.5])
+    ('2:1', '1:0')
+    """
+    warp, fill = (max(x, 0.0) for x in loads)
+    own = math.degrees(math.atan2(fill, warp))
+
+    def off(name: str) -> float:
+        a, b = shares(name)
+        return abs(math.degrees(math.atan2(b, a)) - own)
+
+    best = min(KNOWN, key=off)
+    if off(best) <= NEAR or not max(warp, fill) > 0:
+        return best
+    larger = max(warp, fill)
+    return f"{warp / larger:.2g}:{fill / larger:.2g}"
+
+
+Array = NDArray[np.float64]
+LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm"]
+StrainUnit = Literal["%", "‰", "mm/mm"]
+
+#: What a table has to hold, and by which key of a project its column is named.
+QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
+
+
+@dataclass(frozen=True, eq=False)
+class BiaxialTable:
+    """The rows of a file in their order.
+
+    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the length
+    at the beginning. ratio : (n,) names of load ratios, None where the file has none. lines : (n,)
+    in the file. source : what of it was read.
+    """
+
+    path: Path
+    load: Array
+    strain: Array
+    ratio: tuple[str, ...] | None
+    lines: NDArray[np.intp]
+    source: FrameSource
+
+
+def read_biaxial_table(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    load_unit: LoadUnit | None = None,
+    strain_unit: StrainUnit | None = None,
+    decimal: Literal[".", ","] | None = None,
+    comment: str = "#",
+    format: str | None = None,
+) -> BiaxialTable:
+    """Read a table; names, units, separator and decimal mark are found as for load curves.
+
+    Parameters
+    ----------
+    columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
+        `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are).
+    load_unit, strain_unit : needed where the file names none.
+
+    Raises
+    ------
+    InputError : naming file, line and the columns there are: nothing or several things found for
+        a quantity, no unit or a different one, cells that are not finite numbers, no such ratio.
+    """
+    path, named = Path(path), dict(columns or {})
+    unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
+    if unknown:
+        problem = f"unknown quantity {unknown[0]!r}; expected {', '.join((*QUANTITIES, 'ratio'))}"
+        raise InputError(None, "columns", problem)
+    asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
+    wanted = tuple(QUANTITIES.values())
+    options = TableOptions(asked, wanted, comment, decimal)
+    found = read_machine_table(path, options, format)
+    column = {name: column_of(found, name, asked, wanted) for name in (*wanted, "ratio")}
+    load, strain = (
+        np.column_stack([measured(found, column[f"{yarn} {kind}"], kind, units, unit)
+                         for yarn in ("warp", "fill")])
+        for kind, units, unit in (
+            ("load", WIDTH_LOAD_UNITS, load_unit), ("strain", STRAIN_UNITS, strain_unit),
+        )
+    )  # fmt: skip
+    units_asked = {name: load_unit if name.endswith("load") else strain_unit for name in wanted}
+    source = source_of(found, column, units_asked, format, found.notes)
+    ratio = None
+    if column["ratio"]:
+        cells, lines = found.table.text(column["ratio"]), found.table.lines
+        ratio = tuple(
+            _ratio(path, f"line {line}, column {column['ratio']!r}", cell)
+            for line, cell in zip(lines, cells, strict=True)
+        )
+    return BiaxialTable(path, load, strain, ratio, found.table.lines, source)
+
+
+def _ratio(path: Path, at: str, cell: str) -> str:
+    try:
+        return plain_ratio(cell)
+    except InputError as error:
+        raise InputError(path, at, error.problem) from None
+
+
+# The cycles of a biaxial test: where each is loaded from, how far, and of which ratio it is.
+#
+# A cycle begins where the larger of the two loads turns from falling to rising and ends where it
+# does so again. Turns that are small beside the range of the loads are noise or a hold.
+
+#: Of the range of loads of a phase: a smaller turn is none.
+TURN = 0.2
+#: Of a cycle's range: how far from its lowest and highest load the loading begins and ends, so
+#: that holds at the prestress and at the top, in which the fabric creeps, are no part of it.
+HOLD = 0.01
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One cycle, by rows of the test.
+
+    ratio : "2:1". phase : number, from 1, of the row of cycles of one ratio that it is in; number :
+    from 1, within its phase; count : from 1, in the whole test. first : row from which the
+    fabric is loaded; last : row at which it is loaded most (both are of the loading).
+    """
+
+    ratio: str
+    phase: int
+    number: int
+    count: int
+    first: int
+    last: int
+
+    @property
+    def rows(self) -> slice:
+        """Of the loading."""
+        return slice(self.first, self.last + 1)
+
+
+def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
+    """The cycles in their order.
+
+    Parameters
+    ----------
+    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; where there are none,
+        that of the loads at the top of a cycle.
+    """
+    larger = np.asarray(load).max(axis=1)
+    cycles: list[Cycle] = []
+    for label, start, stop in _stretches(len(larger), labels):
+        for first, last in _loadings(larger[start:stop]):
+            ratio = label or nearest_ratio(load[start + last] - _base(load, start + first))
+            same = bool(cycles) and cycles[-1].ratio == ratio
+            before = cycles[-1] if cycles else None
+            phase = 1 if before is None else before.phase + (0 if same else 1)
+            number = before.number + 1 if before is not None and same else 1
+            cycles.append(Cycle(ratio, phase, number, len(cycles) + 1, start + first, start + last))
+    return cycles
+
+
+def _base(load: Array, row: int) -> Array:
+    """A prestress has no ratio of its own: what is below it does not count."""
+    return np.asarray(np.minimum(load[row], load[row].min()))
+
+
+def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | None, int, int]]:
+    if labels is None:
+        return [(None, 0, count)]
+    found: list[tuple[str | None, int, int]] = []
+    start = 0
+    for label, same in groupby(labels):
+        stop = start + len(list(same))
+        found.append((label, start, stop))
+        start = stop
+    return found
+
+
+def _loadings(s: Array) -> list[tuple[int, int]]:
+    """First and last row of every loading in loads (n,)."""
+    least = TURN * float(np.ptp(s)) if len(s) else 0.0
+    if not least > 0:
+        return []
+    found = []
+    for low, high in _rises(s, least):
+        hold = HOLD * (s[high] - s[low])
+        first = low + int(np.flatnonzero(s[low : high + 1] <= s[low] + hold)[-1])
+        last = first + int(np.flatnonzero(s[first : high + 1] >= s[high] - hold)[0])
+        found.append((first, last))
+    return found
+
+
+def _rises(s: Array, least: float) -> list[tuple[int, int]]:
+    """Rows of a valley and of the peak after it, for each rise of more than `least`."""
+    found, low, high, rising = [], 0, 0, False
+    for i in range(len(s)):
+        if rising:
+            if s[i] > s[high]:
+                high = i
+            elif s[i] < s[high] - least:
+                found.append((low, high))
+                rising, low = False, i
+        elif s[i] < s[low]:
+            low = i
+        elif s[i] > s[low] + least:
+            rising, high = True, i
+    return [*found, (low, high)] if rising else found
+
+
+#: Which cycle of a ratio is evaluated: the last of its phase, or by number from 1.
+Which = int | Literal["last"]
+
+
+@dataclass(frozen=True, eq=False)
+class BiaxialPath:
+    """The loading of one cycle.
+
+    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file, change
+    of length over the length there. residual : (2,) strain at the beginning of the loading, of the
+    same beginning. cycles : how many the phase has.
+    """
+
+    table: BiaxialTable
+    cycle: Cycle
+    cycles: int
+    load: Array
+    strain: Array
+
+    @property
+    def ratio(self) -> str:
+        """Of the loads."""
+        return self.cycle.ratio
+
+    @property
+    def residual(self) -> Array:
+        """(2,) strain at the beginning of the loading."""
+        return np.asarray(self.strain[0] - self.table.strain[0])
+
+    @property
+    def since(self) -> Array:
+        """(n, 2) strain since the beginning of the loading."""
+        return np.asarray(self.strain - self.strain[0])
+
+    def between(self, lowest: float, highest: float) -> BiaxialPath:
+        """The rows whose larger load (N/mm) lies between two.
+
+        Raises
+        ------
+        InputError : fewer than two of them.
+        """
+        larger = self.load.max(axis=1)
+        keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
+        if keep.sum() < 2:
+            problem = (
+                f"fewer than two rows of ratio {self.ratio} lie between {lowest:g} and "
+                f"{highest:g} kN/m; its loading goes from {larger.min():.4g} to {larger.max():.4g}"
+            )
+            raise InputError(self.table.path, "", problem)
+        return replace(self, load=self.load[keep], strain=self.strain[keep])
+
+    def thinned(self, most: int) -> BiaxialPath:
+        """At most so many rows, evenly spread over the larger load, both ends among them."""
+        if len(self.load) <= most:
+            return self
+        larger = np.maximum.accumulate(self.load.max(axis=1))
+        wanted = np.linspace(larger[0], larger[-1], most)
+        rows = np.unique(np.clip(np.searchsorted(larger, wanted), 0, len(larger) - 1))
+        rows[-1] = len(larger) - 1
+        return replace(self, load=self.load[rows], strain=self.strain[rows])
+
+
+def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:
+    """The cycles of each file; named : the ratio that a file is listed for, None for none.
+
+    Raises
+    ------
+    InputError : a file without a cycle.
+    """
+    found = []
+    for table, name in zip(tables, named, strict=True):
+        labels = [name] * len(table.load) if name is not None else table.ratio
+        cycles = find_cycles(table.load, labels)
+        if not cycles:
+            raise InputError(table.path, "", "no loading: the loads do not rise anywhere")
+        found.append(cycles)
+    return found
+
+
+def evaluated_paths(
+    tables: Sequence[BiaxialTable],
+    cycles: Sequence[Sequence[Cycle]],
+    which: Which = "last",
+    conditioning: int = 0,
+    ratios: Collection[str] | None = None,
+) -> list[BiaxialPath]:
+    """Of each ratio the loading of one cycle, in the order of `RATIOS`, then by name.
+
+    Of a ratio that comes several times, the first time after the conditioning counts.
+
+    Parameters
+    ----------
+    which : of the cycles of a ratio. conditioning : cycles at the beginning of each file that
+        count for nothing. ratios : those that are wanted; all unless given.
+
+    Raises
+    ------
+    InputError : a ratio that is wanted and is not there, or has not so many cycles.
+    """
+    found: dict[str, BiaxialPath] = {}
+    for table, own in zip(tables, cycles, strict=True):
+        phases: dict[int, list[Cycle]] = {}
+        for cycle in own[conditioning:]:
+            phases.setdefault(cycle.phase, []).append(cycle)
+        for same in phases.values():
+            ratio = same[0].ratio
+            if ratio in found or (ratios is not None and ratio not in ratios):
+                continue
+            if which != "last" and which > len(same):
+                problem = f"ratio {ratio} has {len(same)} cycles, number {which} is asked for"
+                raise InputError(table.path, "", problem)
+            chosen = same[-1] if which == "last" else same[which - 1]
+            rows = chosen.rows
+            found[ratio] = BiaxialPath(
+                table, chosen, len(same), table.load[rows], table.strain[rows]
+            )
+    missing = [ratio for ratio in ratios or () if ratio not in found]
+    if missing or not found:
+        there = ", ".join(dict.fromkeys(c.ratio for own in cycles for c in own))
+        problem = f"no cycle of ratio {', '.join(missing) or 'any'} after the conditioning"
+        raise InputError(tables[0].path, "", f"{problem}; the ratios there: {there}")
+    order = {ratio: k for k, ratio in enumerate(RATIOS)}
+    return sorted(found.values(), key=lambda p: (order.get(p.ratio, len(order)), p.ratio))

@@ -1,0 +1,222 @@
+"""Load over elongation of tensile specimens, as test machines export it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .columns import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
+from .frames import FrameSource
+from .machine_tables import (
+    MachineTable,
+    TableOptions,
+    choice_of,
+    column_of,
+    measured,
+    read_machine_table,
+    source_of,
+)
+
+QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
+
+#: Directions in which a strip can be pulled, in the order in which they are told.
+DIRECTIONS = ("warp", "fill", "bias")
+
+#: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
+#: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
+DIRECTION_ALIASES: Mapping[str, str] = {
+    "warp": "warp",
+    "fill": "fill",
+    "weft": "fill",
+    "bias": "bias",
+    "bias45": "bias",
+    "45bias": "bias",
+    "45": "bias",
+    "45deg": "bias",
+    "45degree": "bias",
+    "45degreebias": "bias",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCurve:
+    """Load against elongation of one specimen, or of several in one series.
+
+    Parameters
+    ----------
+    direction : warp, fill or bias.
+    specimen : its name in the file, else the series', else the file's.
+    elongation : (n,) mm, in the order of the file.
+    load : (n,) N, of the whole strip.
+    path : the file, None when the curve did not come from one.
+    time : (n,) in the file's unit, None unless asked for by name.
+    frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
+    notes : one sentence each: what was chosen where the file leaves a choice.
+    source : what of the file was read; None where nothing was.
+    """
+
+    direction: str
+    specimen: str
+    elongation: NDArray[np.float64]
+    load: NDArray[np.float64]
+    path: Path | None
+    time: NDArray[np.float64] | None = None
+    frame: NDArray[np.intp] | None = None
+    notes: tuple[str, ...] = ()
+    source: FrameSource | None = None
+
+
+def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
+    """warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
+
+    Raises
+    ------
+    InputError : a name that is not among them.
+    """
+    plain = re.sub(r"[\W_]+", "", name.casefold())
+    if plain not in DIRECTION_ALIASES:
+        known = ", ".join(DIRECTION_ALIASES)
+        raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {known}")
+    return DIRECTION_ALIASES[plain]
+
+
+def read_load_curves(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None,
+    length_unit: Literal["mm", "cm", "m"] | None = None,
+    width: float | None = None,
+    comment: str = "#",
+    direction: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> tuple[LoadCurve, ...]:
+    """Read the curves of one export: one a direction and specimen, in the order of the file.
+
+    In text, lines before the row of names are passed over; names, unit row, separator and decimal
+    mark are found (see `formats.machine_text`).
+
+    Parameters
+    ----------
+    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with
+        or without the unit; needed where finding is ambiguous. `time` is read only when named.
+    load_unit, length_unit : needed where the file names none.
+    width : of the strip, mm, by which a load per width (kN/m, N/mm) is multiplied.
+    comment : lines that start so are skipped.
+    direction : of a file without a column of directions; in a file with one, the rows to keep.
+    decimal : needed where 1,234 may be a thousand or little more than one.
+    format : name of the file's format; found by its content unless given.
+
+    Raises
+    ------
+    InputError : naming file, line and the columns there are: nothing or several things found for
+        a quantity, no unit or a different one, no or an unknown direction, cells that are not
+        finite numbers.
+    """
+    path, named = Path(path), dict(columns or {})
+    unknown = [name for name in named if name not in QUANTITIES]
+    if unknown:
+        problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
+        raise InputError(None, "columns", problem)
+    if decimal not in (None, ".", ","):
+        raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
+    wanted = None if direction is None else direction_named(direction)
+    options = TableOptions(named, comment=comment, decimal=decimal)
+    found = read_machine_table(path, options, format)
+    column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
+    elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
+    load = _load(found, column["load"], load_unit, width)
+    notes = found.notes + choice_of(found, "elongation", named)
+    asked = {"elongation": length_unit, "load": load_unit}
+    source = source_of(found, column, asked, format, notes)
+    time = found.table.numbers(column["time"]) if column["time"] else None
+    labels = _labels(found, column, wanted)
+    places: dict[tuple[str, str], list[int]] = {}
+    for row, label in enumerate(labels):
+        places.setdefault(label, []).append(row)
+    curves = []
+    for key, rows in places.items():
+        if wanted in (None, key[0]):
+            taken = None if time is None else time[rows]
+            values = elongation[rows], load[rows]
+            curves.append(LoadCurve(*key, *values, path, taken, notes=notes, source=source))
+    if not curves:
+        there = ", ".join(dict.fromkeys(key[0] for key in places))
+        raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
+    return tuple(curves)
+
+
+def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
+    """The specimens of a series that lists them one after the other without naming them.
+
+    A new specimen starts where the elongation falls below half of the largest before; so not for
+    tests that unload. They are called by the series' name and a number from 1.
+    """
+    u, starts, reached = curve.elongation, [0], 0.0
+    for i, value in enumerate(u):
+        if 0 < reached and value < 0.5 * reached:
+            starts.append(i)
+            reached = 0.0
+        # Noise about zero, before the load comes on, is no restart.
+        reached = max(reached, value if value > 1e-2 * u.max() else 0.0)
+    parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
+    return tuple(
+        LoadCurve(
+            curve.direction,
+            f"{curve.specimen} {number}",
+            u[part],
+            curve.load[part],
+            curve.path,
+            None if curve.time is None else curve.time[part],
+            notes=curve.notes,
+            source=curve.source,
+        )
+        for number, part in enumerate(parts, start=1)
+    )
+
+
+def _load(
+    found: MachineTable, column: str, unit: str | None, width: float | None
+) -> NDArray[np.float64]:
+    """Loads (rows,) in N of the whole strip."""
+    units = dict(LOAD_UNITS)
+    if found.units[column] in WIDTH_LOAD_UNITS or unit in WIDTH_LOAD_UNITS:
+        if width is None:
+            problem = f"{found.units[column] or unit} is a load per width; say the strip's width"
+            raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
+        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
+    return measured(found, column, "load", units, unit)
+
+
+def _labels(
+    found: MachineTable, column: Mapping[str, str], wanted: str | None
+) -> Sequence[tuple[str, str]]:
+    """Direction and specimen of each row."""
+    table = found.table
+    if not column["direction"] and wanted is None:
+        there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
+        problem = (
+            "no column says the direction; say direction, in a project files = { warp = [...] }."
+            f" The file has: {there}"
+        )
+        raise InputError(table.path, f"line {found.header}", problem)
+    series = list(table.text(column["direction"])) if column["direction"] else None
+    specimens = list(table.text(column["specimen"])) if column["specimen"] else None
+    labels = []
+    for i, line in enumerate(table.lines):
+        at = f"line {line}, column {column['direction']!r}"
+        way = direction_named(series[i], table.path, at) if series else str(wanted)
+        specimen = specimens[i] if specimens else series[i] if series else table.path.stem
+        if not specimen:
+            at = f"line {line}, column {column['specimen']!r}"
+            raise InputError(table.path, at, "expected the specimen's name, found nothing")
+        labels.append((way, specimen))
+    return labels

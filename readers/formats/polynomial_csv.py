@@ -1,0 +1,59 @@
+"""Load polynomials as a comma-separated table, a row a direction.
+
+Columns direction, gauge_length_mm, final_length_mm, c1, c2 ...; c0 and data_scatter_N may be there.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ..curves import direction_named
+from ..polynomials import LoadPolynomial, PublishedPolynomial
+from ..registry import Format, register_format
+from ..tables import TextTable, read_table
+
+
+def read(path: Path) -> dict[str, PublishedPolynomial]:
+    """A polynomial a direction; load in N, elongation in mm, of the full strip.
+
+    Raises
+    ------
+    InputError : naming file, line and column: missing columns, powers left out, cells that are not
+        finite numbers, an unknown direction or one given twice, lengths that do not grow.
+    """
+    table = read_table(path)
+    names = [str(name) for name in table.cells.columns]
+    found = {int(name[1:]) for name in names if re.fullmatch(r"c\d{1,2}", name)}
+    powers = range(1, max(found | {1}) + 1)
+    coefficients = np.zeros((len(table.lines), len(powers) + 1))
+    for power in [0] * (0 in found) + list(powers):
+        coefficients[:, power] = table.numbers(f"c{power}")
+    lengths = np.stack([table.numbers(f"{name}_length_mm") for name in ("gauge", "final")], axis=1)
+    scatter = np.full(len(table.lines), np.nan)
+    if "data_scatter_N" in names:
+        scatter = table.numbers("data_scatter_N")
+    read: dict[str, PublishedPolynomial] = {}
+    for row, line in enumerate(table.lines):
+        gauge, final = (float(length) for length in lengths[row])
+        direction = _direction(table, row, read)
+        if not 0 < gauge < final:
+            problem = f"expected 0 < gauge length < final length, got {gauge:g} and {final:g}"
+            raise InputError(table.path, f"line {line}", problem)
+        fitted = LoadPolynomial(coefficients[row], final - gauge, np.nan, np.nan, 0)
+        read[direction] = PublishedPolynomial(direction, gauge, final, fitted, float(scatter[row]))
+    return read
+
+
+def _direction(table: TextTable, row: int, before: dict[str, PublishedPolynomial]) -> str:
+    at = f"line {table.lines[row]}, column 'direction'"
+    direction = direction_named(str(table.text("direction").iloc[row]), table.path, at)
+    if direction in before:
+        raise InputError(table.path, at, f"{direction} is given twice; expected once")
+    return direction
+
+
+register_format(Format("csv", "load polynomials", "columns direction, lengths, c1, c2 ...", read))

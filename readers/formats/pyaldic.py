@@ -1,0 +1,79 @@
+"""Exports of pyALDIC-3D: .npz with all frames, .mat alike, and .csv, one a frame.
+
+    points3D (frames, points, 3), U, V, W (frames, points), ref_coords, reproj_error, source
+    x_px,y_px,X_mm,Y_mm,Z_mm,U,V,W
+
+Source: pyALDIC-3D's own export (tables.py) and reconstruction (points3D and X_mm are the places in
+the frame itself, displacements those since the first frame, NaN where correlation was lost; the
+left camera's axes, so that y points down and z away from it). Its .mat cannot be told from its
+names alone unless points3D is among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ..frames import Frame, FrameOptions, FrameRows, frame_of
+from ..mat_files import is_mat, read_variables, variable_names
+from ..npz_files import SIGNATURE, array_names, read_arrays
+from ..registry import Format, register_format
+from ..text_frames import read_text_rows
+
+NAMES = ("points3D", "U", "V", "W")
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether points3D is among the arrays, or x_px and X_mm among the headings."""
+    if head.startswith(SIGNATURE):
+        return "points3D" in array_names(path)
+    if is_mat(head):
+        return "points3D" in (variable_names(path, head) or ())
+    return head.startswith(b"x_px,y_px,X_mm")
+
+
+def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """All frames of a file."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(128)
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    if not head.startswith(SIGNATURE) and not is_mat(head):
+        deformed = options if options.coordinates else replace(options, coordinates="deformed")
+        rows = read_text_rows(path, deformed, camera_axes=True)
+        return [frame_of(rows, deformed, path, "pyaldic")]
+    there = (read_variables if is_mat(head) else read_arrays)(path, NAMES)
+    return [frame_of(rows, options, path, "pyaldic") for rows in _rows(path, there)]
+
+
+def _rows(path: Path, there: Mapping[str, np.ndarray]) -> list[FrameRows]:
+    points = there.get("points3D")
+    if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:
+        raise InputError(path, "points3D", "expected places (frames, points, 3)")
+    if points.dtype.kind not in "fiu" or not points.size:
+        raise InputError(path, "points3D", "expected numbers, found none")
+    points = points.astype(float)
+    moved = points - points[0]
+    for i, name in enumerate("UVW"):
+        given = there.get(name)
+        if given is not None and given.shape != points.shape[:2]:
+            problem = f"is {given.shape}, points3D {points.shape}: expected one a point and frame"
+            raise InputError(path, name, problem)
+        if given is not None:
+            moved[:, :, i] = given.astype(float)
+    names = {f"{axis} deformed": "points3D" for axis in "xyz"}
+    names |= {f"d{axis}": name for axis, name in zip("xyz", "UVW", strict=True)}
+    frames = []
+    for place, move in zip(points, moved, strict=True):
+        columns = np.concatenate([place, move], axis=1).T
+        values = dict(zip(names, columns, strict=True))
+        frames.append(FrameRows(values, names, dict.fromkeys(values, "mm"), camera_axes=True))
+    return frames
+
+
+register_format(Format("pyaldic", "frame", "npz, mat or CSV of pyALDIC-3D", read, recognises))

@@ -1,0 +1,468 @@
+"""Frames of image correlation (DIC): places in the reference picture, and how they moved."""
+
+from __future__ import annotations
+
+import glob
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..notes import Note, NoteKind
+from .columns import LONGEST, split_unit
+from .registry import read_file
+
+#: Reference place and displacement, in the order of a frame's columns.
+QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
+
+#: Why rows of a file are not used: what a table of provenance calls it.
+FLAGGED = "flagged as doubtful"
+NEGATIVE_SIGMA = "sigma below zero"
+ALL_ZERO = "all zero"
+LOST = "without a value"
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """What was taken from a file, for the record.
+
+    Parameters
+    ----------
+    format : name of the file's format, "" where its reader does not say.
+    columns : for each quantity that was read, what the file calls it.
+    units : for each of them the unit that the file names; a quantity is missing where the file
+        names none.
+    notes : one sentence each: what was chosen where the file leaves a choice.
+    """
+
+    format: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A surface in one frame.
+
+    Parameters
+    ----------
+    points : (m, 3) mm, reference places; NaN where correlation was lost, z also where it was not
+        asked for.
+    displacement : (m, 3) mm; NaN where correlation was lost.
+    path : the file, None when the frame did not come from one.
+    dropped : how many rows of the file are not among the points, by why.
+    sigma : (m,) what the correlation says of its own error, in the file's own measure; None where
+        it says nothing.
+    source : what of the file was read.
+    """
+
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    path: Path | None = None
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    sigma: NDArray[np.float64] | None = None
+    source: FrameSource = field(default_factory=FrameSource)
+
+    def __post_init__(self) -> None:
+        if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
+            shapes = f"{self.points.shape} and {self.displacement.shape}"
+            raise ValueError(f"expected (m, 3) points and displacements, got {shapes}")
+        if self.sigma is not None and self.sigma.shape != self.points.shape[:1]:
+            raise ValueError(f"expected (m,) sigma, got {self.sigma.shape}")
+
+
+@dataclass(frozen=True)
+class FrameOptions:
+    """What a reader of frames is told beside the file.
+
+    Parameters
+    ----------
+    quantities : of `QUANTITIES`, those that the file must hold; others are read where they are
+        there.
+    columns : the file's own name of some quantities; the others are found by their headings.
+    flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
+    valid_column : the same for a column that is zero in doubtful rows.
+    comment : lines that start so are skipped, where the format has no comments of its own.
+    length_scale : mm in one unit of length of columns that do not name theirs.
+    decimal : the decimal mark, "." or ","; None finds it.
+    coordinates : whether the places in the file are those before or after the motion; None where
+        the format tells.
+    camera_axes : whether y points down in the file and z away from the camera, so that both are
+        turned over; None where the format tells.
+    planar : whether z and dz may be missing, and are then zero.
+
+    Raises
+    ------
+    InputError : a name for what is no quantity, a scale that is not above zero.
+    """
+
+    quantities: tuple[str, ...] = QUANTITIES
+    columns: Mapping[str, str] | None = None
+    flag_column: str | None = None
+    comment: str = "#"
+    length_scale: float = 1.0
+    valid_column: str | None = None
+    decimal: Literal[".", ","] | None = None
+    coordinates: Literal["reference", "deformed"] | None = None
+    camera_axes: bool | None = None
+    planar: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.length_scale < math.inf:
+            problem = f"expected mm per unit, above 0, got {self.length_scale}"
+            raise InputError(None, "length_scale", problem)
+        unknown = [name for name in self.columns or {} if name not in QUANTITIES]
+        if unknown:
+            problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
+            raise InputError(None, "columns", problem)
+
+
+def read_frames(
+    files: Sequence[Path | str],
+    options: FrameOptions = FrameOptions(),
+    format: str | None = None,
+) -> tuple[Frame, ...]:
+    """Read frames in the order of the files; most formats have one a file.
+
+    Exports that write zeros for the displacement only where correlation was lost need a flag
+    column: such a point cannot be told from one that did not move.
+
+    Parameters
+    ----------
+    format : its name (`registry.format_names("frame")`); found by the files' content unless given.
+
+    Raises
+    ------
+    InputError : naming file, line and column: no files, no such file, a format that cannot be
+        told, missing columns, cells that are not numbers.
+    """
+    if not files:
+        raise InputError(None, "files", "expected one file a frame, got none")
+    return tuple(frame for file in files for frame in _frames(Path(file), options, format))
+
+
+def _frames(path: Path, options: FrameOptions, format: str | None) -> Sequence[Frame]:
+    frames: Sequence[Frame] = read_file("frame", path, format, options)
+    for frame in frames:
+        if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
+            raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
+    return frames
+
+
+# What the columns of an image correlation's export are called, and the units they name.
+#
+# The words are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports, whose readers
+# in `formats` name the source of each, and of plain tables in English and German.
+
+#: mm in one of each unit of length, by its name in small letters.
+LENGTHS = {
+    **dict.fromkeys(("mm", "millimeter", "millimetre", "millimeters", "millimetres"), 1.0),
+    **dict.fromkeys(("cm", "centimeter", "centimetre"), 10.0),
+    **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e3),
+    **dict.fromkeys(("µm", "μm", "um", "micron", "microns", "micrometer", "mikrometer"), 1e-3),
+    **dict.fromkeys(("in", "inch", "inches", "zoll"), 25.4),
+}
+PIXELS = frozenset({"px", "pix", "pixel", "pixels"})
+
+_AXES = {
+    **dict(zip("xyz", "xyz", strict=True)),
+    **{name: f"d{axis}" for axis, name in zip("xyz", "uvw", strict=True)},
+    **{f"{letter}{axis}": f"d{axis}" for axis in "xyz" for letter in "du"},
+}
+#: Components of a vector without a word that says of what: displacements where they are lengths.
+_VECTOR = {f"v{axis}": f"d{axis}" for axis in "xyz"}
+_MOVED = frozenset("displacement displacements disp verschiebung verschiebungen".split())
+_REFERENCE = frozenset("undeformed reference ref initial unverformt referenz".split())
+_DEFORMED = frozenset("deformed current cur verformt aktuell".split())
+_FILLING = frozenset(
+    "coordinate coordinates coord coor position pos point koordinate koordinaten punkt punkte"
+    " model horizontal vertical out of plane in component komponente richtung direction".split()
+)
+_VALID = frozenset({"valid", "isvalid", "is valid", "validity", "gültig"})
+_INVALID = frozenset({"invalid", "rejected", "doubtful", "ungültig"})
+_UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column's heading.
+
+    Parameters
+    ----------
+    name : as the file has it.
+    unit : as the file has it, "" for none.
+    quantity : x, y, z, dx, dy, dz, sigma, valid, invalid; "" for anything else.
+    state : of a coordinate, "reference" or "deformed" where the heading says so, else "".
+    """
+
+    name: str
+    unit: str
+    quantity: str
+    state: str = ""
+
+    @property
+    def scale(self) -> float | None:
+        """mm in one unit; None where no unit of length is named."""
+        return LENGTHS.get(self.unit.casefold())
+
+
+def heading_of(name: str, unit: str = "") -> Heading:
+    """What a column holds.
+
+    >>> heading_of("disp.Horizontal Displacement U [mm]").quantity
+    'dx'
+
+    unit : from a row of units below the names; one in the name itself comes first.
+    """
+    if len(name) > LONGEST:
+        return Heading(name, unit, "")
+    plain, own = split_unit(name)
+    at_the_end = _UNIT_AT_THE_END.match(name)
+    if not own and at_the_end:
+        plain, own = at_the_end[1], at_the_end[2]
+    unit = own or unit
+    words = [word for word in re.split(r"[\W_]+", plain.casefold()) if word]
+    whole = " ".join(words)
+    if whole == "sigma":
+        return Heading(name, unit, "sigma")
+    if whole in _VALID or whole in _INVALID:
+        return Heading(name, unit, "valid" if whole in _VALID else "invalid")
+    axes = _AXES | _VECTOR if unit.casefold() in LENGTHS else _AXES
+    found = [axes[word] for word in words if word in axes]
+    others = {word for word in words if word not in axes}
+    if len(found) != 1 or others - _MOVED - _REFERENCE - _DEFORMED - _FILLING:
+        return Heading(name, unit, "")
+    if unit and unit.casefold() not in LENGTHS and unit.casefold() not in PIXELS:
+        return Heading(name, unit, "")
+    quantity = found[0]
+    if quantity in "xyz" and others & _MOVED:
+        return Heading(name, unit, f"d{quantity}")
+    if quantity not in "xyz":
+        return Heading(name, unit, quantity)
+    state = "reference" if others & _REFERENCE else "deformed" if others & _DEFORMED else ""
+    return Heading(name, unit, quantity, state)
+
+
+def columns_of(
+    headings: Sequence[Heading], named: Mapping[str, str], upper: bool = False
+) -> dict[str, list[int]]:
+    """The columns that may hold each quantity; deformed coordinates are those of "x deformed".
+
+    Of several, those with a unit of length come before those without, which come before pixels;
+    a column of exactly the quantity's own name before all, unless `upper`.
+
+    Parameters
+    ----------
+    named : the file's own names of some quantities, with or without the unit.
+    upper : of two names that differ only in their letters' size, the large one is the length.
+    """
+    places: dict[str, list[int]] = {}
+    taken = [name.strip() for name in named.values()]
+    for index, heading in enumerate(headings):
+        if heading.quantity and heading.name not in taken:
+            key = heading.quantity
+            key += " deformed" if heading.state == "deformed" else ""
+            places.setdefault(key, []).append(index)
+    found = {key: _best(headings, where, key, upper) for key, where in places.items()}
+    for quantity, name in named.items():
+        exact = [i for i, one in enumerate(headings) if one.name == name.strip()]
+        plain = [i for i, one in enumerate(headings) if split_unit(one.name)[0] == name.strip()]
+        found[quantity] = exact or plain
+    return {key: where for key, where in found.items() if where or key in named}
+
+
+def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) -> list[int]:
+    own = [i for i in where if headings[i].name == key]
+    if own and not upper:
+        return own
+
+    def rank(index: int) -> tuple[int, int]:
+        heading = headings[index]
+        pixels = heading.unit.casefold() in PIXELS
+        size = int(upper and not heading.name[:1].isupper())
+        return (2 if pixels else int(bool(heading.scale is None)), size)
+
+    best = min(rank(i) for i in where)
+    return [i for i in where if rank(i) == best]
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRows:
+    """One frame as its file has it.
+
+    Parameters
+    ----------
+    values : (rows,) of x, y, z, dx, dy, dz, those that there are; NaN where correlation was lost.
+        Of "x deformed" and so on where the file has places after the motion.
+    names, units : what the file calls each, and the unit it names, "" or missing for none.
+    valid : (rows,) what the file's own flag says; None without one.
+    sigma : (rows,) below zero where correlation was lost; None without one.
+    camera_axes : whether y points down and z away from the camera, as in an image.
+    dropped : rows that are not in `values`, by why.
+    """
+
+    values: Mapping[str, Array]
+    names: Mapping[str, str]
+    units: Mapping[str, str] = field(default_factory=dict)
+    valid: NDArray[np.bool_] | None = None
+    sigma: Array | None = None
+    camera_axes: bool = False
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
+    """The frame of the rows: reference places and displacements in mm.
+
+    Rows that the file's flag rejects, those with a sigma below zero and those that are zero
+    throughout are left out and counted. One row of zeros is a point in a frame in which nothing
+    moves.
+
+    Raises
+    ------
+    InputError : a quantity that is asked for is not there, or is in pixels.
+    """
+    notes = list(rows.notes)
+    values = {name: _in_mm(rows, name, options, path) for name in rows.values}
+    keep, dropped = _kept(rows, values)
+    values = {name: value[keep] for name, value in values.items()}
+    sigma = None if rows.sigma is None else rows.sigma[keep]
+    _complete(values, options, notes)
+    missing = [name for name in options.quantities if name not in values]
+    if missing:
+        there = ", ".join(rows.names.values())[:300]
+        problem = f"no column of {' and '.join(missing)}; name them with columns. Read: {there}"
+        if set(missing) <= {"z", "dz"}:
+            problem = f"planar correlation, without {' and '.join(missing)}; a stereo one is needed"
+        raise InputError(path, "", problem)
+    count = int(keep.sum())
+    table = np.full((count, 6), np.nan)
+    for index, quantity in enumerate(QUANTITIES):
+        if quantity in values:
+            table[:, index] = values[quantity]
+    camera_axes = rows.camera_axes if options.camera_axes is None else options.camera_axes
+    if camera_axes:
+        table[:, [1, 2, 4, 5]] *= -1.0
+        notes.append("y and z are turned over: in the file y points down, z away from the camera")
+    named = {name: unit for name, unit in rows.units.items() if unit}
+    source = FrameSource(format, dict(rows.names), named, tuple(notes))
+    return Frame(table[:, :3], table[:, 3:], path, dropped, sigma, source)
+
+
+def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path) -> Array:
+    unit = rows.units.get(name, "")
+    if unit.casefold() in PIXELS:
+        problem = f"is in pixels; export lengths, or name a column of {name} in mm with columns"
+        raise InputError(path, f"column {rows.names[name]!r}", problem)
+    scale = LENGTHS.get(unit.casefold(), options.length_scale)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(rows.values[name] * scale)
+
+
+def _kept(rows: FrameRows, values: Mapping[str, Array]) -> tuple[NDArray[np.bool_], dict[str, int]]:
+    """Which rows are points, and how many are not, by why."""
+    count = len(next(iter(values.values())))
+    keep = np.ones(count, dtype=bool)
+    dropped = {name: number for name, number in rows.dropped.items() if number}
+    zero = np.all([value == 0 for value in values.values()], axis=0)
+    at_rest = all((np.nan_to_num(v) == 0).all() for name, v in values.items() if name[0] == "d")
+    if at_rest and zero.sum() == 1:
+        zero[:] = False
+    reasons = [(FLAGGED, None if rows.valid is None else ~rows.valid)]
+    reasons += [(NEGATIVE_SIGMA, None if rows.sigma is None else rows.sigma < 0), (ALL_ZERO, zero)]
+    for reason, bad in reasons:
+        more = 0 if bad is None else int((bad & keep).sum())
+        if bad is not None and more:
+            dropped[reason] = dropped.get(reason, 0) + more
+            keep &= ~bad
+    return keep, dropped
+
+
+def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str]) -> None:
+    """Reference places and displacements from each other; the planes of a planar correlation."""
+    if options.coordinates == "deformed":
+        for axis in "xyz":
+            if axis in values:
+                values[f"{axis} deformed"] = values.pop(axis)
+    after = [axis for axis in "xyz" if f"{axis} deformed" in values]
+    back = [axis for axis in after if axis not in values and f"d{axis}" in values]
+    forth = [axis for axis in after if axis in values and f"d{axis}" not in values]
+    for axis in back:
+        values[axis] = values[f"{axis} deformed"] - values[f"d{axis}"]
+    for axis in forth:
+        values[f"d{axis}"] = values[f"{axis} deformed"] - values[axis]
+    if back:
+        notes.append(
+            f"{', '.join(back)} are places in the deformed state; the displacement is taken off"
+        )
+    if forth:
+        notes.append(f"displacements along {', '.join(forth)} are deformed less reference places")
+    if options.planar and not {"z", "dz", "z deformed"} & set(values):
+        values["z"] = values["dz"] = np.zeros_like(values["x"])
+        notes.append("planar correlation: z and dz are taken to be zero")
+
+
+def frame_files(
+    given: Sequence[str], field: str = "files", folder: Path | None = None
+) -> tuple[list[Path], Note | None]:
+    """The files, and a note where their order looks unmeant.
+
+    given : names of files, taken in this order, and patterns, whose files are sorted by the
+        numbers in their names (frame 2 before frame 10).
+    field : what complaints call them.
+    folder : where they are; the working folder unless given.
+
+    Raises
+    ------
+    InputError : a pattern that nothing matches, no such file, a folder, a file given twice.
+    """
+    files: list[Path] = []
+    for own in given:
+        name = own if folder is None else str(folder / own)
+        if not os.path.exists(name) and glob.has_magic(name):
+            # The folder's own name is no pattern.
+            wanted = own if folder is None else str(Path(glob.escape(str(folder))) / own)
+            found = [Path(f) for f in glob.glob(wanted, recursive=True) if not Path(f).is_dir()]
+            if not found:
+                raise InputError(None, field, f"no file matches {name!r}")
+            files += sorted(found, key=_numbers)
+        elif os.path.isdir(name):
+            problem = f"expected files; quote a pattern such as {str(Path(name) / '*.csv')!r}"
+            raise InputError(name, field, f"is a folder, {problem}")
+        else:
+            files.append(Path(name))
+    for i, file in enumerate(files):
+        if file in files[:i]:
+            raise InputError(file, field, "is given twice")
+    plain = [str(name if folder is None else folder / name) for name in given]
+    return files, _shell_order(files) if list(map(str, files)) == plain else None
+
+
+def _numbers(file: Path) -> list[tuple[bool, int, str]]:
+    """Sorts digits as numbers, and numbers before letters."""
+    parts = re.findall(r"\d+|\D+", str(file))
+    return [(not p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]
+
+
+def _shell_order(files: list[Path]) -> Note | None:
+    """A shell sorts frame_10 before frame_2: perhaps not the order of the test."""
+    by_number = sorted(files, key=_numbers)
+    if by_number == files or sorted(files, key=str) != files:
+        return None
+    first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
+    words = (
+        f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
+        " them by number"
+    )
+    return Note(NoteKind.ORDER, words)

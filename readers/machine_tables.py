@@ -1,0 +1,320 @@
+"""A test machine's table: which column holds what, and its numbers in mm and N."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .columns import LOAD_UNITS, TIME_UNITS, columns_of, nearest_to_strip, scale_of
+from .frames import FrameSource
+from .registry import format_of, read_file
+from .tables import TextTable
+
+NEEDED = ("elongation", "load")
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """What a reader of machine tables is told beside the file.
+
+    Parameters
+    ----------
+    columns : quantities whose column is known by name.
+    quantities : of elongation, load, deflection and time, those that the table must hold.
+    comment : lines that start so are skipped, where the format has no comments of its own.
+    decimal : the decimal mark, "." or ","; None finds it.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    quantities: Sequence[str] = NEEDED
+    comment: str = "#"
+    decimal: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MachineTable:
+    """A table as the file has it.
+
+    table : the rows of numbers. units : for each column name the unit that the file names, "" for
+    none. header : line number of the row of names. notes : one sentence each: what was chosen where
+    the file leaves a choice.
+    """
+
+    table: TextTable
+    units: Mapping[str, str]
+    header: int
+    notes: tuple[str, ...] = ()
+
+
+def read_machine_table(
+    path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
+) -> MachineTable:
+    """Read the first table with a column of each quantity that `options` ask for.
+
+    Parameters
+    ----------
+    format : its name (`registry.format_names("machine table")`); found by content unless given.
+
+    Raises
+    ------
+    InputError : no such file or table, a format that cannot be told.
+    """
+    table: MachineTable = read_file("machine table", path, format, options)
+    return table
+
+
+def column_of(
+    found: MachineTable,
+    quantity: str,
+    named: Mapping[str, str],
+    needed: Sequence[str] = NEEDED,
+) -> str:
+    """The name of the one column that holds a quantity; "" where it may be absent and is.
+
+    Times are looked for only where they are named or needed. Of several elongations, the one that
+    was measured nearest to the strip (`choice_of`).
+
+    Raises
+    ------
+    InputError : several columns, or none of one that is needed or was named.
+    """
+    names = [str(name) for name in found.table.cells.columns]
+    if quantity == "time" and quantity not in (*named, *needed):
+        return ""
+    which = columns_of(names, quantity, named)
+    if quantity == "elongation" and quantity not in named:
+        which = nearest_to_strip(names, which)
+    if len(which) == 1 or (not which and quantity not in (*named, *needed)):
+        return names[which[0]] if which else ""
+    there = ", ".join(name for name in names if name)[:300]
+    several = " or ".join(repr(names[i]) for i in which[:6])
+    what = f"may be {several}; name one with columns" if which else "is missing"
+    if quantity in named:
+        what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
+    problem = f"the column of {quantity} {what}; the file has: {there}"
+    raise InputError(found.table.path, f"line {found.header}", problem)
+
+
+def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> tuple[str, ...]:
+    """A sentence where `column_of` chose one column among several; else nothing."""
+    names = [str(name) for name in found.table.cells.columns]
+    which = [] if quantity in named else columns_of(names, quantity, named)
+    if len(which) < 2:
+        return ()
+    chosen = column_of(found, quantity, named)
+    others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
+    return (
+        f"{found.table.path.name}: the {quantity} is column {chosen!r}, not {others};"
+        f" columns = {{ {quantity} = ... }} names another",
+    )
+
+
+def source_of(
+    found: MachineTable,
+    columns: Mapping[str, str],
+    asked: Mapping[str, str | None],
+    format: str | None,
+    notes: Sequence[str] = (),
+) -> FrameSource:
+    """What of a table was taken, for the record.
+
+    Parameters
+    ----------
+    columns : the file's name of each quantity, "" for those that it lacks. asked : units that the
+        caller said, by quantity, for columns that name none. format : as it was asked for.
+    """
+    taken = {quantity: column for quantity, column in columns.items() if column}
+    units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
+    name = format or format_of("machine table", found.table.path).name
+    return FrameSource(name, taken, {q: unit for q, unit in units.items() if unit}, tuple(notes))
+
+
+def measured(
+    found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
+) -> NDArray[np.float64]:
+    """One column (rows,) in mm or N.
+
+    Parameters
+    ----------
+    kind : length or load, for complaints.
+    units : mm or N in one of each unit.
+    asked : the unit the caller says, None to take the file's.
+
+    Raises
+    ------
+    InputError : no unit, an unknown one, or one that differs from `asked`; cells that are not
+        finite numbers.
+    """
+    path, at = found.table.path, f"line {found.header}, column {column!r}"
+    if asked is not None and asked not in units:
+        problem = f"expected one of {', '.join(units)}, got {asked!r}"
+        raise InputError(None, f"{kind}_unit", problem)
+    unit = found.units[column]
+    if not unit and asked is None:
+        problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
+        raise InputError(path, at, problem)
+    scale = scale_of(unit or asked or "", units)
+    if scale is None:
+        problem = f"unit {unit[:20]!r} is not one of {', '.join(units)}; convert the column"
+        raise InputError(path, at, problem)
+    if asked is not None and scale != units[asked]:
+        problem = f"the file says {unit!r}, {kind}_unit says {asked!r}; correct one of them"
+        raise InputError(path, at, problem)
+    with np.errstate(over="ignore"):
+        value = found.table.numbers(column) * scale
+    if not np.isfinite(value).all():
+        raise InputError(path, at, f"numbers too large; is the unit {unit or asked!r} right?")
+    return value
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MachineLoads:
+    """What a machine recorded. load (k,) N; time (k,) s, None unless asked for; path the file."""
+
+    load: Array
+    time: Array | None
+    path: Path
+
+
+def read_machine_loads(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    timed: bool = False,
+    load_unit: Literal["N", "kN"] | None = None,
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> MachineLoads:
+    """Read the loads of an export, whatever else it holds; the table is found as for curves.
+
+    Parameters
+    ----------
+    columns : the file's own names of `load` and `time`, where finding is ambiguous.
+    timed : read the times too.
+    load_unit : needed where the file names none.
+    format : name of the file's format; found by its content unless given.
+
+    Raises
+    ------
+    InputError : as `curves.read_load_curves`; a unit of time that is not known.
+    """
+    path, named = Path(path), dict(columns or {})
+    needed = ("load", "time") if timed else ("load",)
+    found = read_machine_table(path, TableOptions(named, needed, comment, decimal), format)
+    load = measured(found, column_of(found, "load", named, needed), "load", LOAD_UNITS, load_unit)
+    return MachineLoads(load, _times(found, named, needed) if timed else None, path)
+
+
+def read_times(
+    path: Path | str,
+    column: str | None = None,
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> Array:
+    """Times (n,) in s, one a row: of the pictures, from the camera's log.
+
+    column : its name in the file, where finding is ambiguous.
+
+    Raises
+    ------
+    InputError : naming file and line: no or several columns of time, no numbers.
+    """
+    named = {} if column is None else {"time": column}
+    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
+    return _times(found, named, ("time",))
+
+
+def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
+    """The column of times in s; where no unit is named, they are seconds."""
+    name = column_of(found, "time", named, needed)
+    unit = found.units[name]
+    at_the_end = re.search(rf"[_\s]({'|'.join(TIME_UNITS)})$", name)
+    if not unit and at_the_end:
+        unit = at_the_end[1]
+    scale = TIME_UNITS.get(unit or "s")
+    if scale is None:
+        at = f"line {found.header}, column {name!r}"
+        problem = f"unit {unit[:20]!r} is not one of {', '.join(TIME_UNITS)}; convert the column"
+        raise InputError(found.table.path, at, problem)
+    return found.table.numbers(name) * scale
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What a column of readings means: scale * reading + offset, in `unit`.
+
+    Parameters
+    ----------
+    column : its name in the file; found by what names mean unless given.
+    unit : such as mm, N or kPa. The file's own unless given; needed with a scale.
+    scale, offset : of a sensor, such as 200 mm per volt. None: the readings are no volts.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    scale: float | None = None
+    offset: float = 0.0
+
+
+#: A column that is found by what names mean, in the unit that the file says.
+AS_FOUND = Channel()
+
+
+def channel_values(
+    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
+) -> Array:
+    """A column (rows,) in the unit of which `units` says how many each unit has.
+
+    Raises
+    ------
+    InputError : naming file and line: as `in_unit`; cells that are not finite numbers.
+    """
+    path, at = found.table.path, f"line {found.header}, column {column!r}"
+    return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
+
+
+def in_unit(
+    readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
+) -> Array:
+    """Readings (rows,) in the unit of which `units` says how many each unit has.
+
+    Parameters
+    ----------
+    own : the unit that the file names, "" for none.
+    path, at : where they stand, for complaints.
+
+    Raises
+    ------
+    InputError : no unit, one that is not known, a scale for what needs none, two units.
+    """
+    known = dict(units)
+    said = scale_of(own, known) if own else None
+    raw = channel.scale is not None
+    factor = 1.0 if channel.scale is None else channel.scale
+    if factor != 1.0 and said is not None:
+        problem = f"is in {own} already: leave the scale {factor:g} out"
+        raise InputError(path, at, problem)
+    unit = channel.unit or ("" if raw and said is None else own)
+    if not unit:
+        what = "after scaling" if raw else "of the readings"
+        raise InputError(path, at, f"say the unit {what}, one of {', '.join(known)}")
+    scale = scale_of(unit, known)
+    if scale is None:
+        advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
+        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {', '.join(known)}; {advice}")
+    if channel.unit and own and (not raw or said is not None) and said != scale:
+        problem = f"the file says {own!r}, the project {channel.unit!r}; correct one of them"
+        raise InputError(path, at, problem)
+    return (factor * readings + channel.offset) * scale

@@ -1,0 +1,448 @@
+"""A log of pressures with its own clock, and what it says of the frames of a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .columns import PRESSURE_UNITS, TIME_UNITS
+from .frames import Frame
+from .machine_tables import (
+    AS_FOUND,
+    Channel,
+    TableOptions,
+    channel_values,
+    column_of,
+    read_machine_table,
+)
+
+Array = NDArray[np.float64]
+
+#: The apex of a frame is what moved most; so large a share of the points moved less, lest a stray
+#: point be it.
+APEX = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class PressureLog:
+    """Readings: time (k,) s, rising; pressure (k,) MPa; path the file."""
+
+    time: Array
+    pressure: Array
+    path: Path
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """How a log is read; what is not given is found.
+
+    Parameters
+    ----------
+    pressure : its column; volts become a pressure by its scale, offset and unit.
+    time : its column; seconds where neither file nor channel names a unit.
+    format, comment, decimal : as for machine tables.
+    """
+
+    pressure: Channel = AS_FOUND
+    time: Channel = AS_FOUND
+    format: str | None = None
+    comment: str = "#"
+    decimal: str | None = None
+
+
+def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
+    """Read a log as a test machine's table.
+
+    Raises
+    ------
+    InputError : naming file and line: no or several columns, no or unknown units, cells that are
+        not numbers, times that go back.
+    """
+    channels: Mapping[str, Channel] = {"time": options.time, "pressure": options.pressure}
+    named = {key: c.column for key, c in channels.items() if c.column is not None}
+    needed = ("time", "pressure")
+    asked = TableOptions(named, needed, options.comment, options.decimal)
+    found = read_machine_table(path, asked, options.format)
+    column = column_of(found, "pressure", named, needed)
+    pressure = channel_values(found, column, options.pressure, PRESSURE_UNITS)
+    column, clock = column_of(found, "time", named, needed), options.time
+    if not found.units[column] and clock.unit is None:
+        clock = Channel(clock.column, "s", clock.scale, clock.offset)
+    time = channel_values(found, column, clock, TIME_UNITS)
+    back = np.flatnonzero(np.diff(time) < 0)
+    if len(back):
+        at = f"line {found.table.lines[back[0] + 1]}, column {column!r}"
+        raise InputError(path, at, "times must not go back; is this the log of one test?")
+    if len(time) < 2 or not time[-1] > time[0]:
+        raise InputError(path, f"column {column!r}", "expected readings at two times or more")
+    return PressureLog(time, pressure, path)
+
+
+def apex_height(frame: Frame) -> float:
+    """How far the apex of a frame has moved, mm, whatever axes the camera has; NaN if unknown."""
+    moved = np.linalg.norm(frame.displacement, axis=1)
+    moved = moved[np.isfinite(moved)]
+    return float(np.quantile(moved, APEX)) if len(moved) else float("nan")
+
+
+def apex_heights(frames: Sequence[Frame]) -> Array:
+    """(frames,) mm, see `apex_height`."""
+    return np.array([apex_height(frame) for frame in frames])
+
+
+#: So many frames tell something, and so large a share of them lies within the log.
+LEAST_FRAMES, WITHIN = 6, 0.8
+#: Heights to one of these powers go nearly straight with the pressures, those of a sheet that was
+#: taut or flat, so that noise counts alike all along; any rising function of them would do.
+POWERS = (1, 2, 3)
+
+
+def straightest(h: Array, pressures: Sequence[Array]) -> int:
+    """The power of the heights that correlates best with the pressures at any offset."""
+    best = {}
+    for power in POWERS:
+        raised, best[power] = h**power, 0.0
+        for p in pressures:
+            inside = np.isfinite(p)
+            x, y = raised[inside] - raised[inside].mean(), p[inside] - p[inside].mean()
+            size = float(np.sqrt((x @ x) * (y @ y)))
+            if inside.sum() >= max(LEAST_FRAMES, WITHIN * len(h) - 1) and size > 0:
+                best[power] = max(best[power], float(x @ y) / size)
+    return max(best, key=lambda power: best[power])
+
+
+def misfit_of(p: Array, h: Array, rest: float) -> float:
+    """What rising functions leave of the variances: mean of both, 1 where there is none.
+
+    p : (frames,) MPa, NaN beyond the log. h : (frames,) mm, 0 at rest. rest : MPa, at rest.
+    """
+    inside = np.isfinite(p)
+    if inside.sum() < max(LEAST_FRAMES, WITHIN * len(h) - 1):
+        return 1.0
+    p, h = p[inside], h[inside]
+    # The state of rest weighs as much as all frames together, in the functions only.
+    anchored = (p, h, rest, 0.0), (h, p, 0.0, rest)
+    return sum(_left_over(*one) for one in anchored) / 2
+
+
+def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
+    """Share of the variance of y that no rising function of x through the rest explains."""
+    from scipy.optimize import isotonic_regression
+
+    total = float(np.sum((y - y.mean()) ** 2))
+    if not total > 0:
+        return 1.0
+    weight = np.append(np.ones(len(x)), float(len(x)))
+    all_x, all_y = np.append(x, x_rest), np.append(y, y_rest)
+    # A function has one value where x has one: readings of one pressure are put together.
+    which = np.unique(all_x, return_inverse=True)[1]
+    sums = np.bincount(which, weight)
+    rising = isotonic_regression(np.bincount(which, weight * all_y) / sums, weights=sums).x
+    return float(np.sum((y - rising[which[:-1]]) ** 2)) / total
+
+
+#: Offsets looked at: half a frame apart, no more than so many; then finer about the best.
+MOST, FINE = 20_000, 20
+#: Frames are at rest within so many standard deviations of the lowest, and below this share of the
+#: most; share of the log that is below its least pressure, by noise.
+SIGMAS, AT_REST, BELOW = 6.0, 0.02, 0.01
+
+
+def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
+    """(frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
+    return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
+
+
+def offset_misfits(
+    times: Array, heights: Array, log_times: Array, pressures: Array
+) -> tuple[Array, Array]:
+    """Offsets (s), rising, closer together about the best; and the misfit at each.
+
+    Parameters
+    ----------
+    times, heights : (frames,) s and mm, all known. log_times, pressures : (k,) s, rising, and MPa.
+
+    Raises
+    ------
+    InputError : a log that is shorter than the frames.
+    """
+    order = np.argsort(times, kind="stable")
+    t, h = times[order], heights[order]
+    h = np.where(h > _rest_height(h), h, 0.0)
+    rest = float(np.quantile(pressures, BELOW))
+
+    def misfit(offset: float) -> float:
+        return misfit_of(log_at(offset, t, log_times, pressures), h, rest)
+
+    coarse = _offsets(t, log_times)
+    h = h ** straightest(h, [log_at(s, t, log_times, pressures) for s in coarse])
+    misfits = np.array([misfit(s) for s in coarse])
+    step = coarse[1] - coarse[0]
+    fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
+    fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
+    offsets = np.concatenate([coarse, fine])
+    misfits = np.append(misfits, [misfit(s) for s in fine])
+    order = np.argsort(offsets, kind="stable")
+    return offsets[order], misfits[order]
+
+
+def _offsets(t: Array, log_times: Array) -> Array:
+    """The offsets at which enough frames lie within the log, half a frame apart."""
+    enough = int(np.ceil(WITHIN * len(t)))
+    least = log_times[0] - t[len(t) - enough]
+    most = log_times[-1] - t[enough - 1]
+    if least > most:
+        problem = (
+            f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s; are the units of"
+            " time and the rate right?"
+        )
+        raise InputError(None, "", problem)
+    gaps = np.diff(t)
+    step = float(np.median(gaps[gaps > 0])) / 2 if (gaps > 0).any() else most - least
+    count = 2 + int(min((most - least) / step if step else 0, MOST))
+    return np.linspace(least, most, count)
+
+
+def _rest_height(h: Array) -> float:
+    """Up to where a frame is at rest, by the noise from one frame to the next."""
+    noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
+    return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
+
+
+# How far two clocks are apart: the log's of the pressures, and the camera's of the frames.
+#
+# The sheet rises while the pressure does, by a law that is not known here. At the right offset the
+# heights of the frames are therefore some rising function of the pressures, and the pressures one
+# of the heights; at a wrong one they are not, wherever the pressure was held, released, or raised
+# faster or slower. Both functions are found by isotonic regression, which supposes nothing else of
+# them but that a sheet that has not risen is at the least pressure of the log: where the pressure
+# was raised in equal steps, a step later would else do as well.
+
+#: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
+FLOOR = 1e-6
+#: Offsets of a misfit up to so many times the smallest may be the right one.
+AS_GOOD = 2.0
+#: Misfit above which the heights do not follow the pressures; mean doubt of the frames' pressures,
+#: as a share of their range, above which the offset is not known.
+WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
+
+
+@dataclass(frozen=True, eq=False)
+class ClockOffset:
+    """The log's clock less that of the frames.
+
+    Parameters
+    ----------
+    offset : s. lower, upper : s, the least and the largest offset that may be right; the offset
+        itself where it was given.
+    misfit : share of the variance of heights and pressures that no rising function explains; None
+        where the offset was given.
+    pressure : (frames,) MPa, of each frame; NaN beyond the log.
+    doubt : (frames,) MPa, half of the range of each frame's pressure over all offsets that may be
+        right.
+    times : (frames,) s, by the frames' own clock. heights : (frames,) mm, NaN where none is known.
+    """
+
+    offset: float
+    lower: float
+    upper: float
+    misfit: float | None
+    pressure: Array
+    doubt: Array
+    times: Array
+    heights: Array
+
+
+def given_offset(
+    offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
+) -> ClockOffset:
+    """The pressures of frames by a clock offset (s) that is known; else as `find_offset`.
+
+    Raises
+    ------
+    InputError : no frame lies within the log.
+    """
+    there = log_at(offset, times, log_times, pressures)
+    if not np.isfinite(there).any():
+        problem = (
+            f"no frame lies within the log: frames from {times.min() + offset:.2f} to"
+            f" {times.max() + offset:.2f} s by its clock, the log from {log_times[0]:.2f} to"
+            f" {log_times[-1]:.2f} s"
+        )
+        raise InputError(None, "offset", problem)
+    none = np.zeros(len(times))
+    return ClockOffset(offset, offset, offset, None, there, none, times, heights)
+
+
+def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
+    """The offset at which heights rise with the pressures.
+
+    Parameters
+    ----------
+    times : (frames,) s, by the frames' clock. heights : (frames,) mm; NaN where none is known.
+    log_times, pressures : (k,) s, rising, and MPa.
+
+    Raises
+    ------
+    InputError : too few frames, a log that is shorter than the frames; heights that follow the
+        pressures at no offset; offsets that do equally well and give other pressures.
+    """
+    known = np.isfinite(heights)
+    if known.sum() < LEAST_FRAMES:
+        problem = f"{known.sum()} frames are too few to find it by; give it in s"
+        raise InputError(None, "offset", problem)
+    offsets, misfits = offset_misfits(times[known], heights[known], log_times, pressures)
+    best = int(np.argmin(misfits))
+    if misfits[best] > WORST_MISFIT:
+        problem = (
+            f"at no offset does the sheet rise with the pressure: at best, {offsets[best]:.2f} s,"
+            f" {misfits[best]:.0%} of the variance is left; are these the log and the frames of one"
+            " test, and their times right? else give the offset in s"
+        )
+        raise InputError(None, "offset", problem)
+    able = misfits <= AS_GOOD * max(misfits[best], FLOOR)
+    first = last = best
+    while first and able[first - 1]:
+        first -= 1
+    while last + 1 < len(able) and able[last + 1]:
+        last += 1
+    offset = float(offsets[first] + offsets[last]) / 2
+    may_be = offsets[able]
+    some = np.append(may_be[:: max(1, len(may_be) // 200)], may_be[-1])
+    each = np.array([log_at(s, times, log_times, pressures) for s in some])
+    there = log_at(offset, times, log_times, pressures)
+    doubt = _half_range(each)
+    span = float(np.ptp(there[np.isfinite(there)]))
+    if float(np.nanmean(doubt)) > MOST_DOUBT * span:
+        problem = (
+            f"cannot be found: offsets from {may_be[0]:.2f} to {may_be[-1]:.2f} s do as well, and"
+            f" leave the frames' pressures uncertain by {1e3 * np.nanmean(doubt):.3g} kPa on"
+            " average; give it in s. Where the pressure was held, released or began to rise while"
+            " frames were taken, it can be found"
+        )
+        raise InputError(None, "offset", problem)
+    lower, upper = float(may_be[0]), float(may_be[-1])
+    least = float(misfits[best])
+    return ClockOffset(offset, lower, upper, least, there, doubt, times, heights)
+
+
+def _half_range(each: Array) -> Array:
+    """(frames,) of pressures (offsets, frames); NaN where a frame is never within the log."""
+    inside = np.isfinite(each)
+    most = np.where(inside, each, -np.inf).max(axis=0)
+    least = np.where(inside, each, np.inf).min(axis=0)
+    half = np.full(each.shape[1], np.nan)
+    some = inside.any(axis=0)
+    half[some] = (most - least)[some] / 2
+    return half
+
+
+#: Why frames are not looked at.
+BEYOND = "without a pressure: beyond the log"
+AT_REST_FRAME_CHOICE = "at no pressure"
+RELEASED = "after the largest pressure"
+REPEATED = "at a pressure that another frame has"
+#: Pressures that differ by less than this share of the largest are one.
+SAME = 1e-6
+#: How far from an asked pressure a frame may be, as a share of the largest asked one.
+TOLERANCE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class FrameChoice:
+    """Numbers of the frames taken, by rising pressure, and how many were not looked at, by why."""
+
+    frames: tuple[int, ...]
+    left_out: dict[str, int] = field(default_factory=dict)
+
+
+def choose_frames(
+    pressures: Array,
+    asked: Sequence[float] | None = None,
+    count: int | None = None,
+    tolerance: float | None = None,
+    in_time: bool = False,
+) -> FrameChoice:
+    """The frame nearest to each asked pressure, or `count` evenly spread in pressure, or all.
+
+    Parameters
+    ----------
+    pressures : (frames,) MPa, of every frame; NaN where it is not known.
+    asked : MPa, rising. tolerance : MPa, how far a frame may be from the asked pressure; 2 % of the
+        largest asked one unless given.
+    in_time : whether the frames are in the order of time: those after the largest pressure are then
+        of the release, and not taken.
+
+    Raises
+    ------
+    InputError : no frame under pressure, none near an asked pressure, one that is nearest to two;
+        fewer frames than `count`.
+    """
+    known, left_out = np.isfinite(pressures), {}
+    able = known & (np.nan_to_num(pressures) > 0)
+    left_out[BEYOND] = int((~known).sum())
+    left_out[AT_REST_FRAME_CHOICE] = int((known & ~able).sum())
+    if not able.any():
+        raise InputError(None, "", f"none of the {len(pressures)} frames is under pressure")
+    top = int(np.argmax(np.where(able, pressures, -np.inf)))
+    if in_time:
+        later = able & (np.arange(len(pressures)) > top)
+        left_out[RELEASED] = int(later.sum())
+        able &= ~later
+    order = np.flatnonzero(able)
+    order = order[np.argsort(pressures[order], kind="stable")]
+    apart = np.diff(pressures[order], prepend=-np.inf) > SAME * pressures[top]
+    if asked is not None:
+        frames = _nearest(pressures, order, asked, tolerance)
+    elif count is not None:
+        left_out[REPEATED] = int((~apart).sum())
+        frames = _spread(pressures, order[apart], count)
+    else:
+        left_out[REPEATED] = int((~apart).sum())
+        frames = order[apart].tolist()
+    return FrameChoice(tuple(frames), {why: n for why, n in left_out.items() if n})
+
+
+def _nearest(
+    pressures: Array, able: NDArray[np.intp], asked: Sequence[float], tolerance: float | None
+) -> list[int]:
+    limit = TOLERANCE * max(asked) if tolerance is None else tolerance
+    taken: list[int] = []
+    for number, wanted in enumerate(asked):
+        off = np.abs(pressures[able] - wanted)
+        frame = int(able[np.argmin(off)])
+        there = f"{1e3 * pressures[frame]:.4g} kPa"
+        if off.min() > limit * (1 + 1e-9):
+            problem = (
+                f"no frame within {1e3 * limit:.3g} kPa of {1e3 * wanted:.4g} kPa; the nearest was"
+                f" recorded at {there}: ask for that, or say a larger tolerance"
+            )
+            raise InputError(None, f"pressures[{number}]", problem)
+        if frame in taken:
+            first = asked[taken.index(frame)]
+            problem = (
+                f"the frame at {there} is the nearest to {1e3 * first:.4g} and to"
+                f" {1e3 * wanted:.4g} kPa; ask for one of them"
+            )
+            raise InputError(None, f"pressures[{number}]", problem)
+        taken.append(frame)
+    return taken
+
+
+def _spread(pressures: Array, able: NDArray[np.intp], count: int) -> list[int]:
+    if len(able) < count:
+        problem = f"expected at most the {len(able)} frames at pressures of their own, got {count}"
+        raise InputError(None, "frames", problem)
+    levels = pressures[able[-1]] * np.arange(1, count + 1) / count
+    taken: list[int] = []
+    for number, level in enumerate(levels):
+        # Each takes a frame above the one before, and leaves one for each that follows.
+        first = 1 + int(np.flatnonzero(able == taken[-1])[0]) if taken else 0
+        free = able[first : len(able) - (count - 1 - number)]
+        taken.append(int(free[np.argmin(np.abs(pressures[free] - level))]))
+    return taken

@@ -1,0 +1,183 @@
+"""Formats of data files: which there are, how a file's is found, and how one is added.
+
+A format is one module of `formats`, or of another distribution (entry point `bubblefit.readers`),
+that says how a file is recognised by its content and how it is read. Nothing else names it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any, Literal
+
+from ..errors import BubblefitError, InputError, PlugInFailure
+from ..files import PlugIn, names_with, plug_in_named, plug_ins
+from ..reading import check_regular
+
+#: What a file holds, and what the `read` of its formats is called with and gives:
+#: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
+#: machine table : `read(path, machine_tables.TableOptions)`, a `machine_tables.MachineTable`, from
+#:     which load curves, loads and bending curves are taken alike;
+#: load polynomials : `read(path)`, `published_polynomials.PublishedPolynomial` by direction.
+Content = Literal["frame", "machine table", "load polynomials"]
+
+#: How much of a file a format may look at to recognise it, bytes.
+HEAD = 65536
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format of data files.
+
+    Parameters
+    ----------
+    name : what `format =` in a project calls it.
+    content : what such a file holds.
+    title : what it is, in a few words.
+    read : reads a file; see `Content`. An `InputError` names what is wrong with it.
+    recognises : whether a file, by its path and its first `HEAD` bytes, is of this format. None
+        for the one of its content that takes what no other recognises.
+    """
+
+    name: str
+    content: Content
+    title: str
+    read: Callable[..., Any]
+    recognises: Callable[[Path, bytes], bool] | None = None
+
+
+_FORMATS: dict[tuple[Content, str], Format] = {}
+
+
+def register_format(one: Format) -> None:
+    """Add one of our own formats: the last statement of its module in `formats`."""
+    _FORMATS[one.content, one.name] = one
+
+
+def formats(content: Content) -> tuple[Format, ...]:
+    """Our own formats of a content, by name."""
+    _import_formats()
+    ours = [one for one in _FORMATS.values() if one.content == content]
+    return tuple(sorted(ours, key=lambda one: one.name))
+
+
+def format_names(content: Content) -> tuple[str, ...]:
+    """What `format =` may say: our own formats of a content, then every reader of plug-ins."""
+    return names_with("bubblefit.readers", [one.name for one in formats(content)])
+
+
+def format_named(content: Content, name: str) -> Format:
+    """The format of this name, ours or that of a plug-in.
+
+    Raises
+    ------
+    InputError : there is none of that name, or it is of another content.
+    PlugInFailure : a plug-in that does not work.
+    """
+    for one in formats(content):
+        if one.name == name:
+            return one
+    plug_in = plug_in_named("bubblefit.readers", name)
+    if plug_in is None:
+        known = ", ".join(format_names(content))
+        raise InputError(None, "format", f"{name[:40]!r} is not one of: {known}")
+    one = _format_of(plug_in)
+    if one.content != content:
+        raise InputError(None, "format", f"{name!r} is of a {one.content}, not of a {content}")
+    return one
+
+
+def format_of(content: Content, path: Path | str) -> Format:
+    """The format of a file, by its content: ours first, then those of plug-ins.
+
+    Plug-ins that do not work are logged and passed over.
+
+    Raises
+    ------
+    InputError : several formats recognise it.
+    """
+    path = Path(path)
+    head = _head(path)
+    ours = formats(content)
+    theirs = (one for one in _working() if one.content == content)
+    for group in (ours, tuple(theirs)):
+        able = [one for one in group if one.recognises is not None and one.recognises(path, head)]
+        if len(able) > 1:
+            names = " or ".join(repr(one.name) for one in able)
+            raise InputError(path, "", f"the format may be {names}; say which with format")
+        if able:
+            return able[0]
+    return next(one for one in ours if one.recognises is None)
+
+
+def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
+    """What a file holds, by the format named, else by the one that is found; see `Content`.
+
+    Raises
+    ------
+    InputError : the format cannot be told, or something is wrong with the file.
+    PlugInFailure : the plug-in named does not work.
+    """
+    with suppress(OSError):  # the reader says why
+        check_regular(path)
+    chosen = format_of(content, path) if name is None else format_named(content, name)
+    return chosen.read(Path(path), *options)
+
+
+@cache
+def _import_formats() -> None:
+    """Each module registers its own when it is imported."""
+    from . import formats as folder
+
+    for module in iter_modules(folder.__path__):
+        import_module(f"{folder.__name__}.{module.name}")
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes; of a file that cannot be read none: its reader says why."""
+    try:
+        with path.open("rb") as file:
+            return file.read(HEAD)
+    except OSError:
+        return b""
+
+
+def _working() -> list[Format]:
+    able = []
+    for plug_in in plug_ins("bubblefit.readers"):
+        try:
+            able.append(_format_of(plug_in))
+        except PlugInFailure as error:
+            log.warning("%s", error)
+    return able
+
+
+def _format_of(plug_in: PlugIn) -> Format:
+    one = plug_in.load("format", ("name", "content", "read", "recognises"))
+    if one.name != plug_in.name:
+        raise plug_in.failure(f"calls its format {one.name!r}; both must have one name")
+
+    def read(path: Path, *options: Any) -> Any:
+        try:
+            return one.read(path, *options)
+        except BubblefitError:
+            raise
+        except Exception as error:
+            raise plug_in.failure(f"fails on {path}", error) from error
+
+    def recognises(path: Path, head: bytes) -> bool:
+        try:
+            return one.recognises is not None and bool(one.recognises(path, head))
+        except Exception as error:
+            log.warning("%s", plug_in.failure(f"fails on {path}", error))
+            return False
+
+    return replace(one, read=read, recognises=recognises)

@@ -1,0 +1,128 @@
+"""What every section of a project file is made of: the base of its model, numbers, units.
+
+A room's own sections live in that room; what pydantic finds wrong becomes one line by
+`section_errors.first_error`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..errors import InputError
+
+ModulusUnit = Literal["GPa", "MPa", "Pa"]
+PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
+LengthUnit = Literal["mm", "m"]
+LoadUnit = Literal["N", "kN"]
+Name = Annotated[str, Field(min_length=1, max_length=300)]
+
+#: MPa per unit.
+MODULUS_UNITS: dict[str, float] = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
+#: MPa per unit.
+PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
+#: mm per unit.
+LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0}
+
+#: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
+HUGE = 1e18
+
+Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
+Positive = Annotated[float, Field(gt=0, le=HUGE)]
+#: Logarithmic, so 2 is 640 %: who writes 13 means percent.
+Strain = Annotated[float, Field(gt=0, le=2)]
+#: Lower and upper bound.
+Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+#: Ends of a range of strain: warp, fill, shear.
+StrainTriple = Annotated[list[Strain], Field(min_length=3, max_length=3)]
+
+
+class Section(BaseModel):
+    """A table of a project file: no unknown keys, no text for numbers, no NaN."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def beside(folder: Path, given: str) -> Path:
+    """The path that a file in `folder` names: beside it, unless absolute or below the home (~)."""
+    return folder / os.path.expanduser(given)
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def first_error(
+    path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
+) -> InputError:
+    """The first finding as an InputError; unknown keys first, as they explain missing ones.
+
+    file : the sections and keys there are. at : dotted key of the table that was checked, "" for
+    the whole file.
+    """
+    errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    problem = _problem(errors[0], file)
+    if len(errors) > 1:
+        problem += f" ({len(errors) - 1} more)"
+    key = dotted(errors[0]["loc"])
+    return InputError(path, f"{at}.{key}" if at and key else at or key, problem)
+
+
+def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
+    kind, location, given = error["type"], error["loc"], error.get("input")
+    if kind == "missing":
+        field = file.model_fields.get(str(location[0])) if len(location) == 1 else None
+        table = field is not None and next(_sections(field.annotation), None) is not None
+        return f"this {'section' if table else 'key'} is missing; add it"
+    if kind == "extra_forbidden":
+        return _unknown(location, file)
+    if kind == "finite_number":
+        return f"expected a finite number, got {given!r}"
+    if kind in ("too_short", "too_long"):
+        few = "at least" if kind == "too_short" else "at most"
+        count = error["ctx"]["min_length" if kind == "too_short" else "max_length"]
+        return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
+    expected = error["msg"].removeprefix("Input should be ").rstrip(".")
+    return f"expected {expected}, got {_short(given)}"
+
+
+def _unknown(location: Sequence[str | int], file: type[BaseModel]) -> str:
+    known = _keys_beside(location, file)
+    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
+    meant = f"did you mean {near[0]!r}? " if near else ""
+    return f"unknown key; {meant}allowed here: {', '.join(known)}"
+
+
+def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[str]:
+    """Allowed keys of the table that holds `location`."""
+    table = file
+    for part in location[:-1]:
+        if isinstance(part, str):  # a number counts the tables of a list
+            table = _table(table.model_fields[part].annotation)
+    return list(table.model_fields)
+
+
+def _table(annotation: Any) -> type[BaseModel]:
+    """The section class of an annotation such as `PointsSection | None` or `list[CaseSection]`."""
+    return next(_sections(annotation))
+
+
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inside in getattr(annotation, "__args__", ()):
+        yield from _sections(inside)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

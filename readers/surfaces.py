@@ -1,0 +1,162 @@
+"""Polynomial surfaces through displacement fields (thesis section 4.2, Eq. 4.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .fields import DisplacementField
+from .tables import TextTable, read_table, write_table
+
+
+def powers(points: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    """Terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2): x^d y^d first, the constant last."""
+    x = np.vander(points[:, 0], degree + 1)
+    y = np.vander(points[:, 1], degree + 1)
+    return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
+
+
+def total_power(degree: int) -> NDArray[np.intp]:
+    """i + j of each term x^i y^j, ((degree + 1)^2,)."""
+    falling = np.arange(degree, -1, -1)
+    return (falling[:, None] + falling).ravel()
+
+
+Array = NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
+LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfaces.csv
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementSurface:
+    """Three polynomials F(x, y), one a direction of displacement, at one pressure.
+
+    Parameters
+    ----------
+    pressure : MPa.
+    degree : highest power of x and of y; 4 in the thesis.
+    coefficients : (3, (degree + 1)^2) mm, C_0 ... in the order of Eq. 4.4: x^d y^d first, powers
+        of x falling fastest, the constant last. They belong to x / scale and y / scale.
+    scale : mm, the largest coordinate fitted: it keeps high powers near one.
+    r_squared : (3,) coefficient of determination of each direction (Table 4.1).
+    """
+
+    pressure: float
+    degree: int
+    coefficients: Array
+    scale: float
+    r_squared: Array
+
+    def evaluate(self, points: Array) -> Array:
+        """Displacement (n, 3) mm at reference points (n, 2) mm."""
+        return powers(np.asarray(points) / self.scale, self.degree) @ self.coefficients.T
+
+    @property
+    def physical(self) -> Array:
+        """Coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
+        return self.coefficients / self.scale ** total_power(self.degree)
+
+
+def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
+    """Least-squares fit of Eq. 4.4, of any degree, to a displacement field.
+
+    Raises
+    ------
+    InputError : a degree out of range, or points too few or too regularly placed for it.
+    """
+    if not 0 <= degree <= MAX_DEGREE:
+        raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
+    terms, count = (degree + 1) ** 2, len(field.points)
+    at = f"surface of degree {degree} at {field.pressure * 1e3:g} kPa"
+    if count < terms:
+        problem = f"{terms} coefficients need as many points, there are {count}; lower the degree"
+        raise InputError(None, at, problem)
+    scale = float(np.abs(field.points).max()) or 1.0
+    term = powers(field.points / scale, degree)
+    # Columns of length one: x^8 y^8 is at most 1/256 on a disk, and no less a term for that.
+    length = np.linalg.norm(term, axis=0)
+    length[length == 0] = 1.0
+    solution, _, rank, _ = np.linalg.lstsq(term / length, field.displacement, rcond=1e-13)
+    if rank < terms:
+        problem = (
+            f"the {count} points lie so that they settle only {rank} of {terms} coefficients"
+            " (on too few lines?); lower the degree"
+        )
+        raise InputError(None, at, problem)
+    coefficients = (solution / length[:, None]).T
+    left = field.displacement - term @ coefficients.T
+    return DisplacementSurface(
+        field.pressure, degree, coefficients, scale, _r_squared(field.displacement, left)
+    )
+
+
+def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) -> None:
+    """Write surfaces.csv, a row a pressure and direction: R^2, degree, scale, C0 ... of Eq. 4.4.
+
+    These coefficients take x and y in mm and give mm, so the file can be used as it stands. Beyond
+    `scale_mm`, the largest coordinate fitted, a polynomial means nothing.
+
+    Raises
+    ------
+    OSError : the file cannot be written; what was there may be lost.
+    """
+    most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
+    rows: list[list[object]] = []
+    for s in surfaces:
+        for direction, r_squared, c in zip(AXES, s.r_squared, s.physical, strict=True):
+            lead = [float(s.pressure), direction, float(r_squared), s.degree, float(s.scale)]
+            rows.append(lead + c.tolist() + [""] * (most - len(c)))
+    write_table(path, [*LEADING, *(f"C{i}" for i in range(most))], rows)
+
+
+def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
+    """Read what `write_surfaces` wrote, equal to rounding.
+
+    Raises
+    ------
+    InputError : naming file, line and column: missing columns, cells that are not numbers,
+        directions that do not come as x, y, z, degrees without their coefficients.
+    """
+    table = read_table(path)
+    direction = table.text("direction")
+    if len(direction) % 3 or tuple(direction) != AXES * (len(direction) // 3):
+        problem = "expected three rows a pressure, in the order x, y, z"
+        raise InputError(table.path, "column 'direction'", problem)
+    each = [np.arange(len(direction)) // 3 == k for k in range(len(direction) // 3)]
+    return tuple(_read(table.rows(rows)) for rows in each)
+
+
+def _read(table: TextTable) -> DisplacementSurface:
+    """The surface of three rows."""
+    pressure, degree, scale = (
+        table.constant(name) for name in ("pressure_MPa", "degree", "scale_mm")
+    )
+    at = f"line {table.lines[0]}"
+    if degree not in range(MAX_DEGREE + 1):
+        raise InputError(table.path, at, f"expected a degree 0 to {MAX_DEGREE}, got {degree:g}")
+    if not scale > 0:
+        raise InputError(table.path, at, f"expected a scale above 0 mm, got {scale:g}")
+    falling = total_power(int(degree))
+    physical = np.stack([table.numbers(f"C{i}") for i in range(len(falling))], axis=1)
+    with np.errstate(over="ignore"):
+        coefficients = physical * scale**falling
+    if not np.isfinite(coefficients).all():
+        raise InputError(table.path, at, f"coefficients too large for a scale of {scale:g} mm")
+    return DisplacementSurface(pressure, int(degree), coefficients, scale, table.numbers("R2"))
+
+
+def _r_squared(value: Array, left: Array) -> Array:
+    """1 - (sum of squares left) / (that about the mean), by column; 1 for a constant met."""
+    about_mean = ((value - value.mean(axis=0)) ** 2).sum(axis=0)
+    remaining = (left**2).sum(axis=0)
+    # A constant direction (a clamped one, all zeros) has nothing to explain.
+    nothing = about_mean <= 1e-24 * (value**2).sum(axis=0)
+    share = np.divide(remaining, about_mean, out=np.zeros_like(remaining), where=~nothing)
+    return np.asarray(1.0 - share)

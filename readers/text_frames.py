@@ -1,0 +1,443 @@
+"""The points of a frame from a table in a text file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .columns import MOST_NAMES
+from .frames import (
+    FLAGGED,
+    LENGTHS,
+    PIXELS,
+    FrameOptions,
+    FrameRows,
+    Heading,
+    columns_of,
+    heading_of,
+)
+from .tables import HOLES, TextTable, check_width, decimal_mark, is_number, read_lines
+
+# Where the numbers of a table of points stand in a text file: header, units, separator, mark.
+#
+# Exports differ in what stands above the row of names, in whether a row of units follows it, and
+# in the separator. All of it is found by what the names mean (`frame_headings`).
+
+#: Line number from 1 and text.
+Lines = list[tuple[int, str]]
+
+#: None is any number of blanks.
+SEPARATORS = ("\t", ";", ",", None)
+#: The row of names stands within so many lines.
+TOP = 300
+#: So many rows are looked at for the decimal mark.
+SAMPLE = 500
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """Where the numbers stand.
+
+    separator : None for blanks. headings : of the columns. columns : those of each quantity, see
+    `frame_headings.columns_of`. header : line number of the names. body : the rows of numbers.
+    decimal : the mark.
+    """
+
+    separator: str | None
+    headings: Sequence[Heading]
+    columns: Mapping[str, Sequence[int]]
+    header: int
+    body: Lines
+    decimal: str
+
+
+def cells_of(text: str, separator: str | None) -> list[str] | None:
+    """The cells of one line; None where a quotation mark is opened and not closed on it."""
+    if separator is None and '"' not in text:
+        return text.split()
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(separator)]
+    if text.count('"') % 2:
+        return None
+    try:
+        row = next(csv.reader([text.strip()], delimiter=separator or " ", skipinitialspace=True))
+    except csv.Error:
+        return None
+    return [cell.strip(' "') for cell in row if cell or separator is not None]
+
+
+def find_layout(
+    path: Path,
+    quantities: Sequence[str],
+    named: Mapping[str, str],
+    comment: str,
+    decimal: str | None = None,
+    upper: bool = False,
+) -> TextLayout:
+    """The layout of a file.
+
+    Parameters
+    ----------
+    quantities : what its rows must hold.
+    named : the file's own names of some of them.
+    comment : lines that start so are passed over; a row of names may be one of them.
+    decimal : the mark, where it is known.
+    upper : see `frame_headings.columns_of`.
+
+    Raises
+    ------
+    InputError : no such file, no text, no row of names, a mark that may be one of thousands.
+    """
+    lines = read_lines(path, comment, any_encoding=True)
+    found = _best_header(lines, quantities, named, upper)
+    if found is None and comment:
+        # The names may be a comment, as numpy.savetxt writes them.
+        above = [(n, t.lstrip(comment).strip()) for n, t in read_lines(path, "", any_encoding=True)]
+        first = lines[0][0] if lines else 0
+        heads = [one for one in above if one[0] < first][-2:]
+        found = _best_header(heads + lines, quantities, named, upper)
+        lines = heads + lines if found is not None else lines
+    if found is None:
+        raise InputError(path, "", _nothing_found(lines))
+    index, separator, names = found
+    header, body = lines[index][0], lines[index + 1 :]
+    units = [""] * len(names)
+    below = cells_of(body[0][1], separator) if body else None
+    if below is not None and _is_units(below):
+        units = [cell.strip("()[]<>{} ") for cell in below] + units
+        body = body[1:]
+    headings = [heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
+    columns = columns_of(headings, named, upper)
+    if not body:
+        problem = "expected a header line and rows of numbers, found only a header line"
+        raise InputError(path, f"line {header}", problem)
+    check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
+    mark = decimal or _decimal(path, body, separator, headings, columns)
+    return TextLayout(separator, headings, columns, header, body, mark)
+
+
+def _best_header(
+    lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
+) -> tuple[int, str | None, list[str]] | None:
+    """The row of names that tells most quantities, by any separator: index, separator, names."""
+    best: tuple[tuple[int, bool, bool, bool, int], int, str | None, list[str]] | None = None
+    for separator in SEPARATORS:
+        for index, (_, text) in enumerate(lines[:TOP]):
+            names = cells_of(text, separator)
+            if names is None or not 2 <= len(names) <= MOST_NAMES or _is_numbers(names):
+                continue
+            columns = columns_of([heading_of(name) for name in names], named, upper)
+            known = {key.split()[0] for key, where in columns.items() if where}
+            hits = len(known & {*quantities})
+            rows = [cells_of(text, separator) for _, text in lines[index + 1 : index + 3]]
+            numbers = [row for row in rows if row is not None and _is_numbers(row)]
+            # A heading with a blank in it makes more names than there are numbers.
+            fits = any(len(names) == len(row) - (not row[-1]) for row in numbers)
+            fits = fits or any(len(names) == len(row) for row in numbers)
+            score = (hits, bool(numbers), fits, separator is not None, len(names))
+            if hits >= 2 and (best is None or score > best[0]):
+                best = score, index, separator, names
+    return None if best is None else best[1:]
+
+
+def _is_numbers(row: Sequence[str]) -> bool:
+    """Whether half of the cells or more are numbers."""
+    return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
+
+
+def _is_units(row: Sequence[str]) -> bool:
+    """Whether a row below the names is one of units: some are lengths, and none is a number."""
+    plain = [cell.strip("()[]<>{} ").casefold() for cell in row]
+    known = any(cell in LENGTHS or cell in PIXELS for cell in plain)
+    return known and not any(is_number(cell) for cell in plain)
+
+
+def _decimal(
+    path: Path,
+    body: Lines,
+    separator: str | None,
+    headings: Sequence[Heading],
+    columns: Mapping[str, Sequence[int]],
+) -> str:
+    wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
+    cells = [
+        (number, headings[i].name, row[i])
+        for number, text in body[:SAMPLE]
+        for row in [cells_of(text, separator) or []]
+        for i in wanted
+        if i < len(row)
+    ]
+    return decimal_mark(path, cells)
+
+
+def _nothing_found(lines: Lines) -> str:
+    if len(lines) < 2:
+        found = "only a header line" if lines else "nothing"
+        return f"expected a header line and rows of numbers, found {found}"
+    head = " ".join(lines[0][1].split())[:100]
+    return (
+        "no row of names with places and displacements (x, y, dx, dy, dz and the like) was found;"
+        f" name them with columns. Line {lines[0][0]} is: {head}"
+    )
+
+
+#: Which column is a flag, and which of its values are those of good rows; None: all but zero.
+Flag = tuple[int, Sequence[int] | None]
+
+
+def quantity_columns(
+    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
+) -> dict[str, int]:
+    """The one column of each quantity and flag that the headings tell; `named` : the file's own.
+
+    Raises
+    ------
+    InputError : a quantity that was asked for is missing, or may be in several columns.
+    """
+    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
+    _check_there(path, layout, columns, options)
+    return columns
+
+
+def flag_columns(
+    path: Path,
+    layout: TextLayout,
+    columns: Mapping[str, int],
+    options: FrameOptions,
+    status: tuple[str, Sequence[int]] | None,
+) -> list[Flag]:
+    """The flags that are named; those the headings tell only where none is.
+
+    status : a column of states, and the values of good rows.
+
+    Raises
+    ------
+    InputError : a column that is named is missing, or there are two of the name.
+    """
+    names = [heading.name for heading in layout.headings]
+    asked = [(options.flag_column, (0,)), (options.valid_column, None)]
+    found: list[Flag] = []
+    for name, good in asked:
+        if name is not None:
+            found.append((_named(path, names, name.strip(' "')), good))
+    if found:
+        return found
+    if status is not None and status[0] in names:
+        return [(names.index(status[0]), status[1])]
+    found += [(columns["valid"], None)] if "valid" in columns else []
+    return found + ([(columns["invalid"], (0,))] if "invalid" in columns else [])
+
+
+def _one(
+    path: Path, layout: TextLayout, key: str, where: Sequence[int], named: Mapping[str, str]
+) -> int:
+    """The one column of a quantity."""
+    if len(where) == 1:
+        return where[0]
+    names = [heading.name for heading in layout.headings]
+    if key in named:
+        return _named(path, names, named[key])
+    may = [names[i] for i in where]
+    if len({*may}) == 1:
+        return _named(path, names, may[0])
+    several = " or ".join(repr(name) for name in may[:6])
+    problem = f"the column of {key} may be {several}; name one with columns"
+    raise InputError(path, f"line {layout.header}", problem)
+
+
+def _named(path: Path, names: Sequence[str], name: str) -> int:
+    if names.count(name) == 1:
+        return names.index(name)
+    what = "appears twice" if name in names else "is missing"
+    problem = f"this column {what}; the file has: {', '.join(names)[:300]}"
+    raise InputError(path, f"column {name!r}", problem)
+
+
+def _check_there(
+    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
+) -> None:
+    """Every quantity asked for is there, or can be had of the places before and after."""
+    spare = {"z", "dz"} if options.planar else set()
+    for quantity in options.quantities:
+        axis = quantity[-1]
+        both = {axis, f"d{axis}"} - {quantity}
+        if quantity in columns or (f"{axis} deformed" in columns and both <= {*columns}):
+            continue
+        if quantity in spare and not {"z", "dz", "z deformed"} & {*columns}:
+            continue
+        there = ", ".join(heading.name for heading in layout.headings)[:300]
+        problem = f"this column is missing; the file has: {there}"
+        raise InputError(path, f"column {quantity!r}", problem)
+
+
+# The numbers of a table in a text file, at the speed of pandas' reader where it can.
+#
+# The quick way takes whole columns as numbers; whatever does not fit it (a comment amidst the
+# rows, a cell that is no number, a row with a cell too many) is read again cell by cell, so that a
+# complaint names its line.
+
+Array = NDArray[np.float64]
+#: Flags in words, in small letters.
+WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
+
+
+def read_numbers(
+    path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """The numbers (good rows,) of each quantity, and which rows (rows,) the flags call good.
+
+    Raises
+    ------
+    InputError : naming line and column.
+    """
+    return _quick(layout, columns, flags) or _slow(path, layout, columns, flags)
+
+
+def _quick(
+    layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
+) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
+    """All rows by pandas' reader; None where they have to be looked at one by one."""
+    import pandas as pd
+
+    separator, width = layout.separator, len(layout.headings)
+    texts = [text for _, text in layout.body]
+    if separator is None and {len(text.split()) for text in texts} != {width}:
+        return None
+    if separator is not None:
+        # pandas takes what it needs of a row that is too long, so that a cell with a decimal
+        # comma would shift the rest.
+        counts = {text.count(separator) for text in texts}
+        if not (counts <= {width - 1} or counts <= {width}) or any('"' in text for text in texts):
+            return None
+        if counts == {width} and any(not text.rstrip().endswith(separator) for text in texts):
+            return None
+    wanted = sorted({*columns.values(), *(i for i, _ in flags)})
+    holes = [word for hole in HOLES for word in {hole, hole.upper(), hole.replace("nan", "NaN")}]
+    try:
+        table = pd.read_csv(
+            StringIO("\n".join(texts)),
+            header=None,
+            sep=r"\s+" if separator is None else separator,
+            decimal=layout.decimal,
+            usecols=None if separator is None else wanted,
+            dtype=dict.fromkeys(wanted, float),
+            na_values=holes,
+            keep_default_na=False,
+            skipinitialspace=True,
+        )
+    except (ValueError, OverflowError, KeyError):
+        return None
+    if len(table) != len(texts) or (separator is None and table.shape[1] != width):
+        return None
+    if np.isinf(table[wanted].to_numpy()).any() or any(table[i].isna().any() for i, _ in flags):
+        return None
+    good = np.ones(len(table), dtype=bool)
+    for i, values in flags:
+        flag = table[i].to_numpy()
+        good &= (flag != 0) if values is None else np.isin(flag, values)
+    return {key: table[i].to_numpy(dtype=float)[good] for key, i in columns.items()}, good
+
+
+def _slow(
+    path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Row by row; flags first: a doubtful row may hold anything.
+
+    Raises
+    ------
+    InputError : naming line and column.
+    """
+    import pandas as pd
+
+    width, rows = len(layout.headings), []
+    for number, text in layout.body:
+        row = cells_of(text, layout.separator)
+        if row is None:
+            problem = "a quotation mark that is opened and not closed"
+            raise InputError(path, f"line {number}", problem)
+        # Blanks leave no empty cells: a short row has lost its place.
+        if any(row[width:]) or (layout.separator is None and len(row) < width):
+            problem = f"expected {width} cells as in the header, found {len(row)}"
+            if layout.separator == ",":
+                problem += "; decimal commas need another separator, or quotation marks"
+            raise InputError(path, f"line {number}", problem)
+        rows.append((row + [""] * width)[:width])
+    names = [heading.name for heading in layout.headings]
+    lines = np.array([number for number, _ in layout.body])
+    # By position: names may appear twice where nobody asks for them.
+    cells = pd.DataFrame(rows, dtype=str)
+    good = np.ones(len(rows), dtype=bool)
+    for i, values in flags:
+        flag = cells[i].str.casefold().map(WORDS).to_numpy(dtype=float)
+        if np.isnan(flag).any():
+            one = TextTable(path, cells[[i]].set_axis([names[i]], axis=1), lines, layout.decimal)
+            flag = one.numbers(names[i])
+        good &= (flag != 0) if values is None else np.isin(flag, values)
+    read = {}
+    for key, i in columns.items():
+        kept = cells[[i]][good].set_axis([names[i]], axis=1)
+        read[key] = TextTable(path, kept, lines[good], layout.decimal).numbers(names[i], holes=True)
+    return read, good
+
+
+#: Names of columns that say whether a row is good, but not in which way.
+UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
+
+
+def read_text_rows(
+    path: Path,
+    options: FrameOptions,
+    *,
+    comment: str | None = None,
+    upper: bool = False,
+    camera_axes: bool = False,
+    names: Mapping[str, str] | None = None,
+    status: tuple[str, Sequence[int]] | None = None,
+) -> FrameRows:
+    """The rows of the one frame in a text file.
+
+    Parameters
+    ----------
+    comment : that of the format, where it has one of its own.
+    upper : of two names that differ only in their letters' size, the large one is the length.
+    names : what the format calls some quantities; the user's own come first.
+    status : a column of states, and the values of good rows.
+
+    Raises
+    ------
+    InputError : naming file, line and column: no such file, missing columns, cells that are not
+        numbers.
+    """
+    own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
+    named = {**(names or {}), **own}
+    mark = options.comment if comment is None else comment
+    wanted = [*options.quantities]
+    layout = find_layout(path, wanted, named, mark, options.decimal, upper)
+    columns = quantity_columns(path, layout, named, options)
+    flags = flag_columns(path, layout, columns, options, status)
+    numbers = {key: i for key, i in columns.items() if key not in ("valid", "invalid")}
+    values, good = read_numbers(path, layout, numbers, flags)
+    sigma = values.pop("sigma", None)
+    headings = {key: layout.headings[i] for key, i in numbers.items() if key != "sigma"}
+    unclear = [h.name for h in layout.headings if h.name.casefold() in UNCLEAR]
+    notes = [
+        f"column {name!r} is not used; flag_column or valid_column says what it means"
+        for name in unclear
+        if name not in (options.flag_column, options.valid_column)
+    ]
+    return FrameRows(
+        values,
+        {key: heading.name for key, heading in headings.items()},
+        {key: heading.unit for key, heading in headings.items() if heading.unit},
+        sigma=sigma,
+        camera_axes=camera_axes,
+        dropped={FLAGGED: int((~good).sum())},
+        notes=tuple(notes),
+    )

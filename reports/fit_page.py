@@ -1,0 +1,546 @@
+"""The folder of a finished fit: card, tables, figures, report.html, and last result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import NoFeasibleStart, OutputError, SolverFailure
+from ..experiments.kinds import Exhibit, by_strain
+from ..inference.linear import PRIOR
+from ..inference.posterior import LEVEL
+from ..materials.card import write_card
+from ..materials.forms.base import COMPONENTS
+from ..materials.law import HypoelasticLaw
+from ..notes import NOTES, NOTES_ARE, write_notes
+from ..runs.folder import RESULT, Store
+from ..runs.result import STRAINS, answer_at, coefficients_table
+from ..writing import replacing
+from .charts import Charts
+from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
+from .html import percent, write_report
+from .moduli import plot_moduli
+from .moduli_charts import moduli_charts, pinned_charts
+from .optima import plot_optima
+from .optima_charts import optima_chart
+from .pinned import plot_pinned
+
+if TYPE_CHECKING:
+    from ..runs.result import Fit
+
+Array = NDArray[np.float64]
+
+TITLE = "What the data determine"
+#: A modulus is said to be unknown from here on: as uncertain as it was before, but for rounding.
+UNKNOWN = 0.999 * PRIOR
+
+
+def determined_section(fit: Fit, pinned: Sequence[Part]) -> Section:
+    """Tables, and `pinned`, the picture of what each test pins down."""
+    parts = [*_determined(fit), *_beside(fit), *pinned, *_pinned_table(fit.pinned)]
+    return Section(TITLE, parts)
+
+
+def _beside(fit: Fit) -> list[Table]:
+    """What the data say of every unknown beside the moduli."""
+    rows: list[list[object]] = [
+        [v.name, v.unit, v.value, v.sigma if v.determined else "not determined", v.lower, v.upper,
+         v.prior, v.words]
+        for v in fit.verdicts
+    ]  # fmt: skip
+    header = ["unknown", "unit", "value", "1 sigma", "least", "largest", "known to", "verdict"]
+    note = (
+        "Known to: one standard deviation before the tests. Correlation: with a modulus in the "
+        "middle of its strains, where it is above one half."
+    )
+    return [Table("Unknowns beside the moduli", header, rows, note, text=(1, 7))] if rows else []
+
+
+def sigma_words(value: float) -> str:
+    """A relative uncertainty as percent, as long as it says anything."""
+    return percent(value) if value < UNKNOWN else "unknown"
+
+
+def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
+    rows: list[list[object]] = [
+        [source, name, sigma_words(float(np.median(s))), sigma_words(float(s.max()))]
+        for source, sigmas in pins.items()
+        for name, s in sigmas.items()
+    ]
+    note = (
+        "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
+        "as one counted as one; before the "
+        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
+    )
+    header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
+    return [Table("What each test pins down", header, rows, note)] if rows else []
+
+
+def _together(alike: float) -> str:
+    """How many neighbouring values count as one; nothing where each counts."""
+    return f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
+
+
+def _determined(fit: Fit) -> Sequence[Table]:
+    """What the data determine, modulus by modulus; nothing where it is not known."""
+    sure = fit.best.certainty
+    if sure is None:
+        return []
+    mesh = {name: "not known" for name in sure.sigma}
+    if sure.mesh is not None:
+        mesh = {n: percent(round(float(np.abs(off).max()), 6)) for n, off in sure.mesh.items()}
+    rows: list[list[object]] = [
+        [name, percent(float(np.median(s))), percent(float(s.max())), mesh[name],
+         percent(float(sure.total[name].max()))]
+        for name, s in sure.sigma.items()
+    ]  # fmt: skip
+    units = {c.name: c.objective.unit for c in fit.problem.comparisons}
+    noise = ", ".join(
+        f"{value:.2g} {units[name]} ({name}{_together(sure.alike[name])})"
+        for name, value in sure.noise.items()
+    )
+    note = (
+        f"noise of {noise} on everything matched; a law or a model of the wrong form is not in it; "
+        "single coefficients are far less certain than the moduli they make. Mesh: "
+        "by how much a modulus would be another on ever finer meshes, from one run of a finer "
+        "model at the best fit"
+    )
+    if sure.order is not None:
+        note += f". Uncertainty of {sure.order.words}"
+    header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest", "together, largest"]
+    return [Table(TITLE, header, rows, note)]
+
+
+TITLE_TRUST = "Can it be trusted?"
+NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
+
+
+def trust_section(fit: Fit) -> Section:
+    """What a reader should know before using the numbers, and what the fit leaves."""
+    result = fit.result
+    parts: list[Part] = [
+        Words([f"{_said_by_tests(fit)}", *_checked(fit)]),
+        warnings_of(fit),
+        misfit_table(fit),
+        *known_solution_table(result.get("moduli_error", {}), result.get("moduli_error_range", {})),
+        Facts(assumed(fit)),
+    ]
+    return Section(TITLE_TRUST, parts)
+
+
+def _said_by_tests(fit: Fit) -> str:
+    said = "; ".join(
+        f"{name}: {f.summary}" if len(fit.findings) > 1 else f.summary
+        for name, f in fit.findings.items()
+    )
+    return f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {said}."
+
+
+def _checked(fit: Fit) -> list[str]:
+    """What the look at the data before the fit, and the solver's look at stability, showed."""
+    lines = []
+    if fit.judgements:
+        doubts = sum(len(judgement.doubts) for judgement in fit.judgements)
+        seen = f"{doubts} doubts, told below" if doubts else "nothing doubtful"
+        tests = ", ".join(judgement.test for judgement in fit.judgements)
+        lines.append(f"The data were looked at before the fit ({tests}): {seen}.")
+    leading = (fit.best.differentiated or fit.best.point).histories
+    stable = [
+        beside.stable if history.stable is None else history.stable
+        for history, beside in zip(fit.best.point.histories, leading, strict=True)
+    ]
+    if all(stable):
+        lines.append("Every equilibrium at a reported load is stable.")
+    elif False in stable:
+        lines.append("Equilibria at some of the reported loads are unstable: see the warnings.")
+    else:
+        lines.append("The solver did not look whether every equilibrium is stable.")
+    return lines
+
+
+def warnings_of(fit: Fit) -> Words:
+    """Every note of the fit, or that there is none."""
+    lines = [note.line for note in fit.notes]
+    return Words(lines, marked=True, warning=True) if lines else Words([NO_WARNING])
+
+
+def misfit_table(fit: Fit) -> Table:
+    """The residual of every comparison beside the noise of its data."""
+    rows: list[list[object]] = [
+        [name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()
+    ]
+    header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
+    note = (
+        "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "
+        "else what such an instrument is good for. The uncertainty reckons with the larger of "
+        "noise and residual."
+    )
+    return Table("Residual beside the noise", header, rows, note, text=(3, 4))
+
+
+def known_solution_table(
+    errors: dict[str, float], ranges: dict[str, tuple[float, float]]
+) -> list[Table]:
+    """The largest errors of the moduli, where the solution is known."""
+    rows: list[list[object]] = [
+        [name, percent(error), *ranges.get(name, (None, None))] for name, error in errors.items()
+    ]
+    note = (
+        "Against the known solution, over the range of logarithmic strain in the table, which is "
+        "what the tests reached. Single coefficients are not compared: the highest powers hardly "
+        "act at these strains, so quite different coefficients give the same moduli."
+    )
+    header = ["modulus", "largest error", "from strain", "to strain"]
+    return [Table("Errors of the moduli", header, rows, note)] if rows else []
+
+
+def assumed(fit: Fit) -> list[tuple[str, object]]:
+    """What was not measured here but taken as known."""
+    unknowns, project = fit.project.fit.unknowns, fit.project
+    fitted = {name: getattr(unknowns, name) is not None for name in ("nu12", "thickness")}
+    thick = f"{fit.thickness:.4g} mm, {project.fabric.thickness_change}"
+    return [
+        (f"Poisson's ratio nu12 ({'fitted' if fitted['nu12'] else 'fixed'})", fit.law.nu12),
+        ("thickness (fitted)" if fitted["thickness"] else "thickness", thick),
+        ("form of the moduli", fit.law.form.name),
+    ]
+
+
+TITLE_WAYS = "How it was found"
+
+
+def ways_section(fit: Fit, parts: list[Part]) -> Section:
+    """Facts, `parts` (the picture of the optima), and the tables."""
+    every = [
+        Facts(found_by(fit)), *parts, starts_table(fit), bounds_table(fit), *coefficients_table(fit)
+    ]  # fmt: skip
+    return Section(TITLE_WAYS, every)
+
+
+def found_by(fit: Fit) -> list[tuple[str, object]]:
+    """Method, starts and cost."""
+    result, project, best = fit.result, fit.project, fit.best
+    runs, cached = result["external_runs"], result["cached_runs"]
+    return [
+        (f"objective: {fit.setup.objective_is}", fit.objective),
+        ("method", f"{project.fit.method} on {project.fit.solver}"),
+        ("starts", f"{len(best.ranked)} feasible of {len(best.records)}"),
+        *([("coarse to fine", fit.stages)] if fit.stages else []),
+        ("analyses", result["analyses"]),
+        *([(f"of them by {project.fit.solver}", runs)] if runs or cached else []),
+        *([("of them from the cache", cached)] if cached else []),
+        ("wall time, s", result["wall_s"]),
+    ]
+
+
+def starts_table(fit: Fit) -> Table:
+    """Every start, best first."""
+
+    def value(objective: float | None) -> float:
+        return objective if objective is not None and isfinite(objective) else inf
+
+    records = sorted(fit.best.records, key=lambda record: value(record.objective))
+    rows: list[list[object]] = [
+        [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(records, start=1)
+    ]
+    header = ["rank", "start", "objective", "analyses", "how it ended"]
+    return Table("Starts, best first", header, rows, text=(4,))
+
+
+def bounds_table(fit: Fit) -> Table:
+    """Value, lower and upper bound of everything that was fitted of the law."""
+    form, unknowns, scale = fit.law.form, fit.problem.unknowns, fit.project.scales.modulus
+    rows: list[list[object]] = [
+        [form.labels[i], f"{float(fit.law.beta[i] / scale):.6g}", float(low / scale),
+         float(high / scale)]
+        for i, low, high in zip(form.free, *unknowns.box, strict=True)
+    ]  # fmt: skip
+    header = ["coefficient", f"value, {fit.project.scales.modulus_unit}", "lower bound",
+              "upper bound"]  # fmt: skip
+    return Table("Coefficients of the law", header, rows)
+
+
+def optima(fit: Fit) -> np.ndarray:
+    """(starts,) objective of every start, NaN where it has none."""
+    return np.array([np.nan if r.objective is None else r.objective for r in fit.best.records])
+
+
+def optima_words(fit: Fit) -> str:
+    """The caption of their picture."""
+    words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
+    if fit.coarse_to_fine is not None:
+        words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
+    return words
+
+
+#: What the moduli are called where nobody knows their letters.
+WORDS: Mapping[str, str] = {
+    "E1": "Young's modulus along the warp, E1",
+    "E2": "Young's modulus along the fill, E2",
+    "G12": "shear modulus between warp and fill, G12",
+}
+#: Within what stays on one line.
+SPACE = "\u00a0"
+#: The strain of the summary, and what it is called.
+FIRST = 0.01
+
+
+def modulus_at(fit: Fit, name: str, strain: float) -> tuple[float, float, float] | None:
+    """MPa and the ends of its band, NaN where that is not known; None beyond where it is known."""
+    if strain > fit.best.valid[COMPONENTS[name]]:
+        return None
+    found = answer_at(fit, name, strain)
+    return (found.value, *((np.nan, np.nan) if found.band is None else found.band))
+
+
+def band_words(value: float, lower: float, upper: float) -> str:
+    """A value with its band, as many digits as it bears."""
+    if not np.isfinite([lower, upper]).all():
+        return f"{value:.3g}"
+    return f"{_short(value)}{SPACE}({_short(lower)}{SPACE}to{SPACE}{_short(upper)})"
+
+
+def _short(value: float) -> str:
+    """Three digits, without powers of ten."""
+    return f"{value:.0f}" if abs(value) >= 99.5 else f"{value:.3g}"
+
+
+def answer_table(fit: Fit) -> Table:
+    """A row a modulus and unit, a column a strain that one of them reaches."""
+    far = max(float(fit.best.valid[c]) for c in COMPONENTS.values())
+    strains = [strain for strain in STRAINS if strain <= far]
+    rows: list[list[object]] = []
+    for name, words in WORDS.items():
+        found = [modulus_at(fit, name, strain) for strain in strains]
+        end = percent(float(fit.best.valid[COMPONENTS[name]]))
+        for unit, scale in (("MPa", 1.0), ("kN/m", fit.thickness)):
+            cells = [None if m is None else band_words(*(scale * v for v in m)) for m in found]
+            rows.append([words, unit, *cells, end])
+    header = ["", "unit", *(f"at {100 * strain:g} %" for strain in strains), "known up to"]
+    note = (
+        "Tangent moduli at logarithmic strains along their own direction (shear: γ12). In brackets "
+        f"the {percent(LEVEL)} band, noise and mesh together. kN/m: MPa times the thickness of "
+        f"{fit.thickness:.4g} mm. Beyond the last column's strain no test reached: the card keeps "
+        "the modulus that it has there."
+    )
+    sure = fit.best.certainty
+    if sure is None or not sure.band:
+        note = note.replace(f"In brackets the {percent(LEVEL)} band, noise and mesh together. ", "")
+    return Table("Moduli", header, rows, note, text=(1,))
+
+
+def reached_table(fit: Fit) -> Table:
+    """How far the moduli are known, beside how far the tests went."""
+    reached, valid = (by_strain(ends) for ends in (fit.best.reached, fit.best.valid))
+    rows: list[list[object]] = [[name, valid[name], strain] for name, strain in reached.items()]
+    note = (
+        "Logarithmic strain. The material card holds up to the first of the two: beyond it a "
+        "modulus keeps the value it has there, even where a test reached further."
+    )
+    header = ["direction", "moduli fitted up to", "largest strain reached"]
+    return Table("Where they end", header, rows, note)
+
+
+def answer_words(fit: Fit) -> str:
+    """The same in a sentence, at a small strain that every modulus reaches."""
+    least = min(float(fit.best.valid[c]) for c in COMPONENTS.values())
+    at = FIRST if least >= FIRST else 0.0
+    said = []
+    for name, words in WORDS.items():
+        found = modulus_at(fit, name, at)
+        assert found is not None
+        plain = words.rpartition(",")[0]
+        said.append(f"{plain} {band_words(*found)} MPa")
+    return f"At {100 * at:g} % strain: {'; '.join(said)}."
+
+
+BIBTEX = """@software{{bubblefit,
+  title = {{bubblefit: material models of coated fabrics from bubble inflation tests and strip
+           tests by inverse finite element analysis}},
+  author = {{{{The bubblefit developers}}}},
+  version = {{{version}}},
+  license = {{MIT}}
+}}
+@mastersthesis{{jekel2016,
+  title = {{Obtaining Non-linear Orthotropic Material Models for PVC-Coated Polyester via Inverse
+           Bubble Inflation}},
+  author = {{Jekel, Charles F.}},
+  school = {{Stellenbosch University}},
+  month = mar,
+  year = {{2016}},
+  url = {{https://hdl.handle.net/10019.1/98627}}
+}}"""
+
+
+def citation() -> list[Part]:
+    """Words and BibTeX, as CITATION.cff of the program has it."""
+    said = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
+    return [Words([said]), Listing(BIBTEX.format(version=__version__))]
+
+
+CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"
+COEFFICIENTS = "coefficients.csv"
+MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
+#: Strains at which curves are drawn.
+SMOOTH = 121
+SAVE_CARD = "Save the material card (material.toml)"
+FILES = (
+    (RESULT, "all numbers of this page, for programs"),
+    (CARD, "the material card"),
+    (MODULI, "tangent moduli along their strains, with their bands"),
+    (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
+    (RESIDUALS, "every matched value beside the model's"),
+    (NOTES, NOTES_ARE),
+    ("history.csv", "one row an analysis"),
+    (MODULI_PICTURE, "picture of the moduli"),
+    (OPTIMA, "picture of the optima"),
+    (PINNED, "picture of what each test pins down"),
+)
+
+
+def write_fit(fit: Fit, folder: Path) -> Path:
+    """Write everything; raises OutputError."""
+    store = Store(folder)
+    (folder / RESULT).unlink(missing_ok=True)
+    if fit.record is not None:
+        fit.record.write(folder)
+    write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
+    tables = {MODULI: fit.moduli(), COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
+    for name, table in tables.items():
+        with replacing(folder / name) as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+    write_notes(folder, fit.notes)
+    page = write_report(folder, _page(fit, folder))
+    store.finish(fit.result)
+    return page
+
+
+def _page(fit: Fit, folder: Path) -> Report:
+    result = fit.result
+    exhibits = {
+        t.test.name: t.show(
+            fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
+        )
+        for t in fit.setup.tests
+    }
+    record = [] if fit.record is None else fit.record.tables()
+    files = [
+        *FILES,
+        *([] if fit.record is None else fit.record.files),
+        *(f for exhibit in exhibits.values() for f in exhibit.files),
+    ]
+    card = (folder / CARD).read_text(encoding="utf-8")
+    return Report(
+        title=fit.project.title,
+        summary=answer_words(fit),
+        sections=[
+            Section("The answer", [
+                answer_table(fit), Download(CARD, card, SAVE_CARD), reached_table(fit),
+            ]),
+            trust_section(fit),
+            Section("The moduli over strain", [_moduli(fit, folder)]),
+            Section("Measured beside modelled", _shown(exhibits)),
+            determined_section(fit, _pinned(fit, folder)),
+            ways_section(fit, [_optima(fit, folder)]),
+            Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
+            Section("How to cite", citation()),
+        ],
+        files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
+        versions=result["versions"],
+    )  # fmt: skip
+
+
+def _shown(exhibits: Mapping[str, Exhibit]) -> list[Part]:
+    """What the tests show, each after its name where there are several."""
+    return [
+        part
+        for name, exhibit in exhibits.items()
+        for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
+    ]
+
+
+def _optima(fit: Fit, folder: Path) -> Charts:
+    plot_optima(folder / OPTIMA, optima(fit))
+    return optima_chart(optima(fit), optima_words(fit))
+
+
+def _moduli(fit: Fit, folder: Path) -> Charts:
+    """The moduli over the strains that they are fitted to, as far as the card is valid."""
+    strains = _strains(fit)
+    known = next((t.known for t in fit.setup.tests if t.known is not None), None)
+    curves = np.array([modulus_curves(law, strains) for law in fit.laws])
+    band, sure = None, fit.best.certainty
+    if sure is not None and sure.band:
+        band = np.array(
+            [
+                [np.interp(x, sure.strain[name], end) for end in sure.band[name]]
+                for name, x in zip(COMPONENTS, strains, strict=True)
+            ]
+        ).transpose(1, 0, 2)
+    truth = None if known is None else modulus_curves(known, strains)
+    shown = None if known is not None else band
+    plot_moduli(folder / MODULI_PICTURE, strains, curves, truth, band=shown)
+    words = ", where a dot ends them" if known is None and band is not None else ""
+    if band is not None:
+        words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
+    caption = f"Tangent moduli of the best fits over the strains reached{words}"
+    return moduli_charts(strains, curves, truth, band, caption)
+
+
+def _strains(fit: Fit, count: int = SMOOTH) -> Array:
+    return np.array([np.linspace(0.0, fit.best.valid[c], count) for c in COMPONENTS.values()])
+
+
+def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
+    """(3, k) E1, E2, G12 in MPa at strains (3, k)."""
+    return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
+
+
+def _pinned(fit: Fit, folder: Path) -> list[Charts]:
+    if not (pins := fit.pinned):
+        return []
+    sigma = {
+        source: 100 * np.array([sigmas[name] for name in COMPONENTS])
+        for source, sigmas in pins.items()
+    }
+    count = next(iter(sigma.values())).shape[1]
+    plot_pinned(folder / PINNED, _strains(fit, count), sigma)
+    caption = "What each test pins down: one standard deviation of the moduli"
+    return [pinned_charts(_strains(fit, count), sigma, caption)]
+
+
+FAILED = "This failed, and there is no result."
+
+
+@contextmanager
+def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
+    """Where what is done within fails, report.html of the folder says so, and nothing else does.
+
+    Parameters
+    ----------
+    folder : None: nothing is written. title : of the project.
+
+    Returns
+    -------
+    What else the page is to say, line by line, to be filled.
+
+    Raises
+    ------
+    What is raised within.
+    """
+    more: list[str] = []
+    try:
+        yield more
+    except (SolverFailure, NoFeasibleStart) as failure:
+        if folder is not None:
+            said = str(failure).splitlines()[0]
+            with suppress(OutputError):  # the failure itself says more
+                write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
+        raise

@@ -1,0 +1,202 @@
+"""The folder of a comparison of forms: comparison.csv, laws.png, curves, report.html."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from ..errors import SolverFailure
+from ..experiments.kinds import CardRun, Output, Shown
+from ..experiments.registry import kind_named
+from ..notes import NOTES, NOTES_ARE, rows, write_notes
+from ..runs.best import noise_of
+from ..runs.compare import AS_GOOD
+from ..runs.folder import RESULT, Store
+from ..writing import replacing
+from .content import Report, Section, Table, pictures
+from .html import write_report
+from .laws import LawRow, plot_laws
+from .named_charts import law_charts
+
+if TYPE_CHECKING:
+    from ..experiments.kinds import PreparedTest
+    from ..runs.compare import FormFit, LawComparison
+
+
+def result_of(comparison: LawComparison) -> dict[str, Any]:
+    """Errors form by form, and the simplest form that is as good as the best."""
+    forms, first = comparison.forms, comparison.forms[0]
+    whole = [f for f in forms if math.isfinite(f.validated)]
+    best = min(whole, key=lambda f: f.validated, default=None)
+    simplest = None
+    if best is not None:
+        limit = (1 + AS_GOOD) * best.validated
+        simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
+    return {
+        "command": "compare",
+        "title": comparison.project.title,
+        "tests": [test.test.name for test in first.fit.setup.tests],
+        "objective_is": first.fit.setup.objective_is,
+        "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
+                  if c.name in first.compared},
+        "fold_starts": comparison.fold_starts,
+        "forms": [_form(f) for f in forms],
+        "noise": sum(noise(first).values()),
+        "noise_by_part": noise(first),
+        "least_cross_validated": best.name if best else None,
+        "simplest_as_good": simplest.name if simplest else None,
+        "as_good_within": AS_GOOD,
+        "notes": rows(comparison.notes),
+    }  # fmt: skip
+
+
+def _form(form: FormFit) -> dict[str, Any]:
+    return {
+        "form": form.name,
+        **form.fit.law.form.to_card(),
+        "coefficients": form.coefficients,
+        "objective": form.fit.objective,
+        "fitted": form.fitted,
+        "rms": form.rms,
+        "cross_validated": _number(form.validated),
+        "cross_validated_by_part": {
+            name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
+        },
+        "folds": [_number(value) for value in form.left_out()],
+        "starts_objective": [r.objective for r in form.fit.best.ranked],
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def noise(form: FormFit) -> dict[str, float]:
+    """What the data's own noise adds to the objective, by comparison: no form can do better."""
+    every = noise_of(form.fit.problem)
+    return {name: every[name] for name in form.compared}
+
+
+def table_of(comparison: LawComparison) -> pd.DataFrame:
+    """A row a form: errors of the fit and at what was left out, in all and by comparison."""
+    rows = []
+    for form in comparison.forms:
+        units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
+        fitted = {f"rms {name}, {units[name]}": e for name, e in form.rms.items()}
+        left = {
+            f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
+            for name in form.compared
+        }
+        rows.append(
+            {
+                "moduli": form.name,
+                "coefficients": form.coefficients,
+                "fitted": form.fitted,
+                "cross_validated": form.validated,
+                **fitted,
+                **left,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def lines_of(result: Mapping[str, Any]) -> list[str]:
+    """A table for the terminal."""
+    lines = [
+        f"error: {result['objective_is']}",
+        f"{'moduli':<12}{'coefficients':>13}{'fitted':>12}{'cross-validated':>18}",
+    ]
+    for form in result["forms"]:
+        error = form["cross_validated"]
+        validated = "a fold failed" if error is None else f"{error:.4g}"
+        lines.append(
+            f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
+        )
+    lines.append(f"the data's own noise: {result['noise']:.4g}")
+    return [*lines, *conclusion(result)]
+
+
+def conclusion(result: Mapping[str, Any]) -> list[str]:
+    """Which form is best, and which is the simplest that is as good."""
+    if result["simplest_as_good"] is None:
+        return []
+    return [
+        f"least at specimens left out: {result['least_cross_validated']}; simplest within "
+        f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
+    ]
+
+
+COMPARISON = "comparison.csv"
+CAPTION = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
+
+
+def write_comparison(comparison: LawComparison, folder: Path) -> Path:
+    """Write everything; raises OutputError."""
+    result, table = comparison.result, table_of(comparison)
+    with replacing(folder / COMPARISON) as path:
+        table.to_csv(path, index=False, float_format="%.9g")
+    write_notes(folder, comparison.notes)
+    first = comparison.forms[0]
+    rows = [
+        LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out())
+        for f in comparison.forms
+    ]
+    total = sum(noise(first).values())
+    plot_laws(folder / "laws.png", rows, total, result["objective_is"])
+    page = Report(
+        title=f"{comparison.project.title}: forms of the moduli",
+        summary="; ".join(conclusion(result)),
+        facts=[("error", result["objective_is"]), ("the data's own noise", total)],
+        warnings=[note.line for note in comparison.notes],
+        sections=[
+            Section("Errors", [
+                law_charts(rows, total, result["objective_is"], CAPTION),
+                Table(
+                    "Errors",
+                    list(table.columns),
+                    table.to_numpy(dtype=object).tolist(),
+                    "fitted: to all points; left out: at what the fits of the folds were not given",
+                ),
+            ]),
+            Section("The forms side by side", pictures([
+                shown
+                for test in first.fit.setup.tests
+                for shown in _side_by_side(comparison, test, folder)
+            ])),
+        ],
+        files=[
+            (COMPARISON, "the table"),
+            ("laws.png", "picture of the errors"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers, for programs"),
+        ],
+    )  # fmt: skip
+    written = write_report(folder, page)
+    Store(folder).finish(result)
+    return written
+
+
+def _side_by_side(comparison: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:
+    """What a kind of test draws of several cards: here those of the forms."""
+    several = len(comparison.forms[0].fit.setup.tests) > 1
+    own = test.test
+    cards = {f.name: f.fit.card for f in comparison.forms}
+    runs = {
+        (f.name, part): CardRun(model, _outcome(f.fit.setup.make_solver(), model, f.fit.law))
+        for f in comparison.forms
+        for part, model in own.models().items()
+    }
+    out = Output.of(folder, own.name, several)
+    return kind_named(own.kind).simulate(own, cards, runs, out).figures
+
+
+def _outcome(solver: Any, model: Any, law: Any) -> Any:
+    try:
+        return solver.run(model, law)
+    except SolverFailure as failure:
+        return failure

@@ -1,0 +1,294 @@
+"""The best of a fit's starts, run once more from the unloaded state: what counts as its result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, SolverFailure
+from ..experiments.kinds import Refinable, strains_of
+from ..inference.assessment import Certainty, certainty
+from ..inference.comparison import Blocks
+from ..inference.discretisation import Limit, limit_of, residual_of
+from ..inference.linear import (
+    NOT_DEFINITE,
+    TOO_LITTLE,
+    WORTH,
+    Linear,
+    Order,
+    definite,
+    large,
+    second_of,
+)
+from ..inference.noise import Noise
+from ..inference.problem import Evaluation, FitProblem
+from ..materials.card import CardCertainty, certainty_of, words_of
+from ..materials.forms.base import COMPONENTS
+from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind
+from .setup import FitSetup, with_shared
+from .starts import StartRecord
+
+Array = NDArray[np.float64]
+
+#: Relative difference of an objective and of the same, run again, that is rounding; and of what
+#: the data's own noise would add to it, which an objective near zero cannot be told from.
+ROUNDING, UNTOLD = 1e-5, 1e-6
+#: Least strain that counts as reached.
+LEAST_STRAIN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BestFit:
+    """The best fit as it is run again.
+
+    Parameters
+    ----------
+    point : the analysis by the solver that counts; differentiated : the same point by the solver
+        that differentiates, where it could.
+    ranked : the starts that ended with a fit, best first, the best with the objective of `point`;
+        records : all of them, by number.
+    reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. certainty : of
+        `budget.with_certainty`; None before it, and where there are no derivatives.
+    """
+
+    point: Evaluation
+    differentiated: Evaluation | None
+    law: HypoelasticLaw
+    ranked: Sequence[StartRecord]
+    records: Sequence[StartRecord]
+    reached: Array
+    certainty: Certainty | None = None
+
+    @property
+    def objective(self) -> float:
+        """What the best fit leaves, from the unloaded state."""
+        return self.point.value
+
+    @property
+    def valid(self) -> Array:
+        """(3,) ends of the strains for which the moduli are fitted, not held."""
+        return np.minimum(self.reached, self.law.strain_range)
+
+
+def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
+    """Run the best of the starts again.
+
+    It ran once. Another program that fails now has lost its licence or its machine, most likely,
+    and gets a second try.
+
+    Parameters
+    ----------
+    tolerance : objectives below it are the same.
+
+    Raises
+    ------
+    SolverFailure : the best fit does not run again, or gives another objective.
+    """
+    ranked = ranking(records)
+    problem.reset()
+    unknowns = np.array(ranked[0].unknowns)
+    # The derivatives behind what the data could not determine are the surrogate's, if there is one.
+    leading = problem.surrogate or problem
+    point = problem.evaluate(unknowns, leading is problem, warm=False)
+    if point is None and problem.solver.external:
+        point = problem.evaluate(unknowns, leading is problem, warm=False)
+    if point is None:
+        said = f"the best fit does not run again: {problem.failure}"
+        raise SolverFailure(f"{said}; its starts are kept, --resume goes on", problem.solver.name)
+    first = _repeated(problem, ranked[0], point, tolerance)
+    ranked = [_like(r, first) for r in ranked]
+    again = [_like(r, first) for r in records]
+    strains = [strains_of(h) for h in point.histories]
+    reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
+    law = problem.unknowns.law(problem.law, unknowns)
+    slopes = point if leading is problem else leading.evaluate(unknowns, True, warm=False)
+    return BestFit(point, slopes, law, ranked, again, reached)
+
+
+def _like(record: StartRecord, first: StartRecord) -> StartRecord:
+    """A record as it is; that of the best start, or with its fit, as it was run again."""
+    if record.number == first.number:
+        return first
+    return replace(record, objective=first.objective) if record.same_as == first.number else record
+
+
+def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:
+    """The starts that ended with a fit, best first."""
+    ended = [r for r in records if r.objective is not None]
+    return sorted(ended, key=lambda r: (r.objective, r.number))
+
+
+def noise_of(problem: FitProblem) -> dict[str, float]:
+    """What the data's own noise adds to the objective, by comparison: no law can do better.
+
+    The noise is the specimens' scatter where it is known, or what the instrument is good for.
+    """
+    return {
+        c.name: Blocks(c.objective.sizes).value(c.objective.least_noise / c.objective.scale)
+        for c in problem.comparisons
+    }
+
+
+def _repeated(
+    problem: FitProblem, record: StartRecord, point: Evaluation, tolerance: float
+) -> StartRecord:
+    """The record of the best start with the objective that the run from the unloaded state has."""
+    assert record.objective is not None
+    before, now = record.objective, point.value
+    untold = tolerance + UNTOLD * sum(noise_of(problem).values())
+    if abs(now - before) > ROUNDING * max(now, before) + untold:
+        raise SolverFailure(
+            f"start {record.number} ended with an objective of {before:.6g}, and the same moduli "
+            f"give {now:.6g} from the unloaded state: the fit hangs on the way it was reached; "
+            "more increments usually help",
+            problem.solver.name,
+        )
+    return replace(record, objective=now)
+
+
+#: Elements and increments are divided by it, once.
+FINER = 2.0
+#: What a project says of it (`fit.mesh_error`).
+TOLD, TAKEN_OUT = "told", "taken out"
+#: Less of a modulus is no matter, whatever the noise.
+LEAST = 0.01
+
+
+def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
+    """Where ever finer meshes would take the best fit, and what they would leave.
+
+    None where its derivatives are not known, where another program runs the tests (a finer run of
+    it is not made unasked), or where a kind of test knows no finer model.
+
+    Raises
+    ------
+    InputError, SolverFailure : the finer model cannot be made or does not run.
+    """
+    if best.differentiated is None or problem.solver.external:
+        return None
+    if not all(isinstance(test, Refinable) for test in setup.tests):
+        return None
+    finer = [
+        comparison
+        for test, weighting in zip(setup.tests, setup.weightings, strict=True)
+        if isinstance(test, Refinable)
+        for comparison in test.finer(setup.make_solver, weighting, FINER)
+    ]
+    finer = [*with_shared(finer, problem.unknowns.nuisance.shared)]
+    residual = residual_of(problem, finer, best.differentiated, best.law)
+    return limit_of(problem, best.differentiated, residual, FINER)
+
+
+def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
+    """Each modulus that the mesh moves by more than the noise does, where that is most."""
+    notes = []
+    for name in COMPONENTS:
+        beyond = np.abs(mesh[name]) - np.maximum(sure.sigma[name], LEAST)
+        worst = int(beyond.argmax())
+        if beyond[worst] > 0:
+            strain, by = sure.strain[name][worst], 100 * mesh[name][worst]
+            words = (
+                f"on a fine mesh {name} would be {by:+.2g} % at strain {strain:.3f}, more than the "
+                f"noise makes uncertain ({100 * sure.sigma[name][worst]:.2g} %): more elements help"
+            )
+            notes.append(Note(NoteKind.MESH, words))
+    return notes
+
+
+def note_of_limit(mesh: dict[str, Array]) -> Note:
+    """That the card is not that of the mesh that the fit was run with."""
+    by = ", ".join(f"{name} {100 * off[np.abs(off).argmax()]:+.2g} %" for name, off in mesh.items())
+    words = (
+        f"the error of the mesh is taken out of the moduli ({by} at most): the card is the law of "
+        "ever finer meshes, to first order; objective, residuals and what is drawn of the tests "
+        "are those of the mesh of the fit"
+    )
+    return Note(NoteKind.TAKEN_OUT, words)
+
+
+NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
+
+
+def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
+    """The best fit with its certainty; as it is where its derivatives are not known.
+
+    What the mesh leaves is no noise: that is what finer models would leave. Where the project asks
+    for it, the law is that of ever finer meshes; the analysis stays that of the fit.
+    """
+    slopes = best.differentiated
+    if slopes is None:
+        return best
+    out = setup.project.fit.mesh_error == TAKEN_OUT
+    limit, notes = _limit(setup, problem, best)
+    law = best.law
+    if limit is None and out:
+        notes.append(Note(NoteKind.MESH, NOT_TAKEN_OUT))
+    elif limit is not None and out:
+        law = problem.unknowns.law(law, slopes.unknowns + limit.step)
+    sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
+    if sure.mesh is not None:
+        notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)
+    if sure.order is not None:
+        notes += sure.order.notes
+    told = (*sure.undetermined, *notes)
+    sure = replace(sure, undetermined=told, taken_out=out and limit is not None)
+    return replace(best, law=law, certainty=sure)
+
+
+def _certainty(
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array, limit: Limit | None
+) -> Certainty:
+    """By the first derivatives; by the second where much is left, and they say something else."""
+    first = certainty(problem, best, law, reached, limit)
+    left = best.residual if limit is None else limit.residual
+    if not large(problem, left):
+        return first
+    noise = Noise.of(problem, left)
+    found = second_of(problem, best, noise)
+    if not definite(Linear.of(problem, best, noise), found):
+        order = Order(False, NOT_DEFINITE, {}, found.directions, found.analyses)
+        return replace(first, order=order)
+    second = certainty(problem, best, law, reached, limit, found)
+    change = {}
+    for name, sigma in second.sigma.items():
+        by = sigma / first.sigma[name] - 1.0
+        change[name] = float(by[np.abs(by).argmax()])
+    used = max(map(abs, change.values())) > WORTH
+    why = "" if used else TOO_LITTLE
+    order = Order(used, why, change, found.directions, found.analyses)
+    return replace(second if used else first, order=order)
+
+
+def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit | None, list[Note]]:
+    try:
+        return limit_of_meshes(setup, problem, best), []
+    except (InputError, SolverFailure) as error:
+        words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
+        return None, [Note(NoteKind.MESH, words)]
+
+
+#: Draws within the bounds of the fit of which the directions are made.
+DRAWS = 2000
+
+
+def card_certainty(
+    problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
+) -> CardCertainty | None:
+    """About the card's law, from draws that keep the bounds of the fit; None where none is known.
+
+    Where the error of the mesh is told and not taken out, the draws lie about the law of ever
+    finer meshes: how far that is from the card's counts as a standard deviation does.
+    """
+    sure = best.certainty
+    known = None if sure is None else sure.fine or sure.posterior
+    if sure is None or known is None:
+        return None
+    unknowns = known.unknowns
+    drawn = known.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
+    values = sum(sum(c.objective.sizes) for c in problem.comparisons)
+    words = words_of(tests, values, sure.fine is not None)
+    return certainty_of(law, drawn @ unknowns.to_coefficients.T, words)

@@ -1,0 +1,419 @@
+"""Bootstrap of a fit: its frames, specimens or tests drawn again and again, and fitted anew."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import InputError
+from ..experiments.kinds import by_strain
+from ..inference.linear import moduli_of, summary
+from ..inference.methods.descent import descend
+from ..inference.posterior import LEVEL, bands_of
+from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
+from ..inference.resampling import Group, Unit, drawn, factors_of, rows_of
+from ..materials.forms.base import COMPONENTS
+from ..notes import Note, NoteKind, rows
+from ..notes import lines as note_lines
+from ..project.project import Project
+from ..reports.html import percent
+from .executor import cores
+from .folder import Store
+from .refound import Card, Refound, refound
+from .series import mark_of, read_marked, write_marked
+from .setup import fingerprints
+from .validation import TESTS, name_of, parts_of
+from .workers import Task
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLES = "bootstrap-samples.json"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One refit. counts : by group, how often each unit was drawn. unknowns : the optimiser's.
+
+    status : how the descent ended, as that of a fit.
+    """
+
+    number: int
+    counts: Sequence[Sequence[int]]
+    unknowns: Sequence[float]
+    analyses: int
+    status: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, exact in JSON."""
+        return asdict(self)
+
+
+class BootstrapRecord:
+    """Samples under a mark of all that they depend on, the optimum they began at among it.
+
+    folder : None where nothing is written. resume : go on with what it holds.
+    """
+
+    def __init__(self, folder: Path | None, found: Refound, over: str, resume: bool) -> None:
+        at = [f"{value:.6g}" for value in found.point.unknowns]
+        parts = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
+        self._mark = mark_of(parts)
+        self._folder = folder
+        self.samples: dict[int, Sample] = {}
+        if folder is not None and resume:
+            self.samples = read_marked(folder / SAMPLES, self._mark, _by_number) or {}
+
+    def write(self, sample: Sample) -> None:
+        """Write a sample; raises OutputError."""
+        self.samples[sample.number] = sample
+        if self._folder is not None:
+            rows = [one.to_json() for one in self.samples.values()]
+            write_marked(self._folder, SAMPLES, self._mark, {"samples": rows})
+
+
+def _by_number(content: dict[str, Any]) -> dict[int, Sample]:
+    return {row["number"]: Sample(**row) for row in content["samples"]}
+
+
+Array = NDArray[np.float64]
+
+#: Units of a group, below which their percentiles say little; samples, likewise.
+FEW, FEW_SAMPLES = 5, 40
+#: Of a number: what differs by less does not differ.
+ROUNDING = 1e-9
+#: Strains of each modulus in the table.
+PLACES = 21
+METHOD = (
+    "Units are drawn with replacement, each among its own group, and count as often as they were "
+    "drawn; every sample is fitted from the optimum of all. The bands are percentiles of the "
+    "samples. They hold what differs between the units, and nothing that all of them share: "
+    "the error of the mesh, a wrong form of the law or of the model, noise that is given and not "
+    "in the residual."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Bootstrap:
+    """Samples of a fit's data, fitted.
+
+    Parameters
+    ----------
+    found : the fit to all of the data. over : the sort of units. groups : the units. before :
+        analyses that were needed before the first sample.
+    """
+
+    found: Refound
+    over: str
+    groups: Sequence[Group]
+    samples: Sequence[Sample]
+    before: int
+
+    @property
+    def analyses(self) -> int:
+        """In all."""
+        return self.before + sum(sample.analyses for sample in self.samples)
+
+    @property
+    def unfinished(self) -> int:
+        """Samples whose analyses were used up on the way."""
+        return sum(sample.status == ANALYSES_USED_UP for sample in self.samples)
+
+    @property
+    def strains(self) -> dict[str, Array]:
+        """(n,) by modulus, up to what the tests reached."""
+        valid = self.found.best.valid
+        return {name: np.linspace(0.0, valid[c], PLACES) for name, c in COMPONENTS.items()}
+
+    @cached_property
+    def unknowns(self) -> Array:
+        """(samples, count)."""
+        return np.array([sample.unknowns for sample in self.samples])
+
+    @cached_property
+    def moduli(self) -> dict[str, Array]:
+        """(samples, n) MPa by modulus."""
+        own = self.found.problem.unknowns
+        each = [moduli_of(own, y, self.strains) for y in self.unknowns]
+        return {name: np.array([one[name] for one in each]) for name in COMPONENTS}
+
+    @cached_property
+    def bands(self) -> dict[str, Array]:
+        """(2, n) MPa by modulus: percentiles."""
+        ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
+        return {name: np.quantile(own, ends, axis=0) for name, own in self.moduli.items()}
+
+    @cached_property
+    def of_fit(self) -> dict[str, Array]:
+        """(2, n) MPa by modulus: the fit's own bands by the noise alone."""
+        return bands_of(self.found.posterior, self.found.best.law, self.strains)
+
+    @cached_property
+    def sigma(self) -> dict[str, tuple[float, float]]:
+        """By modulus, 1 sigma relative, root mean square along its strain: samples, and fit."""
+        spread, first, sure = {}, {}, self.found.sure
+        for name, own in self.moduli.items():
+            best = self.found.best.law.modulus(name, self.strains[name])
+            spread[name] = own.std(axis=0, ddof=1) / best
+            first[name] = np.interp(self.strains[name], sure.strain[name], sure.sigma[name])
+        samples, fit = summary(spread), summary(first)
+        return {name: (samples[name], fit[name]) for name in samples}
+
+    def coefficients(self) -> pd.DataFrame:
+        """A row an unknown: value, sigma of the samples and of the fit, and correlations.
+
+        Columns unknown, value, sigma, sigma_of_fit (MPa of a coefficient, else its own unit),
+        and by each unknown's name the correlation over the samples.
+        """
+        import pandas as pd
+
+        own, known = self.found.problem.unknowns, self.found.posterior
+        turn = np.eye(own.count)
+        turn[: own.size, : own.size] = own.to_coefficients
+        each = self.unknowns @ turn.T
+        sigma = each.std(axis=0, ddof=1)
+        # What lies on a bound in every sample differs by rounding.
+        sigma = np.where(sigma > ROUNDING * np.abs(each).max(axis=0), sigma, 0.0)
+        moved = np.where(sigma > 0, sigma, np.inf)
+        away = (each - each.mean(axis=0)) / moved
+        correlation = away.T @ away / (len(each) - 1)
+        names = list(known.labels)
+        table = pd.DataFrame(
+            {
+                "unknown": names,
+                "value": turn @ self.found.point.unknowns,
+                "sigma": sigma,
+                "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
+            }
+        )
+        return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
+
+    def table(self) -> pd.DataFrame:
+        """The moduli along their strains: modulus, strain, MPa, lower_MPa, upper_MPa, median_MPa,
+        sigma_relative of the samples, fit_lower_MPa, fit_upper_MPa (noise alone)."""
+        import pandas as pd
+
+        found = []
+        for name, strain in self.strains.items():
+            best = self.found.best.law.modulus(name, strain)
+            found.append(
+                pd.DataFrame(
+                    {
+                        "modulus": name,
+                        "strain": strain,
+                        "MPa": best,
+                        "lower_MPa": self.bands[name][0],
+                        "upper_MPa": self.bands[name][1],
+                        "median_MPa": np.median(self.moduli[name], axis=0),
+                        "sigma_relative": self.moduli[name].std(axis=0, ddof=1) / best,
+                        "fit_lower_MPa": self.of_fit[name][0],
+                        "fit_upper_MPa": self.of_fit[name][1],
+                    }
+                )
+            )
+        return pd.concat(found, ignore_index=True)
+
+    @property
+    def notes(self) -> list[Note]:
+        """Where percentiles say little."""
+        told = list(self.found.notes)
+        for group in self.groups:
+            count = len(group.units)
+            if count < FEW:
+                words = (
+                    f"{count} {self.over} only: so few drawn from themselves scatter less than "
+                    "others would, and the percentiles are too narrow"
+                )
+                told.append(Note(NoteKind.FEW_UNITS, words, group.name))
+        if len(self.samples) < FEW_SAMPLES:
+            words = f"{len(self.samples)} samples: the ends of the bands are those of one or two"
+            told.append(Note(NoteKind.FEW_UNITS, words))
+        return told
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What result.json says."""
+        setup = self.found.setup
+        return {
+            "command": "bootstrap",
+            "title": setup.project.title,
+            "project": str(setup.project.path),
+            "card": self.found.card,
+            "tests": [test.test.name for test in setup.tests],
+            "over": self.over,
+            "groups": {group.name: [u.name for u in group.units] for group in self.groups},
+            "seed": setup.project.fit.seed,
+            "samples": len(self.samples),
+            "analyses": self.analyses,
+            "unfinished": self.unfinished,
+            "level": LEVEL,
+            "up_to_strain": by_strain(self.found.best.valid),
+            "sigma_relative": {name: own for name, (own, _) in self.sigma.items()},
+            "sigma_relative_of_fit": {name: of for name, (_, of) in self.sigma.items()},
+            "method": METHOD,
+            "notes": rows(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """For the terminal."""
+        drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
+        told = [
+            f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
+            "1 sigma, root mean square along the strain: "
+            + ", ".join(
+                f"{name} {percent(own)} (fit {percent(of)})"
+                for name, (own, of) in self.sigma.items()
+            ),
+        ]
+        if self.unfinished:
+            told.append(f"{self.unfinished} samples used up their analyses before they settled")
+        return [*told, *note_lines(self.notes)]
+
+    def write(self, folder: Path | str) -> None:
+        """Write bootstrap.csv, coefficients.csv, bootstrap.png, report.html, notes.csv and, last,
+        result.json.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from ..reports.bootstrap_page import write_bootstrap
+
+        write_bootstrap(self, Path(folder))
+
+
+COUNT = 100
+#: Analyses of a refit, at most, beside the optimum's, which none runs again; its first damping.
+MOST, DAMPING = 4, 1e-9
+#: Predicted decrease of the sum of squares, relative, that is not worth an analysis.
+NEGLIGIBLE = 1e-5
+#: Told how many of how many samples are done, and of what.
+Progress = Callable[[int, int, str], None]
+
+
+def bootstrap(
+    project: Project,
+    over: str,
+    samples: int = COUNT,
+    card: Card = None,
+    tests: str | Sequence[str] | None = None,
+    *,
+    seed: int | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Bootstrap:
+    """Draw parts of the data with replacement and fit them, again and again.
+
+    Every refit begins at the optimum of the fit that left the card, whose analysis it does not
+    repeat, and takes a few of its own. Nothing is read anew: what was drawn twice counts twice.
+
+    Parameters
+    ----------
+    over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
+        "specimens", "directions", "ratios". samples : how often. card : the one that the project's
+        fit left in its usual folder unless given. tests : as for `fit`. seed : of the draws, the
+        project's unless given. out : folder in which every sample is kept as it ends; resume :
+        go on with what it holds.
+
+    Raises
+    ------
+    InputError : in the project or its data; nothing of which there are two. OutputError : the
+        folder is used or cannot be written. SolverFailure : the tests cannot be run with the card.
+    """
+    if samples < 2:
+        raise InputError(None, "--samples", f"expected two or more, got {samples}")
+    project = project.with_fit(seed=seed)
+    found = refound(project, card, tests)
+    groups = groups_of(found, over)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        Store(folder).begin({"version": __version__, "over": over}, resume, overwrite, (SAMPLES,))
+    record = BootstrapRecord(folder, found, over, resume)
+    done = {n: sample for n, sample in record.samples.items() if n < samples}
+    tell = progress or (lambda done, total, what: None)
+    tell(len(done), samples, "")
+    missing = [n for n in range(samples) if n not in done]
+    prepare = functools.partial(_task, found, groups, project.fit.seed)
+    for sample in project.executor.run_tasks(prepare, missing, "samples"):
+        if isinstance(sample, Sample):
+            done[sample.number] = sample
+            record.write(sample)
+        tell(len(done), samples, "")
+    # Every process runs the optimum once more.
+    before = found.analyses + min(project.fit.jobs or cores(), len(missing))
+    return Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before)
+
+
+def groups_of(found: Refound, over: str) -> list[Group]:
+    """The units that are drawn, and among which.
+
+    Raises
+    ------
+    InputError : there are no two of them.
+    """
+    return _tests(found) if over == TESTS else _parts(found, over)
+
+
+def _tests(found: Refound) -> list[Group]:
+    """Tests among those of their kind."""
+    setup, problem = found.setup, found.problem
+    numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
+    kinds: dict[str, list[Unit]] = {}
+    for test in setup.tests:
+        rows = np.zeros(len(problem.blocks.of), dtype=bool)
+        for comparison in setup.own(test):
+            rows[problem.rows(numbers[comparison.name])] = True
+        kinds.setdefault(test.test.kind, []).append(Unit(test.test.name, rows))
+    several = [Group(kind, units) for kind, units in kinds.items() if len(units) > 1]
+    if not several:
+        problem_said = "no kind of which the project has two tests or more"
+        raise InputError(setup.project.path, "--over", problem_said)
+    return several
+
+
+def _parts(found: Refound, sort: str) -> list[Group]:
+    """Parts of tests: among those of their comparison, whole comparisons among those of the test.
+
+    Specimens are so drawn direction by direction.
+    """
+    setup, problem = found.setup, found.problem
+    grouped: dict[str, list[Unit]] = {}
+    for part in parts_of(setup, sort, "--over"):
+        alone = {name: mask for name, mask in part.alone.items() if mask.any()}
+        shared = [name for name, mask in alone.items() if not mask.all()]
+        own = shared[0] if shared else setup.tests[part.test].test.name
+        unit = Unit(name_of(setup, part), rows_of(problem, alone))
+        grouped.setdefault(own, []).append(unit)
+    several = [Group(name, units) for name, units in grouped.items() if len(units) > 1]
+    if not several:
+        raise InputError(setup.project.path, "--over", f"no test has two {sort} to draw from")
+    return several
+
+
+def _task(found: Refound, groups: Sequence[Group], seed: int) -> Task:
+    problem = found.setup.problem()
+    # With derivatives, from the unloaded state: every sample starts from here.
+    point = problem.evaluate(found.point.unknowns, True, warm=False)
+    tolerance = found.setup.project.fit.tolerance
+
+    def sample(number: int, tell: Callable[[Any], None]) -> Sample:
+        counts = drawn(groups, np.random.default_rng([seed, number]))
+        own = WeightedProblem.of(problem, factors_of(problem, groups, counts))
+        assert point is not None  # it ran a moment ago
+        best, status = descend(
+            own, own.seen(point), tolerance, MOST, norms=True, damping=DAMPING,
+            negligible=NEGLIGIBLE,
+        )  # fmt: skip
+        return Sample(number, counts, best.unknowns.tolist(), own.analyses, status)
+
+    return sample

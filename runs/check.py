@@ -1,0 +1,185 @@
+"""A look at the data of a project's tests before anything is fitted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from ..experiments.kinds import Exhibit, Expected, FittableTest, Judgement, Output, judged
+from ..experiments.registry import kinds
+from ..materials.forms.base import COMPONENTS
+from ..project.project import Project
+from ..reports.content import Report, Section, Table
+from ..reports.html import write_report
+from ..writing import write_text
+from .setup import FitSetup, prepare_fit
+
+
+def expected_of(setup: FitSetup) -> Expected:
+    """The moduli at rest that the bounds of the law allow, MPa."""
+    bounds, law = setup.bounds, setup.law
+    if bounds.largest is not None:
+        return Expected({n: (bounds.least[n], bounds.largest[n]) for n in COMPONENTS})
+    assert bounds.lower is not None and bounds.upper is not None
+    free = list(law.form.free)
+    ends = []
+    for entries in (bounds.lower, bounds.upper):
+        beta = np.zeros(len(law.form.labels))
+        beta[free] = entries
+        ends.append({name: float(law.with_beta(beta).modulus(name, 0.0)) for name in COMPONENTS})
+    low, high = ends
+    least = {name: max(low[name], bounds.least[name]) for name in COMPONENTS}
+    return Expected({n: (least[n], max(high[n], least[n])) for n in COMPONENTS})
+
+
+def judge(setup: FitSetup) -> tuple[Judgement, ...]:
+    """The doubts of every test whose kind looks at its data; some are trusted by the project.
+
+    Raises
+    ------
+    InputError : the project trusts what is no doubt's name.
+    """
+    trust = setup.project.fit.trust
+    known = sorted({name for kind in kinds().values() for name in getattr(kind, "doubts", ())})
+    for name in trust:
+        if name not in known:
+            problem = f"there is no doubt {name!r}; there are: {', '.join(known)}"
+            raise InputError(setup.project.path, "fit.trust", problem)
+    expected = expected_of(setup)
+    return tuple(
+        judged(one.test.name, look(expected), trust)
+        for one in setup.tests
+        if (look := getattr(one, "doubts", None)) is not None
+    )
+
+
+NOTHING = "nothing doubtful"
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What was seen of the tests, and what makes them doubtful."""
+
+    setup: FitSetup
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether a fit would begin."""
+        return not any(judgement.errors for judgement in self.judgements)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values: what check.json holds."""
+        tests = {
+            j.test: [
+                {
+                    "name": d.name,
+                    "severity": "error" if d.sure else "warning",
+                    "trusted": d.name in j.trusted,
+                    "text": d.text,
+                }
+                for d in j.doubts
+            ]
+            for j in self.judgements
+        }
+        return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
+
+    def _summary(self) -> str:
+        if not self.sound:
+            return "A fit would not begin."
+        doubts = sum(len(judgement.doubts) for judgement in self.judgements)
+        if doubts:
+            return f"A fit would begin, and carry {doubts} of the doubts below with it."
+        return "The data are fit to be fitted."
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Test, what it is, name of the doubt, text: a line a doubt, one for a test without."""
+        rows = []
+        for judgement in self.judgements:
+            for doubt in judgement.doubts:
+                severity = "error" if doubt.sure else "warning"
+                if doubt.name in judgement.trusted:
+                    severity = f"trusted {severity}"
+                rows.append((judgement.test, severity, doubt.name, doubt.text))
+            if not judgement.doubts:
+                rows.append((judgement.test, "fine", "", NOTHING))
+        return rows
+
+    def lines(self) -> list[str]:
+        """For a terminal."""
+        return [
+            f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
+            for test, severity, name, text in self.rows()
+        ]
+
+    def report(self, folder: Path | str) -> Path:
+        """Write check.json, the tests' own figures and report.html; the page.
+
+        Raises
+        ------
+        OutputError : they cannot be written.
+        """
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "check.json", json.dumps(self.result, indent=1) + "\n")
+        several = len(self.setup.tests) > 1
+        exhibits: list[tuple[str, Exhibit]] = []
+        for one in self.setup.tests:
+            if (examine := getattr(one, "examine", None)) is not None:
+                out = Output.of(folder, one.test.name, several)
+                exhibits.append((one.test.name, examine(out)))
+        header = ["test", "", "doubt", "what was seen"]
+        doubts = Table("Doubts", header, [list(row) for row in self.rows()], text=(1, 2, 3))
+        facts = [
+            (f"{name}: {label}" if several else label, value)
+            for name, exhibit in exhibits
+            for label, value in exhibit.facts
+        ]
+        report = Report(
+            title=f"{self.setup.project.title}: a look at the data",
+            summary=self._summary(),
+            facts=facts,
+            warnings=[
+                words
+                for j in self.judgements
+                for words in (
+                    *(f"{j.test}: {d.text}" for d in j.errors),
+                    *(n.line for n in j.notes),
+                )
+            ],
+            sections=[
+                Section("Doubts", [doubts]),
+                Section(
+                    "What was seen",
+                    [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
+                ),
+            ],
+            files=[("check.json", "the doubts in plain values")],
+            versions={"bubblefit": __version__},
+        )
+        return write_report(folder, report)
+
+
+def check(
+    project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = ()
+) -> Check:
+    """Look at the data of tests; of all that can be fitted unless some are named.
+
+    trust : names of doubts that stop nothing, beside those of the project.
+
+    Raises
+    ------
+    InputError : data that cannot be read, a doubt that there is not. SolverFailure : a known
+        solution cannot be run.
+    """
+    project = project.with_fit(trust=[*project.fit.trust, *trust])
+    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
+    return Check(setup, judge(setup))

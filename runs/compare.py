@@ -1,0 +1,396 @@
+"""Which form of the moduli do the tests support? Fits of several forms, cross-validated."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError, NoFeasibleStart
+from ..experiments.kinds import FittableTest, Masks
+from ..inference.problem import FitProblem
+from ..inference.resampling import folds_of
+from ..inference.search import feasible_start, fit_from
+from ..materials.forms.registry import form_names, form_settings, of_load_ratio
+from ..notes import Note, NoteKind
+from ..project.project import Project
+from ..solvers.base import carries_load_ratios
+from .fit import FitEvent
+from .result import Fit
+from .series import begin_study, mark_of, read_marked, write_marked
+from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
+from .stored_fit import stored_fit
+
+#: Of a spline, where neither the project nor the caller says how many.
+KNOTS = 6
+
+
+def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
+    """The project with each of the forms asked for, by name; with all unless any is.
+
+    All are those that the project's solver carries.
+
+    names : of forms; "spline:8" is a spline of eight knots for each modulus.
+
+    Raises
+    ------
+    InputError : no such form, or bounds that do not go with every form.
+    """
+    bounds = project.law.bounds
+    if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
+        problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
+        raise InputError(project.path, "law.bounds", problem)
+    own = project.law.model_extra or {}
+    chosen: dict[str, Project] = {}
+    for asked in names or _carried(project):
+        form, _, knots = asked.partition(":")
+        settings: dict[str, Any] = {}
+        if form not in form_names():
+            problem = f"there is no form {form!r}; there are: {', '.join(form_names())}"
+            raise InputError(None, "--form", problem)
+        if knots and (not knots.isdecimal() or "knots" not in form_settings(form)):
+            problem = f"expected a form, or one with its number of knots (spline:8), got {asked!r}"
+            raise InputError(None, "--form", problem)
+        if knots:
+            settings = {"knots": int(knots)}
+        elif "knots" in form_settings(form) and "knots" not in own:
+            asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
+        chosen[asked] = project.with_law(form, settings)
+    return chosen
+
+
+def _carried(project: Project) -> list[str]:
+    carries = carries_load_ratios(make_solver(project))
+    return [name for name in form_names() if carries or not of_load_ratio(name)]
+
+
+def plain(name: str) -> str:
+    """A form's name as that of a folder."""
+    return name.replace(":", "-")
+
+
+@dataclass(frozen=True)
+class FoldError:
+    """One fold: errors at the points left out.
+
+    value : their part of the objective; rms : root mean square by comparison, in its unit. None and
+    empty where no fit without them, or no analysis, ended well.
+    """
+
+    fold: int
+    value: float | None
+    rms: Mapping[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, exact in JSON."""
+        return asdict(self)
+
+
+def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
+    """Number of the specimen of each point that can be left out, by comparison."""
+    return {name: list(own) for test in setup.tests for name, own in test.specimens.items()}
+
+
+def folds(setup: FitSetup, count: int) -> list[Masks]:
+    """Which points the folds keep: at most `count` folds, and no more than there are specimens."""
+    whose = specimens_of(setup)
+    several = [len(set(own)) for own in whose.values() if len(set(own)) > 1]
+    return folds_of(whose, min([count, *several]), setup.project.fit.seed)
+
+
+def validate(
+    setup: FitSetup, count: int, starts: int, done: Collection[int] = ()
+) -> Iterator[FoldError | None]:
+    """Fit without the points of each fold and judge at these points; None now and then.
+
+    What follows from the data (strain range and breaks of the law, what a relative error is over)
+    follows from the points matched, and the fits begin at random starts of their own: nothing of
+    the points left out is in them but how far the models are strained, to be judged there.
+
+    Parameters
+    ----------
+    count : of folds, at most. starts : random starts a fold, the best of which counts. done : folds
+        that are known already.
+    """
+    parts = folds(setup, count)
+    missing = [fold for fold in range(len(parts)) if fold not in done]
+    prepare = functools.partial(_task, setup, parts, starts)
+    if not missing:
+        return iter(())
+    return setup.project.executor.run_tasks(prepare, missing, "folds")
+
+
+def _task(
+    setup: FitSetup, parts: list[Masks], starts: int
+) -> Callable[[int, Callable[[Any], None]], FoldError]:
+    return lambda fold, tell: _fold(setup, fold, parts[fold], starts)
+
+
+def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.ndarray | None]:
+    """The fit with a law of the points that the masks keep; unknowns None where all starts fail."""
+    law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
+    own = replace(setup, law=law)
+    return own, best_of(own, own.problem(masks), starts)
+
+
+def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
+    own, unknowns = fit_of(setup, masks, starts)
+    if unknowns is None:
+        return FoldError(fold, None, {})
+    whole = own.problem({name: ~mask for name, mask in masks.items()})
+    judged = whole.part([k for k, c in enumerate(whole.comparisons) if c.name in masks])
+    point = judged.evaluate(unknowns, False, warm=False)
+    if point is None:
+        return FoldError(fold, None, {})
+    return FoldError(
+        fold, part_of_objective(judged, point.residual), errors(judged, point.residual)
+    )
+
+
+def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
+    """Unknowns of the best of some starts; None where all failed."""
+    best, least = None, np.inf
+    for number in range(starts):
+        problem.reset()
+        try:
+            start = feasible_start(problem, setup.project.fit.seed, number)
+        except NoFeasibleStart:
+            continue
+        optimum = fit_from(problem, start, setup.options)
+        if optimum is not None and optimum.value < least:
+            best, least = optimum.best.unknowns, optimum.value
+    return best
+
+
+def part_of_objective(problem: FitProblem, residual: np.ndarray) -> float:
+    """What the problem's comparisons add to the objective."""
+    return float(problem.blocks.norms(residual).sum())
+
+
+def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
+    """Root mean square by comparison, in its unit."""
+    misfit = residual * problem.scale
+    return {
+        c.name: float(np.sqrt(np.mean(misfit[problem.rows(k)] ** 2)))
+        for k, c in enumerate(problem.comparisons)
+    }
+
+
+VALIDATION = "validation.json"
+
+
+def validated_folds(
+    setup: FitSetup,
+    found: Fit,
+    folds: int,
+    starts: int,
+    folder: Path | None,
+    tell: Callable[[FoldError | None], None],
+) -> tuple[FoldError, ...]:
+    """Errors of the folds, as they were written where they are of this fit.
+
+    folds, starts : how many folds at most, and random starts of each. folder : of the fit, where
+    the errors are written; None where nothing is. tell : hears each fold that ended, and time pass.
+    """
+    parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
+    mark = mark_of(parts)
+    known = {} if folder is None else written_folds(folder / VALIDATION, mark)
+    for event in validate(setup, folds, starts, tuple(known)):
+        if event is not None:
+            known[event.fold] = event
+            if folder is not None:
+                plain = [known[fold].to_json() for fold in sorted(known)]
+                write_marked(folder, VALIDATION, mark, {"folds": plain})
+        tell(event)
+    return tuple(known[fold] for fold in sorted(known))
+
+
+def written_folds(path: Path, mark: str) -> dict[int, FoldError]:
+    """What an interrupted run has validated already, by fold; nothing of another fit."""
+    found = read_marked(path, mark, lambda told: [FoldError(**fold) for fold in told["folds"]])
+    return {error.fold: error for error in found or ()}
+
+
+#: Of the smallest cross-validated error: a simpler form within it is as good.
+AS_GOOD = 0.05
+#: Starts of the fit of a form, and of the fit of a fold, unless said otherwise.
+STARTS, FOLD_STARTS = 5, 2
+FOLDS = 5
+LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
+
+#: Told the name of each form as its turn comes, then the records of its starts and folds; None
+#: now and then.
+Progress = Callable[[str | FitEvent | FoldError | None], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FormFit:
+    """One form of the moduli: its best fit, and its errors in the folds.
+
+    name : as it was asked for. compared : the comparisons whose points can be left out.
+    """
+
+    name: str
+    fit: Fit
+    folds: tuple[FoldError, ...]
+    compared: tuple[str, ...]
+
+    @property
+    def coefficients(self) -> int:
+        """How many are fitted."""
+        return self.fit.problem.unknowns.size
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Error of the fit to all points, by comparison, in its unit."""
+        return errors(self._judged, self._residual)
+
+    @property
+    def fitted(self) -> float:
+        """What those comparisons leave of the objective in the fit to all points."""
+        return part_of_objective(self._judged, self._residual)
+
+    def left_out(self, comparison: str | None = None) -> list[float]:
+        """Error of each fold at the points left out, NaN where it failed.
+
+        Their part of the objective, or the root mean square of one comparison in its unit.
+        """
+        if comparison is not None:
+            return [fold.rms.get(comparison, math.nan) for fold in self.folds]
+        return [math.nan if fold.value is None else fold.value for fold in self.folds]
+
+    @property
+    def validated(self) -> float:
+        """Mean of the folds' errors, NaN where any of them failed."""
+        return float(np.mean(self.left_out()))
+
+    @property
+    def _numbers(self) -> list[int]:
+        whole = self.fit.problem.comparisons
+        return [k for k, c in enumerate(whole) if c.name in self.compared]
+
+    @property
+    def _judged(self) -> Any:
+        return self.fit.problem.part(self._numbers)
+
+    @property
+    def _residual(self) -> np.ndarray:
+        rows = [self.fit.problem.rows(k) for k in self._numbers]
+        return np.concatenate([self.fit.best.point.residual[part] for part in rows])
+
+
+@dataclass(frozen=True, eq=False)
+class LawComparison:
+    """Forms of the moduli side by side, in the order in which they were asked for."""
+
+    forms: tuple[FormFit, ...]
+    fold_starts: int
+
+    @property
+    def project(self) -> Project:
+        """The project, with the first of the forms."""
+        return self.forms[0].fit.project
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader should know of every form's fit, and of its folds."""
+        notes = []
+        for form in self.forms:
+            lost = [fold.fold + 1 for fold in form.folds if fold.value is None]
+            own = [Note(NoteKind.FOLD, LOST, f"fold {fold}") for fold in lost]
+            notes += [note.about(form.name) for note in (*form.fit.notes, *own)]
+        return notes
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values: what result.json holds."""
+        from ..reports.law_page import result_of
+
+        return result_of(self)
+
+    def report(self, folder: Path | str) -> Path:
+        """Write comparison.csv, figures, report.html and, last, result.json; the page's path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from ..reports.law_page import write_comparison
+
+        return write_comparison(self, Path(folder))
+
+
+def compare_laws(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    forms: Sequence[str] = (),
+    *,
+    folds: int = FOLDS,
+    starts: int = STARTS,
+    fold_starts: int = FOLD_STARTS,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
+) -> LawComparison:
+    """Fit every form to the tests, then without some specimens, and judge it at those.
+
+    Tests whose specimens are not known stay whole in every fold.
+
+    Parameters
+    ----------
+    tests : by name or kind; every test that can be fitted unless given.
+    forms : as for `candidates`.
+    folds : at most; fold_starts : random starts of the fit of each.
+    starts : random starts of the fit of each form.
+    out : folder with a folder for each form, in which everything is written as it ends.
+    command_line : as for `fit`.
+
+    Raises
+    ------
+    InputError : in the project or its data, no test with specimens, nothing to go on with.
+    OutputError, NoFeasibleStart, SolverFailure : as `fit`.
+    """
+    tell = progress or (lambda event: None)
+    # All of them first: a mistake in the project shows before the first fit.
+    projects = candidates(project.with_fit(starts=starts), forms)
+    chosen = project.chosen(tests, fitted=True)
+    setups = {name: prepare_fit(own, _fittable(chosen)) for name, own in projects.items()}
+    compared = tuple(specimens_of(next(iter(setups.values()))))
+    if not compared:
+        problem = (
+            "no test has specimens that a fit could do without: strips need measured points and "
+            'match = "points"'
+        )
+        raise InputError(project.path, "", problem)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        parts = {"version": __version__, "folds": str(folds), "fold starts": str(fold_starts)}
+        begin_study(folder, parts, resume, overwrite, map(plain, projects))
+    done = []
+    for name, own in projects.items():
+        tell(name)
+        place = None if folder is None else folder / plain(name)
+        found = stored_fit(
+            own,
+            [test.name for test in chosen],
+            place,
+            resume=resume,
+            overwrite=overwrite,
+            progress=tell,
+            command_line=command_line,
+        )
+        errors = validated_folds(setups[name], found, folds, fold_starts, place, tell)
+        done.append(FormFit(name, found, errors, compared))
+    return LawComparison(tuple(done), fold_starts)
+
+
+def _fittable(tests: Sequence[Any]) -> Sequence[FittableTest]:
+    return tests

@@ -1,0 +1,360 @@
+"""A fit: every start of the chosen tests, the best of them once more, and what it means."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NoFeasibleStart, SolverFailure
+from ..experiments.kinds import FittableTest
+from ..inference.problem import FitProblem
+from ..materials.forms.base import COMPONENTS
+from ..project.project import Project, settings_of
+from ..reports.fit_page import failure_page
+from .best import BestFit, best_fit, with_certainty
+from .check import judge
+from .folder import Store
+from .record import Record, data_rows, facts_of, solver_facts, this_run
+from .result import Fit
+from .setup import FitSetup, coarse_problem, fingerprints, prepare_fit
+from .starts import (
+    HISTORY,
+    STARTS,
+    EvaluationRecord,
+    RunningFiles,
+    Stage,
+    StartRecord,
+    log_record,
+    run_start,
+    timed,
+)
+from .workers import Task
+
+Array = NDArray[np.float64]
+
+#: Optima are one where no modulus differs by more over the strains reached, relative: starts that
+#: end in one and the same optimum of a real test differ by up to 0.7 % ...
+SAME_MODULI = 0.02
+#: ... and the objectives by no more, relative, beside the fit's tolerance.
+SAME_OBJECTIVE = 0.01
+#: Strains at which moduli are compared.
+POINTS = 31
+
+
+def distinct(
+    problem: FitProblem, records: Sequence[StartRecord], tolerance: float
+) -> list[list[StartRecord]]:
+    """Starts that ended in the same optimum together, each group in the order of their numbers.
+
+    Each is compared with the first of a group: by its moduli up to the strains that either of the
+    two optima reached, and by what it leaves. So groups do not depend on starts of higher numbers.
+    One without an optimum is a group of its own.
+
+    tolerance : of the objective; below it objectives are the same.
+    """
+    groups: list[list[StartRecord]] = []
+    for record in sorted(records, key=lambda r: r.number):
+        same = (g for g in groups if _are_one(problem, g[0], record, tolerance))
+        group = next(same, None)
+        if group is None:
+            groups.append([record])
+        else:
+            group.append(record)
+    return groups
+
+
+def _are_one(problem: FitProblem, a: StartRecord, b: StartRecord, tolerance: float) -> bool:
+    if a.objective is None or b.objective is None:
+        return False
+    room = tolerance + SAME_OBJECTIVE * min(a.objective, b.objective)
+    if abs(a.objective - b.objective) > room:
+        return False
+    return moduli_apart(problem, a, b) <= SAME_MODULI
+
+
+def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
+    """Largest relative difference of a modulus between two optima, over the strains reached."""
+    one, other = (problem.unknowns.law(problem.law, np.array(record.unknowns)) for record in (a, b))
+    ends = np.maximum(a.reached, b.reached)
+    apart = []
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, ends[component], POINTS)
+        apart.append(np.abs(one.modulus(name, strain) / other.modulus(name, strain) - 1.0).max())
+    return float(max(apart))
+
+
+# All starts of a fit: each on its mesh, or all on a coarse one and what differs on the full one.
+#
+# A start takes most of its analyses to come near an optimum, and an optimum of a coarse mesh is
+# near one of the full mesh. So all starts can run on quads of twice the edge; one start of each
+# distinct optimum there goes on to the full mesh, from where it ended, and the others take its
+# fit.
+
+Event = EvaluationRecord | StartRecord
+Records = Iterator[Event | None]
+
+
+def every_start(
+    setup: FitSetup,
+    done: Sequence[StartRecord],
+    ran: Callable[[Event | None], None],
+    told: Callable[[StartRecord | Stage], None],
+) -> list[StartRecord]:
+    """How every start of a fit ended, by number.
+
+    Parameters
+    ----------
+    done : starts that have ended before. ran : is given every record as it ends, None now and then.
+    told : is given a stage as it begins, and the records of it that were there before.
+    """
+    fit, executor = setup.project.fit, setup.project.executor
+    full, coarse = (
+        {r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
+        for mesh in ("full", "coarse")
+    )
+    if not fit.coarse_to_fine or coarse_problem(setup) is None:
+        for record in full.values():
+            told(record)
+        missing = [n for n in range(fit.starts) if n not in full]
+        full |= _ended(executor.run_starts(setup.problem, setup.options, fit.seed, missing), ran)
+        return [full[n] for n in sorted(full)]
+
+    told(Stage("starts on the coarse mesh", fit.starts))
+    for record in coarse.values():
+        told(record)
+    missing = [n for n in range(fit.starts) if n not in coarse]
+    build = functools.partial(_coarse_problem, setup)
+    coarse |= _ended(executor.run_starts(build, setup.options, fit.seed, missing, "coarse"), ran)
+
+    groups = distinct(setup.problem(), list(coarse.values()), fit.tolerance)
+    told(Stage("distinct optima on the full mesh", len(groups)))
+    for group in groups:
+        if (fitted := _fit_of(group, full)) is not None:
+            told(fitted)
+    open_groups = [g for g in groups if _fit_of(g, full) is None]
+    prepare = functools.partial(_going_on, setup, open_groups)
+
+    def lost(number: int, why: str) -> StartRecord:
+        coarse = open_groups[number][-1]
+        return replace(coarse, objective=None, status=why, failure=why, mesh="full")
+
+    numbers = range(len(open_groups))
+    full |= _ended(executor.run_tasks(prepare, numbers, "optima", lost), ran)
+    ended = [record for group in groups for record in one_fit(group, full)]
+    return sorted(ended, key=lambda record: record.number)
+
+
+def _ended(
+    records: Iterable[Event | None], ran: Callable[[Event | None], None]
+) -> dict[int, StartRecord]:
+    ended = {}
+    for record in records:
+        ran(record)
+        if isinstance(record, StartRecord):
+            ended[record.number] = record
+    return ended
+
+
+def _coarse_problem(setup: FitSetup) -> FitProblem:
+    problem = coarse_problem(setup)
+    assert problem is not None  # it was there before
+    return problem
+
+
+def _going_on(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
+    """Fits a group on the full mesh: from its first start's optimum, or the next where that fails.
+
+    A start without an optimum on the coarse mesh begins where it was drawn.
+    """
+    problem, seed = setup.problem(), setup.project.fit.seed
+
+    def fit(number: int, tell: Callable[[Event], None]) -> StartRecord:
+        *others, last = groups[number]
+        for coarse in others:
+            record = run_start(problem, setup.options, seed, coarse.number, tell, coarse=coarse)
+            if record.objective is not None:
+                return record
+            tell(record)
+        return run_start(problem, setup.options, seed, last.number, tell, coarse=last)
+
+    return fit
+
+
+def _fit_of(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> StartRecord | None:
+    """The fit on the full mesh that a group has."""
+    own = (full[record.number] for record in group if record.number in full)
+    return next((record for record in own if record.objective is not None), None)
+
+
+def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> Iterator[StartRecord]:
+    """Every start of a group, with its fit on the full mesh: its own, or that of the group."""
+    fit = _fit_of(group, full)
+    for coarse in group:
+        own = full.get(coarse.number)
+        if own is not None:
+            yield own
+            continue
+        assert fit is not None  # where none has a fit, each was tried
+        yield replace(
+            fit,
+            number=coarse.number,
+            seed=coarse.seed,
+            status=f"as start {fit.number}",
+            analyses=coarse.analyses,
+            wall_s=coarse.wall_s,
+            external_runs=coarse.external_runs,
+            cached_runs=coarse.cached_runs,
+            failure="",
+            coarse_objective=coarse.objective,
+            coarse_analyses=coarse.analyses,
+            same_as=fit.number,
+        )
+
+
+FitEvent = EvaluationRecord | StartRecord | Stage
+#: Is told of every analysis and every start as it ends, of a stage of several as it begins, and of
+#: time passing (None).
+Progress = Callable[[FitEvent | None], None]
+
+
+def fit(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    starts_from: str | None = None,
+    earlier: Path | str | None = None,
+    method: str | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    trust: Sequence[str] = (),
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
+) -> Fit:
+    """Fit the law of a project to its tests, from random feasible starts.
+
+    Parameters
+    ----------
+    tests : names of tests, or a kind of test; every test that can be fitted unless given.
+    starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
+        cores unless the project says otherwise.
+    scheduler : address of a Dask scheduler, whose workers run the starts instead of this machine.
+    starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", by what the fit in the
+        folder `earlier` evaluated.
+    trust : names of doubts about the data that stop nothing, beside those of the project.
+    out : folder in which every analysis and start is written as it ends, so that an interrupted
+        fit can be gone on with (`resume`); nothing is written without it.
+    overwrite : replace what the folder holds.
+    progress : is told of every record; None now and then while nothing ends. An interrupt
+        (Ctrl-C) leaves the folder ready for `resume`.
+    command_line : of the command that asks, for the record; None where Python does.
+
+    Returns
+    -------
+    The result: card, moduli and residuals as tables, `report(folder)` for the page.
+
+    Raises
+    ------
+    InputError : in the project or its data, or nothing to go on with. OutputError : the folder is
+        used or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is
+        not there, it failed in every start, or the best fit does not run again or gives another
+        objective: then the page in `out` says so, and there is no result.
+    """
+    begun = time.perf_counter()
+    trusted = [*project.fit.trust, *trust]
+    project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
+    project = project.with_fit(
+        starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute())
+    )
+    project = project.with_scheduler(scheduler)
+    project.executor.check()
+    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    with timed("tests and their data made ready"):
+        setup = prepare_fit(project, chosen)
+    problem = setup.problem()
+    judgements = judge(setup)
+    for judgement in judgements:
+        judgement.demand(project.path)
+    record = _record(setup, problem, command_line)
+    files = None
+    done: list[StartRecord] = []
+    if out is not None:
+        store = Store(Path(out))
+        facts = facts_of(setup, problem.solver, record.data)
+        parts = fingerprints(setup, problem)
+        if store.begin(parts, resume, overwrite, (STARTS, HISTORY), facts):
+            record = record.after(store.path)
+        record.write(store.path)
+        unknowns, scales = problem.unknowns, project.scales
+        columns = [f"{label}_{scales.modulus_unit}" for label in unknowns.labels]
+        scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
+        files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
+        done = files.begin(resume)
+    with failure_page(None if out is None else Path(out), project.title):
+        with timed("all starts"):
+            records = _records(setup, files, done, progress or _nobody)
+        with timed("the best fit once more, and how sure it is"):
+            best = with_certainty(setup, problem, _best(problem, records, project))
+    return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
+
+
+def _record(setup: FitSetup, problem: FitProblem, command_line: Sequence[str] | None) -> Record:
+    project, tests = setup.project, [(test.test.name, test) for test in setup.tests]
+    return Record(
+        project.path,
+        None if project.written is None else project.written.text,
+        None if project.written is None else settings_of(project, [name for name, _ in tests]),
+        data_rows(tests),
+        solver_facts(project.fit.solver, problem.solver.identity),
+        [this_run(command_line)],
+    )
+
+
+def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:
+    """The best of the starts, run again; raises NoFeasibleStart, SolverFailure."""
+    if any(r.objective is not None for r in records):
+        return best_fit(problem, records, project.fit.tolerance)
+    failed = next((r for r in records if r.failure), None)
+    if failed is None:
+        raise NoFeasibleStart(f"{project.path}: no feasible start: {records[0].status}")
+    problem_said = f"no start ended with a fit: {failed.failure}"
+    raise SolverFailure(f"{problem_said}; --resume tries again", problem.solver.name)
+
+
+def _records(
+    setup: FitSetup,
+    files: RunningFiles | None,
+    done: Sequence[StartRecord],
+    progress: Progress,
+) -> list[StartRecord]:
+    """Every start: those that are finished already, and the others side by side."""
+
+    def ran(record: EvaluationRecord | StartRecord | None) -> None:
+        if record is not None and files is not None:
+            files.add(record)
+        log_record(record)
+        progress(record)
+
+    try:
+        records = every_start(setup, done, ran, progress)
+    finally:
+        if files is not None:
+            files.close()
+    if files is not None:
+        files.finish()
+    return records
+
+
+def _nobody(record: Any) -> None:
+    """Nobody wants to know."""

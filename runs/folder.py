@@ -1,0 +1,367 @@
+"""The output folder of a fit or of a series of predictions: whose it is, and going on with it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shutil
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, OutputError
+from ..experiments.kinds import RunRecord
+from ..notes import Note, NoteKind
+from ..solvers.base import History
+from ..solvers.run_cache import RunCache
+from ..writing import remove_cut, replacing, telling, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Of a checksum, what tells two apart for a reader.
+DIGITS = 12
+#: Beyond, numbers of two lists are not named one by one, and texts are cut.
+FEW, LONG = 3, 60
+CHECKSUM = re.compile("[0-9a-f]{64}")
+NOT_SAID = "not given"
+
+#: Everything that results depend on, in plain values: `version` of bubblefit; `solver`, its name
+#: and what it says of itself; `settings`, as the project file says them; `tests`, the settings of
+#: each by name; `files`, name and sha256 of the data files of each test, in order.
+Facts = Mapping[str, Any]
+
+
+def differences(before: Facts, now: Facts) -> list[str]:
+    """What differs between the facts of two runs, one thing each: key, old value, new value."""
+    words = list(_values("version of bubblefit", before.get("version"), now.get("version")))
+    words += _solvers(before.get("solver", {}), now.get("solver", {}))
+    words += _tables("", before.get("settings", {}), now.get("settings", {}))
+    tests, others = before.get("tests", {}), now.get("tests", {})
+    if list(tests) != list(others):
+        words.append(f"the tests: {', '.join(tests)}, now {', '.join(others)}")
+    for name in tests:
+        if name in others:
+            words += _tables(f"{name}.", tests[name], others[name])
+            files = before.get("files", {}).get(name, []), now.get("files", {}).get(name, [])
+            words += _files(name, *files)
+    return words
+
+
+def _solvers(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    if before.get("name") != now.get("name"):
+        yield from _values("the solver", before.get("name"), now.get("name"))
+        return  # what one says of itself, the other cannot
+    yield from _tables(f"the solver {now.get('name')}: ", before, now)
+
+
+def _tables(head: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    for key in dict.fromkeys([*before, *now]):
+        yield from _values(f"{head}{key}", before.get(key), now.get(key))
+
+
+def _values(key: str, before: Any, now: Any) -> Iterable[str]:
+    if before == now:
+        return []
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        return _tables(f"{key}.", before, now)
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        pairs = [(i, a, b) for i, (a, b) in enumerate(zip(before, now, strict=True)) if a != b]
+        if len(pairs) <= FEW:
+            return [words for i, a, b in pairs for words in _values(f"{key}[{i}]", a, b)]
+    return [f"{key} = {_said(before)}, now {_said(now)}"]
+
+
+def _said(value: Any) -> str:
+    if value is None:
+        return NOT_SAID
+    if isinstance(value, str) and CHECKSUM.fullmatch(value):
+        return f"sha256 {value[:DIGITS]}"
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= LONG else f"{text[:LONG]}..."
+
+
+def _files(
+    test: str, before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]]
+) -> Iterator[str]:
+    if len(before) != len(now):
+        yield f"{len(before)} data files of {test!r}, now {len(now)}"
+        return
+    for old, new in zip(before, now, strict=True):
+        if old["sha256"] == new["sha256"]:
+            continue
+        marks = old["sha256"][:DIGITS], new["sha256"][:DIGITS]
+        if old["name"] == new["name"]:
+            yield f"data file {old['name']} of {test!r} (sha256 {marks[0]}, now {marks[1]})"
+        else:
+            files = f"{old['name']} ({marks[0]}), now {new['name']} ({marks[1]})"
+            yield f"data file of {test!r}, by sha256: {files}"
+
+
+RUN, RESULT = "run.json", "result.json"
+#: What results came from, and the project as it was run.
+PROVENANCE, AS_RUN = "provenance.json", "as-run.toml"
+#: What only a complete result has, beside it: a page and a card of an earlier one must not stand
+#: beside a later one that failed.
+OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
+#: What run.json must hold of a folder that an older version wrote: it can be replaced only.
+PARTS = "parts"
+#: What of them can be told in words.
+FACTS = "facts"
+
+
+def usual_folder(project: Path) -> Path:
+    """out/NAME below the current folder, after the project's folder and file."""
+    name = project.resolve().parent.name
+    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+
+
+class Store:
+    """A folder that holds one fit, or one series of predictions.
+
+    run.json says whose it is; result.json is written last and taken away first, so that where it
+    is, everything is complete. What is written in between (`records`, names below the folder) is
+    known to whoever writes it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def used(self) -> bool:
+        """Whether the folder holds anything of a fit or of predictions."""
+        return (self.path / RUN).exists() or (self.path / RESULT).exists()
+
+    def begin(
+        self,
+        parts: Mapping[str, str],
+        resume: bool,
+        overwrite: bool,
+        records: Sequence[str] = (),
+        facts: Facts | None = None,
+    ) -> bool:
+        """Make the folder ready; whether there is something to go on with.
+
+        Parameters
+        ----------
+        parts : what has to be the same for going on, each part (project, data, solver, version) as
+            a digest by its name; empty where every record carries a digest of its own.
+        records : files below the folder that go when the folder is not gone on with.
+        facts : behind the digests, in plain values: a difference is told by them.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written, or is used and neither `resume` nor `overwrite`
+            is given.
+        InputError : `resume`, but there is nothing to go on with, it is something else (named), or
+            it is not readable.
+        """
+        if self.used and not (resume or overwrite):
+            raise OutputError(
+                f"{self.path}: already holds results; go on with --resume, replace them with "
+                "--overwrite, or name another folder with --out"
+            )
+        if resume and not self.used:
+            problem = "holds nothing to go on with; leave --resume out, or name another with --out"
+            raise InputError(self.path, "", problem)
+        if resume:
+            self._check(parts, facts or {})
+        remove_cut(self.path)
+        with telling(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            for name in (*OUTDATED, *(() if resume else records)):
+                (self.path / name).unlink(missing_ok=True)
+        if not resume:
+            content = {PARTS: dict(parts), FACTS: dict(facts or {})}
+            self.write(RUN, json.dumps(content, indent=1) + "\n")
+        return resume
+
+    def forget(self) -> None:
+        """Make a folder whose results are to be replaced one that holds nothing to go on with.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        with telling(self.path):
+            for name in (RESULT, RUN):
+                (self.path / name).unlink(missing_ok=True)
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file whole or not at all.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        write_text(self.path / name, text)
+
+    def finish(self, result: Mapping[str, Any]) -> None:
+        """Write result.json, after everything else.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        self.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
+
+    def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
+        path = self.path / RUN
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            before, known = content[PARTS], content.get(FACTS, {})
+            other = [name for name in {**before, **parts} if before.get(name) != parts.get(name)]
+            words = differences(known, facts) if other and known else []
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(path, "", "is missing or damaged; use --overwrite") from None
+        if other:
+            # Without words: of an older version, or what differs is in nothing that can be told.
+            what = "; ".join(words) or f"another {' and '.join(sorted(other))}"
+            problem = (
+                f"these results are of something else: {what}"
+                if words
+                else (f"this folder's results are of {what}")
+            )
+            raise InputError(path, PARTS, f"{problem}; go on with the same, or use --overwrite")
+
+
+CSV, PARQUET = ".csv", ".parquet"
+
+
+def write_table(table: pd.DataFrame, path: Path | str) -> Path:
+    """Write a table into the format that the file's name ends in.
+
+    Numbers of a CSV have nine digits; those of a Parquet file are as they are.
+
+    Raises
+    ------
+    InputError : neither .csv nor .parquet, or Parquet without pyarrow. OutputError : the file
+        cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (CSV, PARQUET):
+        raise InputError(path, "", f"expected a name that ends in {CSV} or {PARQUET}")
+    if kind == PARQUET and importlib.util.find_spec("pyarrow") is None:
+        problem = "needs pyarrow, which is not installed: pip install 'bubblefit[parquet]'"
+        raise InputError(path, PARQUET, f"{problem}, or write a {CSV}")
+    with replacing(path) as temporary:
+        if kind == PARQUET:
+            table.to_parquet(temporary, engine="pyarrow", index=False)
+        else:
+            table.to_csv(temporary, index=False, float_format="%.9g")
+    return path
+
+
+RUNS = "runs"
+
+
+class RunRecords:
+    """The runs in an output folder, each under a mark of everything that it depends on."""
+
+    def __init__(self, path: Path) -> None:
+        self.store = Store(path)
+
+    def begin(self, resume: bool, overwrite: bool) -> None:
+        """Make the folder ready; without `resume` no run is left in it.
+
+        Raises
+        ------
+        OutputError, InputError : as `Store.begin`.
+        """
+        folder = self.store.path / RUNS
+        # A name with a dot before it is a file whose writing was cut off.
+        cut = [path for path in folder.glob(".*.npz")]
+        held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz") if path not in cut]
+        self.store.begin({}, resume, overwrite, held)
+        for path in cut:
+            path.unlink(missing_ok=True)
+
+    def write(self, mark: str, record: RunRecord) -> None:
+        """Write a run, whole or not at all; one that failed is tried again next time.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        if record.failure:
+            return
+        words = {
+            "seconds": record.seconds,
+            "early": record.early,
+            "iterations": record.iterations,
+            "unstable": record.unstable,
+            "remarks": [(note.kind, note, note.of) for note in record.remarks],
+            "arrays": list(record.arrays),
+            "from_cache": record.from_cache,
+        }
+        arrays: dict[str, Any] = {f"of_{name}": array for name, array in record.arrays.items()}
+        arrays["words"] = np.array(json.dumps(words))
+        arrays["strain"] = np.empty(0) if record.strain is None else record.strain
+        with replacing(self._file(mark)) as path:
+            np.savez_compressed(path, **arrays)
+
+    def read(self, mark: str) -> RunRecord | None:
+        """The run under this mark; None where there is none, or a damaged one."""
+        # KeyError, TypeError: not one of ours. The rest: cut off, or not an archive at all.
+        with suppress(OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+            with np.load(self._file(mark), allow_pickle=False) as content:
+                words = json.loads(str(content["words"]))
+                strain = np.array(content["strain"], dtype=float)
+                arrays = {n: np.array(content[f"of_{n}"], dtype=float) for n in words["arrays"]}
+            return RunRecord(
+                float(words["seconds"]),
+                early=str(words["early"]),
+                strain=strain if len(strain) else None,
+                arrays=arrays,
+                iterations=int(words["iterations"]),
+                unstable=None if words["unstable"] is None else tuple(words["unstable"]),
+                remarks=tuple(Note(NoteKind(kind), *said) for kind, *said in words["remarks"]),
+                from_cache=bool(words.get("from_cache", False)),
+            )
+        return None
+
+    def _file(self, mark: str) -> Path:
+        return self.store.path / RUNS / f"{mark[:20]}.npz"
+
+
+FOLDER = "analyses"
+
+
+class KeptAnalyses(RunCache):
+    """Those of a study that writes into `folder`, each under a key of all that it depends on.
+
+    Of another project or card none is taken. Nothing is touched before the first analysis; then,
+    without `resume`, what is there goes.
+
+    Raises
+    ------
+    InputError : `resume`, but there is nothing to go on with.
+    """
+
+    def __init__(self, folder: Path, resume: bool) -> None:
+        super().__init__(folder / FOLDER)
+        if resume and not self.folder.is_dir():
+            problem = "holds nothing to go on with; leave --resume out, or name another with --out"
+            raise InputError(folder, "", problem)
+        self._resume, self._begun = resume, False
+
+    def read(self, key: str) -> History | None:
+        """As of `RunCache`; raises OutputError where what is there cannot be removed."""
+        if not self._begun:
+            self._begun = True
+            remove_cut(self.folder.parent)
+            with telling(self.folder):
+                if self.folder.exists() and not self._resume:
+                    shutil.rmtree(self.folder)
+        return super().read(key)
+
+    def not_kept(self, error: OSError) -> None:
+        """Raises OutputError: the study's own tables would not be written either."""
+        with telling(self.folder):
+            raise error

@@ -1,0 +1,278 @@
+"""How much the response of a test depends on nu12, with the moduli as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, SolverFailure
+from ..materials.card import MaterialCard
+from ..notes import Note, NoteKind, rows
+from ..notes import lines as note_lines
+from ..project.project import Project
+from ..solvers.base import History
+from ..solvers.run_cache import RunCache
+from .series import (
+    Part,
+    Series,
+    card_of,
+    card_words,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+    write_study,
+)
+from .simulation import Progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Ratios:
+    """A response at several nu12.
+
+    values, to_base, to_mean : (n,) the response itself, relative to that at the base nu12, and
+    relative to the mean of all n.
+    """
+
+    nu12: Array
+    values: Array
+    to_base: Array
+    to_mean: Array
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Lowest and highest `to_base`, less one; NaN where no run ended."""
+        known = self.to_base[np.isfinite(self.to_base)]
+        return (float(known.min() - 1), float(known.max() - 1)) if len(known) else (np.nan, np.nan)
+
+
+def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
+    """Normalise a response (n,); NaN where a run failed, left out of the mean."""
+    v = np.asarray(values, dtype=float)
+    mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
+    return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
+
+
+def by_response(
+    nu12: Sequence[float],
+    responses: Sequence[Mapping[str, float] | None],
+    base: Mapping[str, float],
+) -> dict[str, Ratios]:
+    """Ratios of every response that the run at the base nu12 has.
+
+    responses : of each nu12, by name; None where the run failed, without those it did not reach.
+    """
+    return {
+        name: ratios(nu12, [np.nan if r is None else r.get(name, np.nan) for r in responses], value)
+        for name, value in base.items()
+    }
+
+
+#: The range of coated fabrics, in equal steps.
+NU12 = (0.05, 0.15, 0.25, 0.35, 0.45)
+
+
+@dataclass(frozen=True, eq=False)
+class PartRatios:
+    """One part of a test.
+
+    response : what the responses are. failed : why a run failed, by nu12. notes : what to know of
+    the runs.
+    """
+
+    response: str
+    responses: Mapping[str, Ratios]
+    failed: Mapping[str, str]
+    notes: Sequence[Note]
+
+
+@dataclass(frozen=True, eq=False)
+class Nu12Study:
+    """What a study of nu12 gave, by part of a test. base : the card's own nu12."""
+
+    project: Path
+    card: str
+    solver: str
+    base: float
+    parts: Mapping[str, PartRatios]
+    warnings: tuple[Note, ...] = ()
+
+    @property
+    def response(self) -> str:
+        """What the responses are, of all parts."""
+        return " or ".join(dict.fromkeys(part.response for part in self.parts.values()))
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What result.json says."""
+        return {
+            "command": "study nu12",
+            "project": str(self.project),
+            "card": self.card,
+            "solver": self.solver,
+            "base_nu12": self.base,
+            "response": self.response,
+            "models": {name: _numbers(part) for name, part in self.parts.items()},
+            "notes": rows(self.notes),
+        }
+
+    def table(self) -> pd.DataFrame:
+        """Columns model, response, nu12, value, to_base, to_mean."""
+        import pandas as pd
+
+        frames = [
+            pd.DataFrame(
+                {
+                    "model": name,
+                    "response": response,
+                    "nu12": r.nu12,
+                    "value": r.values,
+                    "to_base": r.to_base,
+                    "to_mean": r.to_mean,
+                }
+            )
+            for name, part in self.parts.items()
+            for response, r in part.responses.items()
+        ]
+        return pd.concat(frames, ignore_index=True)
+
+    def lines(self) -> list[str]:
+        """The same for a terminal."""
+        words = [f"{self.response}, relative to that at nu12 = {self.base:g}"]
+        named = {
+            f"{n}, {k}": r for n, part in self.parts.items() for k, r in part.responses.items()
+        }
+        wide = max(map(len, named))
+        first = next(iter(named.values()))
+        words.append(" " * wide + "".join(f"{f'{v:g}':>9}" for v in first.nu12) + "   spread")
+        for name, r in named.items():
+            numbers = "".join(f"{v:9.4f}" for v in r.to_base)
+            low, high = (100 * s for s in r.spread)
+            words.append(f"{name:<{wide}}{numbers}   {low:+.1f} to {high:+.1f} %")
+        return [*words, *note_lines(self.notes)]
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader of the responses should know, of every run of its own."""
+        of_parts = [n.about(name) for name, part in self.parts.items() for n in part.notes]
+        return [*of_parts, *self.warnings]
+
+    def write(self, folder: Path | str) -> None:
+        """Write nu12.csv, nu12.png, notes.csv and result.json.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from ..reports.nu12 import plot_nu12
+        from ..reports.nu12_charts import nu12_charts
+
+        panels = {
+            name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
+            for name, part in self.parts.items()
+        }
+        title = f"{self.project.name}: what nu12 changes"
+        write_study(
+            Path(folder),
+            "nu12",
+            self.table(),
+            lambda path: plot_nu12(path, panels, self.base, self.response),
+            self.result,
+            self.notes,
+            title,
+            self.lines(),
+            [nu12_charts(panels, self.base, self.response, title)],
+        )
+
+
+def vary_nu12(
+    project: Project,
+    card: MaterialCard | Path | str,
+    values: Sequence[float] = NU12,
+    tests: str | Sequence[str] | None = None,
+    progress: Progress | None = None,
+    kept: RunCache | None = None,
+) -> Nu12Study:
+    """Run tests with a card whose Poisson's ratio is changed, the moduli as they are.
+
+    Parameters
+    ----------
+    card : itself, its file, or its name in the project. values : of nu12. tests : names or kinds,
+    all unless given. progress : is told how far the study is. kept : as of `refine`.
+
+    Raises
+    ------
+    InputError : a value out of range, no such test.
+    SolverFailure : of the card as it is, or of all other values.
+    """
+    for value in values:
+        if not 0 <= value < 1:
+            raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
+    material, several = card_of(project, card), tuple(sorted(set(values)))
+    series = Series(project, material, progress, kept)
+    parts = parts_of(project, studied_tests(project, tests), material.thickness)
+    series.total = len(parts) * (1 + len(several))
+    return Nu12Study(
+        project.path,
+        card_words(card),
+        series.solver.name,
+        material.law.nu12,
+        {name: _part(series, part, several) for name, part in parts.items()},
+        tuple(thickness_notes(project, material)),
+    )
+
+
+def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
+    def run(nu12: float) -> History:
+        return series.run(part, replace(series.card.law, nu12=nu12))
+
+    base = run(series.card.law.nu12)
+    notes, failed = [n.about(_at(series.card.law.nu12)) for n in series.notes(base)], {}
+    responses: list[Mapping[str, float] | None] = []
+    for value in values:
+        try:
+            history = run(value)
+        except SolverFailure as failure:
+            responses.append(None)
+            failed[f"{value:g}"] = failure.reason
+            notes.append(Note(NoteKind.FAILED, failure.reason, _at(value)))
+            if len(failed) == len(values):
+                raise
+            continue
+        responses.append(part.studied.responses(part.model, history))
+        notes += [note.about(_at(value)) for note in series.notes(history)]
+    own = part.studied.responses(part.model, base)
+    return PartRatios(part.studied.response, by_response(values, responses, own), failed, notes)
+
+
+def _numbers(part: PartRatios) -> dict[str, Any]:
+    return {
+        "responses": {
+            response: {
+                "nu12": r.nu12.tolist(),
+                "value": _known(r.values),
+                "to_base": _known(r.to_base),
+                "to_mean": _known(r.to_mean),
+            }
+            for response, r in part.responses.items()
+        },
+        "failed": dict(part.failed),
+    }
+
+
+def _at(nu12: float) -> str:
+    return f"nu12 = {nu12:g}"
+
+
+def _known(values: Array) -> list[float | None]:
+    """Numbers for JSON, which has no NaN."""
+    return [float(v) if np.isfinite(v) else None for v in values]

@@ -1,0 +1,516 @@
+"""Run tests that are not fitted with material cards, side by side, and go on where it was left."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..content import digest_of
+from ..errors import InputError, SolverFailure
+from ..experiments.kinds import (
+    Predicted,
+    PredictedOutcome,
+    PredictedRun,
+    RunRecord,
+    Test,
+    band_of,
+    laws_around,
+    notes_of_record,
+    other_thickness,
+    record_of,
+)
+from ..experiments.registry import kind_named
+from ..materials.card import MaterialCard
+from ..materials.law import HypoelasticLaw
+from ..notes import Note, as_note, marks
+from ..notes import lines as note_lines
+from ..notes import rows as note_rows
+from ..project.cards import Cards, card_sources, chosen_cards
+from ..project.project import Project, settings_of_predictions
+from ..reports.fit_page import failure_page
+from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
+from ..solvers.registry import solver_named, usable_solver
+from .folder import PROVENANCE, RunRecords
+from .record import Record, data_rows, solver_facts, this_run, versions
+from .starts import log_run
+from .workers import Task
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def predicted_kind(name: str) -> Predicted:
+    """What a kind of test offers whose tests are predicted."""
+    kind = kind_named(name).predicted
+    assert kind is not None
+    return kind
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """Every chosen test with every chosen card.
+
+    each : the runs, test by test, card by card; they keep this order in every table.
+    wall_s : seconds that all of it took. record : what it came from, None where nobody asks.
+    """
+
+    project: Project
+    each: tuple[PredictedRun, ...]
+    wall_s: float
+    record: Record | None = None
+
+    @cached_property
+    def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
+        """What the runs of each kind of test say, and their numbers among all runs."""
+        numbers: dict[str, list[int]] = {}
+        for i, run in enumerate(self.each):
+            numbers.setdefault(run.test.kind, []).append(i)
+        outcomes = {}
+        for name, own in numbers.items():
+            outcome = predicted_kind(name).outcome([self.each[i] for i in own])
+            outcomes[name] = outcome, tuple(own)
+        return outcomes
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Everything in plain values, as result.json has it."""
+        tests: dict[str, Any] = {}
+        for outcome, numbers in self.outcomes.values():
+            for i in numbers:
+                test = self.each[i].test
+                tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
+        return {
+            "command": "predict",
+            "title": self.project.title,
+            "solver": self.project.fit.solver,
+            "tests": tests,
+            "cards": list(dict.fromkeys(run.card for run in self.each)),
+            "walls": [
+                {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
+                for end in self.band
+            ],
+            "runs": [self._numbers(i) for i in range(len(self.each))],
+            "notes": note_rows(self.notes),
+            "worst_relative_error": self.worst,
+            "cached_runs": self.cached,
+            "wall_s": self.wall_s,
+            "versions": versions(),
+            **({} if self.record is None else {"provenance": PROVENANCE}),
+        }
+
+    @property
+    def notes(self) -> list[Note]:
+        """What a reader of each run should know, of "TEST with CARD", or "TEST with CARD, WALL"."""
+        return [as_note(note).about(run.title) for run in self.each for note in run.notes]
+
+    @property
+    def band(self) -> list[BandEnd]:
+        """The ends of the solver's band, first what is predicted; empty where there is none."""
+        return band_of(self.each)
+
+    @property
+    def worst(self) -> float | None:
+        """Largest RMS error over the largest value measured; None where nothing is compared.
+
+        Of what is predicted: the other end of a band is no prediction.
+        """
+        errors = [self.error(i) for i, run in enumerate(self.each) if run.predicted]
+        return max((e for e in errors if e is not None), default=None)
+
+    def ended(self, number: int) -> str:
+        """How a run ended: "finished", how far it came, or why it failed."""
+        outcome, own = self._own(number)
+        return outcome.ended(own)
+
+    def error(self, number: int) -> float | None:
+        """RMS of model less measured over the largest value measured, of a run."""
+        outcome, own = self._own(number)
+        return outcome.error(own)
+
+    def failed(self) -> list[int]:
+        """Numbers of the runs that failed."""
+        return [i for i, run in enumerate(self.each) if run.record.failure]
+
+    @property
+    def cached(self) -> int:
+        """How many of the runs were made earlier by another program, and not again."""
+        return sum(run.record.from_cache for run in self.each)
+
+    def silent(self) -> list[int]:
+        """Numbers of the runs of measured tests that gave nothing to compare."""
+        measured = [
+            i
+            for i, run in enumerate(self.each)
+            if run.predicted and predicted_kind(run.test.kind).measured(run.test)
+        ]
+        return [i for i in measured if self.error(i) is None]
+
+    def runs(self) -> pd.DataFrame:
+        """A row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
+        import pandas as pd
+
+        rows = []
+        for i, run in enumerate(self.each):
+            outcome, own = self._own(i)
+            tail = {
+                "ended": self.ended(i),
+                "marks": "; ".join(marks(run.notes)),
+                "notes": "; ".join(run.notes),
+                "seconds": run.record.seconds,
+            }
+            head = {"test": run.test.name, "card": run.card, "wall": run.wall}
+            rows.append({**head, **outcome.columns(own), **tail})
+        columns = list(dict.fromkeys(name for row in rows for name in row))
+        last = [name for name in columns if name not in tail]
+        return pd.DataFrame(rows, columns=[*last, *tail])
+
+    def curves(self) -> pd.DataFrame:
+        """Every run frame by frame, with its test, card and wall."""
+        import pandas as pd
+
+        curves = []
+        for i, run in enumerate(self.each):
+            outcome, own = self._own(i)
+            curve = outcome.curve(own)
+            curve.insert(0, "wall", run.wall)
+            curve.insert(0, "card", run.card)
+            curve.insert(0, "test", run.test.name)
+            curves.append(curve)
+        return pd.concat(curves, ignore_index=True)
+
+    def lines(self) -> list[str]:
+        """For the terminal: a table of each kind of test, then the notes."""
+        lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
+        return [*lines, *note_lines(self.notes)]
+
+    def report(self, folder: Path | str) -> Path:
+        """Write tables, figures, files, report.html and last result.json; the page's path.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from ..reports.prediction_page import write_predictions
+
+        return write_predictions(self, Path(folder))
+
+    def _own(self, number: int) -> tuple[PredictedOutcome, int]:
+        """The outcome that a run belongs to, and its number there."""
+        outcome, numbers = self.outcomes[self.each[number].test.kind]
+        return outcome, numbers.index(number)
+
+    def _numbers(self, number: int) -> dict[str, Any]:
+        run = self.each[number]
+        outcome, own = self._own(number)
+        head: dict[str, Any] = {
+            "test": run.test.name,
+            "card": run.card,
+            "wall": run.wall,
+            "predicted": run.predicted,
+            "ended": self.ended(number),
+            "marks": marks(run.notes),
+            "seconds": run.record.seconds,
+        }
+        if run.record.failure:
+            return head
+        tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
+        return {**head, **outcome.numbers(own), **tail}
+
+
+@dataclass(frozen=True)
+class RunEvent:
+    """A run that ended: `done` of `total`; None: they are about to begin.
+
+    again : it was in the folder, from an earlier time.
+    """
+
+    run: PredictedRun | None
+    done: int
+    total: int
+    again: bool = False
+
+
+#: Is told of every run as it ends, and of time passing (None).
+Progress = Callable[[RunEvent | None], None]
+
+
+def predict(
+    project: Project,
+    tests: str | Sequence[str] | None = None,
+    cards: Cards = None,
+    *,
+    samples: int | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
+) -> Predictions:
+    """Run every chosen test that is predicted with every chosen card.
+
+    Where the solver's answer is a band, both its ends are run (`PredictedRun.end`). What is
+    predicted is also run with laws around the card's, where the card says how sure it is, so that
+    its spread is known (`PredictedRun.around`).
+
+    Parameters
+    ----------
+    tests : names of tests, or a kind of test; every test that is not fitted unless given.
+    cards : by name; or names of the project's cards and files of others. The project's unless
+        given; where it has none, the one that its fit left in the usual folder.
+    samples : laws drawn from the certainty of each card; unless given, steps along its few least
+        certain directions are run instead, but not by another program. 0: the spread is not asked
+        for.
+    jobs : processes; as the project says unless given, else all cores.
+    scheduler : address of a Dask scheduler, whose workers do the runs instead of this machine.
+    out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
+        nothing is written without it.
+    overwrite : replace what the folder holds.
+    progress : is told of every run that ended; None now and then while none does. An interrupt
+        (Ctrl-C) leaves the folder ready for `resume`.
+    command_line : of the command that asks, for the record; None where Python does.
+
+    Returns
+    -------
+    The runs as tables, and `report(folder)` for the page.
+
+    Raises
+    ------
+    InputError : a test or card that there is not, a test that makes no model with a card's
+        thickness, or nothing to go on with. OutputError : the folder is used or cannot be written.
+    SolverFailure : the solver is not there, or no run ended well.
+    """
+    begun = time.perf_counter()
+    project = project.with_scheduler(scheduler)
+    project.executor.check()
+    chosen = predicted_tests(project, tests)
+    solver = _usable(project)
+    pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
+    record = _record(project, chosen, card_sources(project, cards), solver, command_line)
+    records = None
+    if out is not None:
+        records = RunRecords(Path(out))
+        records.begin(resume, overwrite)
+        if resume:
+            record = record.after(Path(out))
+        record.write(Path(out))
+    with failure_page(None if out is None else Path(out), project.title) as said:
+        # Runs of another program, minutes each, are not made unasked.
+        some = 0 if samples is None and solver.external else samples
+        others = _around(project, pairs, some)
+        every = [*pairs, *(run for _, run in others)]
+        ended = _run(project, every, records, jobs, progress or _nobody)
+        runs = _with_others(ended, [number for number, _ in others])
+        if all(run.record.failure for run in runs):
+            said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
+            failure = f"no run ended well: {runs[0].record.failure}"
+            raise SolverFailure(failure, project.fit.solver)
+    return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
+
+
+def _record(
+    project: Project,
+    tests: Sequence[Test],
+    cards: Sequence[str | Path] | None,
+    solver: Solver,
+    command_line: Sequence[str] | None,
+) -> Record:
+    written, settings = project.written, None
+    if written is not None and cards is not None:
+        settings = settings_of_predictions(project, [test.name for test in tests], cards)
+    return Record(
+        project.path,
+        None if written is None else written.text,
+        settings,
+        data_rows((test.name, test) for test in tests),
+        solver_facts(project.fit.solver, solver.identity),
+        [this_run(command_line)],
+    )
+
+
+def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """The tests that `predict` runs: by name or by kind, all unless named.
+
+    Raises
+    ------
+    InputError : a name that is none; none of them is of a kind that is predicted.
+    """
+    chosen = project.chosen(tests, fitted=False)
+    able = [test for test in chosen if kind_named(test.kind).predicted is not None]
+    if not able:
+        problem = f"no card is judged on these tests: {', '.join(test.name for test in chosen)}"
+        raise InputError(project.path, "", problem)
+    return able
+
+
+def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """Of the tests that `predict` would run, those with something measured to compare with."""
+    chosen = predicted_tests(project, tests)
+    return [test for test in chosen if predicted_kind(test.kind).measured(test)]
+
+
+def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
+    """One test with one card; a run that does not end well is a record of its failure."""
+    check_carries(solver, card.law)
+    begun = time.perf_counter()
+    try:
+        outcome: Any = solver.run(model, card.law)
+    except SolverFailure as failure:
+        outcome = failure
+    return record_of(kind, model, outcome, time.perf_counter() - begun)
+
+
+def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
+    """A mark of everything that a run's result depends on, by content."""
+    material = (law.pieces, law.coupling, law.thickness_change)
+    return digest_of(kind.depends_on(model), material, solver.identity)
+
+
+def _pairs(
+    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
+) -> list[PredictedRun]:
+    """Test by test, card by card, end by end of the solver's band, nothing run yet."""
+    pairs = []
+    for test in tests:
+        models: dict[float, Mapping[str, Any]] = {}
+        for name, card in cards.items():
+            try:
+                if card.thickness not in models:
+                    models[card.thickness] = test.models(card.thickness)
+            except InputError as error:
+                where = f"{test.name!r} with card {name!r}, {error.field}"
+                raise InputError(project.path, where, error.problem) from None
+            (model,) = models[card.thickness].values()
+            waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
+            pairs += [replace(waiting, end=end) for end in _ends(solver, model)]
+    return pairs
+
+
+def _around(
+    project: Project, pairs: Sequence[PredictedRun], samples: int | None
+) -> list[tuple[int, PredictedRun]]:
+    """Runs with other laws, each with the number of the prediction around which it lies."""
+    others = []
+    for number, pair in enumerate(pairs):
+        if not pair.predicted:
+            continue
+        try:
+            around, laws = laws_around(pair.material, samples)
+        except ValueError as error:
+            raise InputError(project.path, f"card {pair.card!r}", str(error)) from None
+        for k, law in enumerate(laws):
+            card, own = replace(pair.material, law=law), f"{pair.card}, law {k + 1} around it"
+            others.append((number, replace(pair, card=own, material=card, around=around)))
+    return others
+
+
+def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[PredictedRun]:
+    """The predictions, each with the records of the runs around it; `numbers` of the last runs."""
+    count = len(ended) - len(numbers)
+    runs = list(ended[:count])
+    for number in dict.fromkeys(numbers):
+        own = [run for n, run in zip(numbers, ended[count:], strict=True) if n == number]
+        around = own[0].around
+        assert around is not None
+        records = tuple(run.record for run in own)
+        runs[number] = replace(runs[number], around=replace(around, records=records))
+    return runs
+
+
+def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
+    """The ends of the band that the solver gives for a model; one None where it gives none."""
+    band = solver.band(model) if isinstance(solver, BandedSolver) else ()
+    return tuple(band) or (None,)
+
+
+def _usable(project: Project) -> Solver:
+    """The project's solver; what is wrong with it shows here, in one line."""
+    name = project.fit.solver
+    options = project.options_of(name)
+    return usable_solver(name, options, project.path, cache=project.run_cache)
+
+
+def _run(
+    project: Project,
+    pairs: Sequence[PredictedRun],
+    records: RunRecords | None,
+    jobs: int | None,
+    progress: Progress,
+) -> list[PredictedRun]:
+    """Every pair with its record: those that the folder holds, and the others side by side."""
+    kinds = [predicted_kind(pair.test.kind) for pair in pairs]
+    solver_of = _solvers(project)
+    marks = [
+        mark_of(kind, pair.model, pair.material.law, solver_of(pair.end))
+        for kind, pair in zip(kinds, pairs, strict=True)
+    ]
+    ended: dict[int, PredictedRun] = {}
+
+    def end(number: int, record: RunRecord, again: bool) -> None:
+        pair = pairs[number]
+        card = pair.material
+        thick = other_thickness(card, project.fabric.thickness)
+        notes = [*notes_of_record(record, card), *thick]
+        ended[number] = replace(pair, record=record, notes=notes)
+        log_run(pair.title, record, again)
+        progress(RunEvent(ended[number], len(ended), len(pairs), again))
+
+    progress(RunEvent(None, 0, len(pairs)))
+    for number, mark in enumerate(marks):
+        record = None if records is None else records.read(mark)
+        if record is not None:
+            end(number, record, True)
+    missing = [number for number in range(len(pairs)) if number not in ended]
+    prepare = functools.partial(_runner, project, pairs)
+    executor = project.with_fit(jobs=jobs).executor
+    told: Iterable[Any] = executor.run_tasks(prepare, missing, "runs", _lost) if missing else ()
+    for item in told:
+        if item is None:
+            progress(None)
+            continue
+        number, record = item
+        if records is not None:
+            records.write(marks[number], record)
+        end(number, record, False)
+    return [ended[number] for number in range(len(pairs))]
+
+
+def _lost(number: int, why: str) -> tuple[int, RunRecord]:
+    return number, RunRecord(0.0, why)
+
+
+def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
+    solver_of = _solvers(project)
+
+    def run(number: int, tell: Callable[[Any], None]) -> tuple[int, RunRecord]:
+        pair = pairs[number]
+        kind, solver = predicted_kind(pair.test.kind), solver_of(pair.end)
+        return number, run_card(kind, solver, pair.model, pair.material)
+
+    return run
+
+
+def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
+    """The project's solver for each end of its band, made once."""
+    name = project.fit.solver
+    options = project.options_of(name)
+    made: dict[str, Solver] = {}
+
+    def solver_of(end: BandEnd | None) -> Solver:
+        key = "" if end is None else end.name
+        if key not in made:
+            more = {} if end is None else end.options
+            made[key] = solver_named(name, project.run_cache, **{**options, **more})
+        return made[key]
+
+    return solver_of
+
+
+def _nobody(event: RunEvent | None) -> None:
+    """Nobody wants to know."""

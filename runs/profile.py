@@ -1,0 +1,375 @@
+"""Profile likelihood of moduli: how far the data let each be from its best, on either side."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inference.likelihood import (
+    BOUND,
+    FAILED,
+    THRESHOLD,
+    Side,
+    extreme,
+    modulus_row,
+    profile_side,
+)
+from ..inference.posterior import LEVEL, bands_of
+from ..inference.problem import WeightedProblem
+from ..materials.forms.base import COMPONENTS
+from ..notes import Note, NoteKind, rows
+from ..notes import lines as note_lines
+from ..project.project import Project
+from .executor import cores
+from .refound import Card, Refound, refound
+from .setup import FitSetup
+from .workers import Task
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Of the distances of the ends from the best: beyond, they are said to be asymmetric.
+ASYMMETRIC = 1.3
+#: Of -2 log L, below the best: another optimum is better.
+BETTER = -0.5
+METHOD = (
+    "The modulus is held at values ever farther from its best and everything else is fitted anew, "
+    "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
+    "by, scaled so that where nothing is curved it passes the threshold 1.96 of the fit's 1 sigma "
+    "away (noise alone, neighbouring values that err as one counted as one; the error of the mesh "
+    "is in neither)."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Of one modulus at one strain, MPa.
+
+    best : of the fit. sigma : one standard deviation of the fit. band : its band by the noise,
+    within the bounds. below, above : the profile to either side. allowed : the least and the
+    largest value that the bounds of the fit allow.
+    """
+
+    modulus: str
+    strain: float
+    best: float
+    sigma: float
+    band: tuple[float, float]
+    below: Side
+    above: Side
+    allowed: tuple[float, float]
+
+    @property
+    def name(self) -> str:
+        """The modulus and where."""
+        return f"{self.modulus} at strain {self.strain:.4g}"
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Where the threshold is passed; None where it is not."""
+        return self.below.end, self.above.end
+
+    @property
+    def analyses(self) -> int:
+        """Of both sides."""
+        return self.below.analyses + self.above.analyses
+
+    @property
+    def asymmetry(self) -> float | None:
+        """Distance of the upper end over that of the lower one; None where one is not there."""
+        low, high = self.ends
+        if low is None or high is None or not low < self.best < high:
+            return None
+        return (high - self.best) / (self.best - low)
+
+    @property
+    def curve(self) -> tuple[list[float], list[float]]:
+        """Moduli (MPa), rising, and -2 log L there."""
+        values = [*self.below.values[:0:-1], *self.above.values]
+        return values, [*self.below.ratios[:0:-1], *self.above.ratios]
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        low, high = (
+            _end(end, side, limit)
+            for end, side, limit in zip(
+                self.ends, (self.below, self.above), self.allowed, strict=True
+            )
+        )
+        said = (
+            f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
+            f"(the fit's band {self.band[0]:.4g} to {self.band[1]:.4g})"
+        )
+        skew = self.asymmetry
+        if skew is not None and not 1 / ASYMMETRIC <= skew <= ASYMMETRIC:
+            low_end, high_end = self.ends
+            assert low_end is not None and high_end is not None
+            said += (
+                f"; asymmetric: {self.best - low_end:.3g} below, {high_end - self.best:.3g} above"
+            )
+        return said
+
+    @property
+    def notes(self) -> list[Note]:
+        """Where the data contradict no value on a side, or another optimum is better."""
+        told = []
+        for word, side in (("below", self.below), ("above", self.above)):
+            if side.why:
+                ratio = round(side.ratios[-1], 3) + 0.0
+                words = (
+                    f"not closed {word}: {_why(side)}; -2 log L is {ratio:.2g} of "
+                    f"{THRESHOLD:.3g} there"
+                )
+                told.append(Note(NoteKind.NOT_CLOSED, words, self.name))
+        if min(*self.below.ratios, *self.above.ratios) < BETTER:
+            words = "another optimum fits the data better than the card's: fit with more starts"
+            told.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
+        return told
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """For result.json."""
+        values, ratios = self.curve
+        return {
+            "modulus": self.modulus,
+            "strain": self.strain,
+            "MPa": self.best,
+            "lower_MPa": self.ends[0],
+            "upper_MPa": self.ends[1],
+            "fit_sigma_MPa": self.sigma,
+            "fit_lower_MPa": self.band[0],
+            "fit_upper_MPa": self.band[1],
+            "asymmetry": self.asymmetry,
+            "not_closed": {
+                word: side.why
+                for word, side in (("below", self.below), ("above", self.above))
+                if side.why
+            },
+            "curve_MPa": values,
+            "curve_minus_2_log_L": ratios,
+            "analyses": self.analyses,
+        }
+
+
+def _why(side: Side) -> str:
+    at = f"{side.values[-1]:.4g} MPa"
+    if side.why == BOUND:
+        return f"it meets the bound of the fit, {at}"
+    if side.why == FAILED:
+        return f"beyond {at} no analysis ends well"
+    return f"the last step ends at {at}"
+
+
+def _end(end: float | None, side: Side, limit: float) -> str:
+    if end is not None:
+        return f"{end:.4g}"
+    if side.why == BOUND:
+        return f"the bound, {limit:.4g},"
+    return f"beyond {side.values[-1]:.4g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """What the data say of moduli, each for itself.
+
+    Parameters
+    ----------
+    card : what it is named. tests : that are fitted. analyses : in all, the optimum's among them.
+    """
+
+    title: str
+    project: Path
+    card: str
+    tests: Sequence[str]
+    each: Sequence[Profile]
+    analyses: int
+    notes: Sequence[Note] = ()
+
+    def table(self) -> pd.DataFrame:
+        """A row for every value that was held: modulus, strain, MPa, minus_2_log_L,
+        by_sigma (what it would be by the fit's 1 sigma, if nothing were curved)."""
+        import pandas as pd
+
+        found = []
+        for one in self.each:
+            values, ratios = (np.array(v) for v in one.curve)
+            found.append(
+                pd.DataFrame(
+                    {
+                        "modulus": one.modulus,
+                        "strain": one.strain,
+                        "MPa": values,
+                        "minus_2_log_L": ratios,
+                        "by_sigma": ((values - one.best) / one.sigma) ** 2,
+                    }
+                )
+            )
+        return pd.concat(found, ignore_index=True)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What result.json says."""
+        return {
+            "command": "profile",
+            "title": self.title,
+            "project": str(self.project),
+            "card": self.card,
+            "tests": list(self.tests),
+            "level": LEVEL,
+            "threshold": THRESHOLD,
+            "profiles": [one.numbers for one in self.each],
+            "analyses": self.analyses,
+            "method": METHOD,
+            "notes": rows(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """For the terminal."""
+        told = [f"{one.name}: {one.words}" for one in self.each]
+        return [*told, f"{self.analyses} analyses", *note_lines(self.notes)]
+
+    def write(self, folder: Path | str) -> None:
+        """Write profile.csv, profile.png, report.html, notes.csv and, last, result.json.
+
+        Raises
+        ------
+        OutputError : the folder cannot be written.
+        """
+        from ..reports.profile_page import write_profiles
+
+        write_profiles(self, Path(folder))
+
+
+#: Told how many of how many sides are done, and of the one that takes its next step.
+Progress = Callable[[int, int, str], None]
+#: Share of the strain reached at which a modulus is profiled unless strains are given.
+SHARE = 0.5
+#: Downwards and upwards.
+SIGNS = (-1.0, 1.0)
+
+
+def profile(
+    project: Project,
+    moduli: Mapping[str, Sequence[float]] | None = None,
+    card: Card = None,
+    tests: str | Sequence[str] | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Profiles:
+    """Hold moduli away from their best and fit the others anew, until the data contradict.
+
+    Begins at the optimum of the fit that left the card; every refit begins at its neighbour and
+    takes a few analyses.
+
+    Parameters
+    ----------
+    moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
+        where a modulus has no strains. card : the one that the project's fit left in its usual
+        folder unless given. tests : as for `fit`. progress : is told of every step.
+
+    Raises
+    ------
+    InputError : in the project or its data; no such modulus, or a strain beyond the law's.
+    SolverFailure : the tests cannot be run with the card.
+    """
+    asked = _asked(moduli)
+    found = refound(project, card, tests)
+    places = _places(found, asked)
+    numbers = list(range(len(SIGNS) * len(places)))
+    prepare = functools.partial(_task, found, places)
+    sides: dict[int, Side] = {}
+    tell = progress or (lambda done, total, what: None)
+    for record in project.executor.run_tasks(prepare, numbers, "profiles"):
+        if isinstance(record, tuple):
+            sides[record[0]] = record[1]
+        now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""
+        tell(len(sides), len(numbers), now)
+    each = tuple(
+        _profile(found, name, strain, sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1])
+        for k, (name, strain) in enumerate(places)
+    )
+    # Every process runs the optimum once more.
+    analyses = (
+        found.analyses
+        + min(project.fit.jobs or cores(), len(numbers))
+        + sum(p.analyses for p in each)
+    )
+    return Profiles(
+        project.title,
+        project.path,
+        found.card,
+        tuple(t.test.name for t in found.setup.tests),
+        each,
+        analyses,
+        (*found.notes, *(note for one in each for note in one.notes)),
+    )
+
+
+def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
+    asked = {name: list(strains) for name, strains in (moduli or {}).items()}
+    for name, strains in asked.items():
+        if name not in COMPONENTS:
+            problem = f"expected one of {', '.join(COMPONENTS)}, got {name!r}"
+            raise InputError(None, "--modulus", problem)
+        for strain in strains:
+            if not 0.0 <= strain < np.inf:
+                problem = f"expected strains of 0 or more, got {strain:g}"
+                raise InputError(None, "--modulus", problem)
+    return asked or {name: [] for name in COMPONENTS}
+
+
+def _places(found: Refound, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
+    places = []
+    for name, strains in asked.items():
+        component = COMPONENTS[name]
+        reached = float(found.best.valid[component])
+        for strain in strains:
+            if strain > reached * (1 + 1e-9):
+                problem = f"{name} is fitted up to strain {reached:.4g}; got {strain:g}"
+                raise InputError(found.setup.project.path, "--modulus", problem)
+        places += [(name, strain) for strain in strains or (SHARE * reached,)]
+    return places
+
+
+def _task(found: Refound, places: Sequence[tuple[str, float]]) -> Task:
+    # Of the setup, which every process has anew: solvers are no one else's.
+    setup: FitSetup = found.setup
+    problem = setup.problem()
+    point = problem.evaluate(found.point.unknowns, True, warm=False)
+    linear = found.linear
+
+    def side(number: int, tell: Callable[[Any], None]) -> tuple[int, Side]:
+        (name, strain), sign = places[number // len(SIGNS)], SIGNS[number % len(SIGNS)]
+        row = modulus_row(problem.unknowns, name, strain)
+        over = linear.spread_over_curvature(row)
+        scaled = linear.weights / np.sqrt(over if over > 0 else 1.0)
+        own = WeightedProblem.of(problem, scaled)
+        assert point is not None  # it ran a moment ago
+        sigma = float(np.sqrt(row @ found.posterior.covariance @ row))
+        step = functools.partial(tell, [name, strain])
+        return number, profile_side(own, own.seen(point), row, sign, sigma, step)
+
+    return side
+
+
+def _profile(found: Refound, name: str, strain: float, below: Side, above: Side) -> Profile:
+    unknowns = found.problem.unknowns
+    row = modulus_row(unknowns, name, strain)
+    band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]
+    return Profile(
+        name,
+        strain,
+        float(row @ found.point.unknowns),
+        float(np.sqrt(row @ found.posterior.covariance @ row)),
+        (float(band[0]), float(band[1])),
+        below,
+        above,
+        (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
+    )

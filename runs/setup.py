@@ -1,0 +1,561 @@
+"""From a project and its tests to a fit: what is prepared once, and what every process builds."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..content import digest_of
+from ..errors import InputError
+from ..experiments.kinds import (
+    STRAINS,
+    FittableTest,
+    Masks,
+    PreparedTest,
+    Reach,
+    Refinable,
+    Weighting,
+)
+from ..inference.comparison import Comparison, Nuisance
+from ..inference.methods.base import FitOptions
+from ..inference.problem import FitProblem
+from ..inference.unknowns import (
+    LawBounds,
+    ProposedStarts,
+    RandomStarts,
+    SobolStarts,
+    Starts,
+    Unknowns,
+)
+from ..materials.forms.base import Form
+from ..materials.forms.registry import form_named, form_settings, of_strain
+from ..materials.law import HypoelasticLaw
+from ..project.project import Project
+from ..project.schema import BoundsSection, UnknownSection
+from ..readers.sections import beside
+from ..solvers.base import DifferentiatingSolver, Solver, check_carries
+from ..solvers.registry import solver_named, usable_solver
+from .folder import PARTS, RUN
+from .starts import HEADER, HISTORY, StartRecord
+
+#: Smallest modulus allowed anywhere on the strain range (MPa), unless the file says otherwise.
+MARGIN_E, MARGIN_G = 5.0, 0.5
+#: End of the strain range of moduli that do not depend on strain: nothing is held there.
+UNBOUNDED_RANGE = 1.0
+#: Shares of the strain range between the regions of a law, where no test tells.
+THIRDS = (1 / 3, 2 / 3)
+
+
+def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
+    """The law that a fit starts from: everything but its coefficients, which are zero.
+
+    reaches : what the data of each test say of the law.
+
+    Raises
+    ------
+    InputError : no such form, a setting that it does not know, no strain range that follows from
+        the tests.
+    """
+    section, path = project.law, project.path
+    ends = _strain_range(project, reaches)
+    try:
+        form = form_named(section.form, _form_settings(project, reaches, ends), ends)
+    except InputError as error:
+        field = f"law.{error.field}" if error.field else "law.form"
+        raise InputError(path, field, error.problem) from None
+    return HypoelasticLaw(
+        np.zeros(form.size),
+        section.nu12,
+        np.array(ends),
+        project.fabric.thickness_change,
+        form,
+    )
+
+
+def _form_settings(
+    project: Project, reaches: Sequence[Reach], ends: Sequence[float]
+) -> dict[str, Any]:
+    """What [law] says to its form; breaks from the tests' data where it needs and has none."""
+    settings = dict(project.law.model_extra or {})
+    if "breaks" in settings or "breaks" not in form_settings(project.law.form):
+        return settings
+    breaks = {}
+    for i, name in enumerate(STRAINS):
+        said = [pair for reach in reaches if (pair := reach.break_shares[i]) is not None]
+        breaks[name] = [ends[i] * share for share in (said or [THIRDS])[0]]
+    return {**settings, "breaks": breaks}
+
+
+def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, float, float]:
+    given = project.law.strain_range
+    if given is not None:
+        return given[0], given[1], given[2]
+    ends: list[float] = []
+    for i, name in enumerate(STRAINS):
+        known = [e for reach in reaches if (e := reach.strain[i]) is not None]
+        if known:
+            ends.append(max(known))
+        elif not of_strain(project.law.form):
+            ends.append(UNBOUNDED_RANGE)
+        else:
+            problem = (
+                f"this key is missing, and no test tells how far the {name} strain goes; give the "
+                "ends [warp, fill, shear], such as [0.13, 0.13, 0.13]"
+            )
+            raise InputError(project.path, "law.strain_range", problem)
+    return ends[0], ends[1], ends[2]
+
+
+def bounds_of(project: Project, form: Form) -> LawBounds:
+    """Between what the moduli, or their coefficients, are looked for; MPa.
+
+    Raises
+    ------
+    InputError : no bounds, crossed ones, too few or too many, or some of both kinds.
+    """
+    path, section, margin = project.path, project.law.bounds, project.law.margin
+    unit = project.scales.modulus
+    if section is None:
+        problem = "this section is missing; give [least, largest] of E1, E2 and G12"
+        raise InputError(path, "law.bounds", problem)
+    of_moduli = _of_one_kind(project, section)
+    if of_moduli and margin is not None:
+        problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
+        raise InputError(path, "law.margin", problem)
+    if of_moduli:
+        return LawBounds.of_moduli(
+            {name: _ordered(project, name, getattr(section, name)) for name in ("E1", "E2", "G12")}
+        )
+    lower, upper = (_listed(project, form, name) for name in ("lower", "upper"))
+    for i, (place, low, high) in enumerate(zip(form.free, lower, upper, strict=True)):
+        if low > high:
+            problem = (
+                f"bounds of {form.labels[place]} are crossed: lower {low:g} is above upper "
+                f"{high:g} {project.scales.modulus_unit}"
+            )
+            raise InputError(path, f"law.bounds.lower[{i}]", problem)
+    e, g = (margin.E * unit, margin.G12 * unit) if margin else (MARGIN_E, MARGIN_G)
+    margins = {"E1": e, "E2": e, "G12": g}
+    return LawBounds.of_entries(np.array(lower) * unit, np.array(upper) * unit, margins)
+
+
+def _of_one_kind(project: Project, section: BoundsSection) -> bool:
+    """Whether the moduli are bounded, not their coefficients."""
+    ranges = {name: getattr(section, name) for name in ("E1", "E2", "G12")}
+    listed = {name: getattr(section, name) for name in ("lower", "upper")}
+    of_moduli = any(v is not None for v in ranges.values())
+    of_entries = any(v is not None for v in listed.values())
+    if of_moduli and of_entries:
+        problem = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
+        raise InputError(project.path, "law.bounds", problem)
+    if not of_moduli and not of_entries:
+        problem = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
+        raise InputError(project.path, "law.bounds", problem)
+    for name, value in (ranges if of_moduli else listed).items():
+        if value is None:
+            raise InputError(project.path, f"law.bounds.{name}", "this key is missing; add it")
+    return of_moduli
+
+
+def _ordered(project: Project, name: str, pair: Sequence[float]) -> tuple[float, float]:
+    low, high = pair
+    if not low < high:
+        problem = f"expected [least, largest], got [{low:g}, {high:g}]"
+        raise InputError(project.path, f"law.bounds.{name}", problem)
+    return low * project.scales.modulus, high * project.scales.modulus
+
+
+def _listed(project: Project, form: Form, name: str) -> list[float]:
+    assert project.law.bounds is not None
+    values: list[float] = getattr(project.law.bounds, name)
+    if len(values) != len(form.free):
+        problem = (
+            f"expected {len(form.free)} coefficients of {form.name} moduli "
+            f"({', '.join(form.labels[i] for i in form.free)}), got {len(values)}"
+        )
+        raise InputError(project.path, f"law.bounds.{name}", problem)
+    return values
+
+
+#: Bounds unless the file says otherwise; those of the thickness in shares of the fabric's.
+NU12, THICKNESS = (0.0, 0.6), (0.5, 1.5)
+#: Below it a law can be positive definite.
+MOST_NU12 = 1.0
+#: Also of an incompressible one: its load is moduli times thickness times what strain makes of it.
+PRODUCT = "a membrane under load knows moduli times thickness only"
+
+
+def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
+    """Of [fit.unknowns]; a fit starts from what [law] and [fabric] say.
+
+    Raises
+    ------
+    InputError : bounds out of order, beyond what can be, or not around the value to start from; a
+        thickness without a prior, which no data could tell from the moduli.
+    """
+    asked, shared = project.fit.unknowns, []
+    if asked.nu12 is not None:
+        start = project.law.nu12
+        low, high = _bounds(project, "nu12", asked.nu12, NU12, start, 1.0)
+        if not (low >= 0 and high < MOST_NU12):
+            problem = f"expected numbers from 0 to below {MOST_NU12:g}, got [{low:g}, {high:g}]"
+            raise InputError(project.path, "fit.unknowns.nu12.bounds", problem)
+        prior = asked.nu12.prior
+        shared.append(
+            Nuisance("nu12", low, high, "", prior=prior, start=start, law_parameter="nu12",
+                     shared=True)
+        )  # fmt: skip
+    if asked.thickness is not None:
+        start, length = project.fabric.thickness, project.scales.length
+        usual = (THICKNESS[0] * start / length, THICKNESS[1] * start / length)
+        low, high = _bounds(project, "thickness", asked.thickness, usual, start, length)
+        if not low > 0:
+            problem = f"expected thicknesses above 0, got {low / length:g}"
+            raise InputError(project.path, "fit.unknowns.thickness.bounds", problem)
+        if asked.thickness.prior is None:
+            problem = f"this key is missing; {PRODUCT}: say how well its thickness is known before"
+            raise InputError(project.path, "fit.unknowns.thickness.prior", problem)
+        prior = asked.thickness.prior * length
+        shared.append(
+            Nuisance("thickness", low, high, "mm", "thickness", 1.0, prior, start=start,
+                     shared=True, why=PRODUCT)
+        )  # fmt: skip
+    return tuple(shared)
+
+
+def _bounds(
+    project: Project,
+    name: str,
+    section: UnknownSection,
+    usual: tuple[float, float],
+    start: float,
+    unit: float,
+) -> tuple[float, float]:
+    low, high = (unit * value for value in section.bounds or usual)
+    if not low < high:
+        problem = f"expected [least, largest], got [{low / unit:g}, {high / unit:g}]"
+        raise InputError(project.path, f"fit.unknowns.{name}.bounds", problem)
+    if not low <= start <= high:
+        problem = (
+            f"expected bounds around {start / unit:g}, from which a fit starts, got "
+            f"[{low / unit:g}, {high / unit:g}]"
+        )
+        raise InputError(project.path, f"fit.unknowns.{name}.bounds", problem)
+    return low, high
+
+
+def with_shared(
+    comparisons: Iterable[Comparison], shared: Iterable[Nuisance]
+) -> tuple[Comparison, ...]:
+    """The comparisons with what they share before what is their own.
+
+    The misfit that a prior allows is that of the data where it is one standard deviation away: it
+    weighs what one value does of a block whose norm is that of its noise.
+    """
+    several, unknowns = tuple(comparisons), tuple(shared)
+    if not unknowns:
+        return several
+    weight = float(np.median([_weight(c) for c in several]))
+    unknowns = tuple(n if n.prior is None else replace(n, weight=weight) for n in unknowns)
+    own = [tuple(n for n in c.nuisance if not n.shared) for c in several]
+    return tuple(replace(c, nuisance=(*unknowns, *n)) for c, n in zip(several, own, strict=True))
+
+
+def _weight(comparison: Comparison) -> float:
+    objective = comparison.objective
+    noise = objective.least_noise / np.median(objective.scale)
+    return float(noise / np.sqrt(np.mean(objective.sizes)))
+
+
+#: What has to be the same: where moduli mean the same, and are between the same bounds. Data, seed
+#: and solver may be others.
+SAME = ("law", "tests")
+KEY = "fit.earlier (or --earlier)"
+
+
+def proposals(
+    folder: Path, parts: dict[str, str], columns: list[str], scale: float
+) -> ProposedStarts:
+    """What the evaluations in the folder of an earlier fit propose.
+
+    Parameters
+    ----------
+    parts : digests of this fit, by what they are of. columns : names of the coefficients in a
+    history. scale : MPa per unit of it.
+
+    Raises
+    ------
+    InputError : no such folder, a fit of another model, no evaluation; no scikit-learn.
+    """
+    try:
+        before = dict(json.loads((folder / RUN).read_text(encoding="utf-8"))[PARTS])
+        text = (folder / HISTORY).read_text(encoding="utf-8", errors="replace")
+    except (OSError, ValueError, KeyError, TypeError):
+        problem = f"expected the folder of a fit, with {RUN} and {HISTORY}"
+        raise InputError(folder, KEY, problem) from None
+    other = [name for name in SAME if before.get(name) != parts[name]]
+    if other:
+        problem = f"is a fit of another model: its {' and '.join(other)} differ from this fit's"
+        raise InputError(folder, KEY, f"{problem}; name a fit of this model, or start elsewhere")
+    head, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())
+    if any(column not in head for column in columns):
+        raise InputError(folder / HISTORY, KEY, f"has not the columns {', '.join(columns)}")
+    places, value = [head.index(column) for column in columns], HEADER.index("objective")
+    whole = [row for row in rows if len(row) == len(head) and row[value]]
+    try:
+        coefficients = np.array([[float(row[k]) for k in places] for row in whole]) * scale
+        objectives = np.array([float(row[value]) for row in whole])
+    except ValueError as error:
+        raise InputError(folder / HISTORY, KEY, f"is damaged: {error}") from None
+    good = np.isfinite(objectives)
+    if not good.any():
+        raise InputError(folder / HISTORY, KEY, "holds no evaluation that ended well")
+    good &= np.isfinite(coefficients).all(axis=1)
+    return ProposedStarts(coefficients[good], objectives[good])
+
+
+#: Leads the fit where the solver that counts gives no derivatives.
+SURROGATE = "membrane"
+#: Most analyses of one start, unless the file says otherwise.
+MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
+#: Where a project names its solver.
+SOLVER_KEY = "fit.solver"
+#: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
+#: solver is told by what it says of itself.
+UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlier")
+
+
+@dataclass(frozen=True, eq=False)
+class FitSetup:
+    """A fit ready to run, without anything of a solver: what worker processes are given.
+
+    Parameters
+    ----------
+    law : everything but the coefficients. tests : with their data. counts : by name of a test, how
+    many times the weight that the project gives it. starts : where they begin.
+    """
+
+    project: Project
+    law: HypoelasticLaw
+    bounds: LawBounds
+    tests: tuple[PreparedTest, ...]
+    counts: Mapping[str, float] = field(default_factory=dict)
+    starts: Starts = field(default_factory=RandomStarts)
+
+    @property
+    def weightings(self) -> tuple[Weighting, ...]:
+        """One a test: alone it has its own objective, among others its relative errors count."""
+        several = len(self.tests) > 1
+        weights = [t.test.weight * self.counts.get(t.test.name, 1.0) for t in self.tests]
+        return tuple(Weighting(several, weight if several else 1.0) for weight in weights)
+
+    @property
+    def objective_is(self) -> str:
+        """What the fit minimises, in words."""
+        if len(self.tests) > 1:
+            return "weighted sum of the tests' mean relative RMS errors"
+        return self.tests[0].objective_is
+
+    def problem(self, masks: Masks | None = None) -> FitProblem:
+        """The fit, built anew; `masks`: which measured points it matches, by comparison."""
+        comparisons = [
+            comparison
+            for test, weighting in zip(self.tests, self.weightings, strict=True)
+            for comparison in test.comparisons(self.make_solver, weighting, masks)
+        ]
+        problem = self.problem_of(comparisons)
+        if masks is not None and isinstance(self.starts, ProposedStarts):
+            problem.starts = RandomStarts()  # nothing of the points left out may be in them
+        return problem
+
+    def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
+        """The fit of comparisons of its tests, whatever the models: the law's unknowns and theirs,
+        and what leads where the solver that counts gives no derivatives."""
+        comparisons = with_shared(comparisons, shared_unknowns(self.project))
+        law, ends = self.law, self.law.strain_range.tolist()
+        unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
+        problem = FitProblem(tuple(comparisons), self.law, unknowns, starts=self.starts)
+        if not isinstance(problem.solver, DifferentiatingSolver):
+            problem.surrogate = problem.with_solvers([solver_named(SURROGATE) for _ in comparisons])
+        return problem
+
+    def make_solver(self, name: str | None = None) -> Solver:
+        """A new solver as the project names it, or another by name, with the project's settings."""
+        return make_solver(self.project, name)
+
+    def make_leading(self, name: str | None = None) -> Solver:
+        """As `make_solver` where that one gives derivatives, else what leads it."""
+        solver = self.make_solver(name)
+        return solver if isinstance(solver, DifferentiatingSolver) else self.make_solver(SURROGATE)
+
+    def own(self, test: PreparedTest) -> tuple[Comparison, ...]:
+        """The comparisons of one test with its own objective."""
+        return test.comparisons(self.make_solver, Weighting())
+
+    @property
+    def options(self) -> FitOptions:
+        """How each start is fitted."""
+        fit = self.project.fit
+        most = fit.max_analyses or MOST_ANALYSES[fit.method]
+        return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, most)
+
+
+def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
+    """Read or compute the data of the tests, and check everything that a fit needs.
+
+    Raises
+    ------
+    InputError : in the project or its data. SolverFailure : the solver is not there, or a known
+        solution cannot be run.
+    """
+    fit = project.fit
+    options = project.options_of(fit.solver)
+    # Once here, in one line, rather than as the failure of every analysis.
+    solver = usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
+    shared_unknowns(project)  # says now what is wrong with them
+    law = law_of(project, [test.reach for test in tests])
+    try:
+        check_carries(solver, law)
+    except InputError as error:
+        raise InputError(project.path, "law.form", error.problem) from None
+    bounds = bounds_of(project, law.form)
+    make = functools.partial(make_solver, project)
+    ready = tuple(test.prepare(law, make) for test in tests)
+    setup = FitSetup(project, law, bounds, ready)
+    return replace(setup, starts=_starts(setup))
+
+
+def _starts(setup: FitSetup) -> Starts:
+    """Where the project says that starts begin."""
+    project, fit = setup.project, setup.project.fit
+    if fit.earlier is not None and fit.starts_from != "proposed":
+        said = 'means something with starts_from = "proposed" only'
+        raise InputError(project.path, KEY, said)
+    if fit.starts_from != "proposed":
+        return SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
+    if fit.earlier is None:
+        said = "name the folder of an earlier fit of this project: what it evaluated proposes"
+        raise InputError(project.path, KEY, said)
+    problem, scales = setup.problem(), project.scales
+    columns = [f"{label}_{scales.modulus_unit}" for label in problem.unknowns.labels]
+    folder = beside(project.path.parent, fit.earlier)
+    return proposals(folder, fingerprints(setup, problem), columns, scales.modulus)
+
+
+def make_solver(project: Project, name: str | None = None) -> Solver:
+    """A new solver: the project's own, or another by name, with the project's settings of it.
+
+    Raises
+    ------
+    InputError : there is none of that name.
+    """
+    named = name or project.fit.solver
+    return solver_named(named, project.run_cache, **project.options_of(named))
+
+
+def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
+    """Digests of everything that a start's result depends on, by what they are of."""
+    fit = setup.project.fit
+    proposed = setup.starts if isinstance(setup.starts, ProposedStarts) else None
+    own = {} if proposed is None else {
+        "earlier evaluations": digest_of(proposed.coefficients, proposed.objectives)
+    }  # fmt: skip
+    return {
+        **own,
+        "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
+        "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
+        "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
+        "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
+        "solver": digest_of(fit.solver, problem.solver.identity),
+    }
+
+
+#: Edges of quads of the full mesh are those of the coarse one times it.
+COARSER = 0.5
+
+
+def coarse_problem(setup: FitSetup) -> FitProblem | None:
+    """The fit on coarse meshes, run by the project's solver, or by what leads it.
+
+    Tests whose kind knows no coarser mesh, or whose mesh is coarse already, stay as they are; None
+    where all do.
+    """
+    make = setup.make_leading
+    pairs = list(zip(setup.tests, setup.weightings, strict=True))
+    coarse = [_coarse(test, make, weighting) for test, weighting in pairs]
+    if not any(coarse):
+        return None
+    comparisons = [
+        comparison
+        for (test, weighting), own in zip(pairs, coarse, strict=True)
+        for comparison in own or test.comparisons(make, weighting)
+    ]
+    return setup.problem_of(comparisons)
+
+
+def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Comparison, ...]:
+    if not isinstance(test, Refinable):
+        return ()
+    try:
+        return test.finer(make, weighting, COARSER)
+    except InputError:
+        return ()  # the mesh is as coarse as it can be
+
+
+@dataclass(frozen=True)
+class CoarseToFine:
+    """What ran on which mesh.
+
+    quads : by comparison, of the coarse and of the full mesh; those without a mesh are not among
+    them. starts : on the coarse mesh. distinct : of their optima, fitted on the full mesh.
+    coarse_analyses, full_analyses : of all starts together.
+    """
+
+    quads: dict[str, tuple[int, int]]
+    starts: int
+    distinct: int
+    coarse_analyses: int
+    full_analyses: int
+
+    @classmethod
+    def of(cls, setup: FitSetup, records: Sequence[StartRecord]) -> CoarseToFine | None:
+        """Of a fit that ended with these records; None where every start ran on its own mesh."""
+        coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
+        if coarse is None:
+            return None
+        pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
+        quads = {
+            own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
+            for other, own in pairs
+            if hasattr(own.model, "mesh")
+        }
+        before = sum(record.coarse_analyses for record in records)
+        after = sum(record.analyses for record in records) - before
+        distinct = sum(record.same_as is None for record in records)
+        return cls(quads, len(records), distinct, before, after)
+
+    @property
+    def words(self) -> str:
+        """In a line, for page and terminal."""
+        meshes = ", ".join(
+            f"{name} {coarse} of {full} quads" for name, (coarse, full) in self.quads.items()
+        )
+        return (
+            f"{self.starts} starts on the coarse mesh ({meshes}; {self.coarse_analyses} analyses), "
+            f"{self.distinct} distinct of their optima on the full one ({self.full_analyses})"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        quads = {
+            name: dict(zip(("coarse", "full"), own, strict=True))
+            for name, own in self.quads.items()
+        }
+        return {**asdict(self), "quads": quads}

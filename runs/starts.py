@@ -1,0 +1,355 @@
+"""One start of a study: from its number to its optimum, with every evaluation told."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import io
+import json
+import logging
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from io import FileIO
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, NoFeasibleStart
+from ..experiments.kinds import RunRecord, strains_of
+from ..inference.methods.base import FitOptions
+from ..inference.problem import FitProblem
+from ..inference.search import feasible_start, fit_from
+from ..writing import telling
+from .folder import Store
+
+#: On which mesh something ran: on that of the project, or on the coarse one that leads to it.
+MeshName = Literal["full", "coarse"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of a fit begins: what is counted in it, and how many there are."""
+
+    what: str
+    total: int
+
+
+@dataclass(frozen=True)
+class EvaluationRecord:
+    """One analysis by `solver`, a row of history.csv. `objective` is None when it failed."""
+
+    start: int
+    analysis: int
+    objective: float | None
+    status: str
+    coefficients: tuple[float, ...]
+    nuisance: tuple[float, ...]
+    solver: str = "membrane"
+    mesh: MeshName = "full"
+
+
+@dataclass(frozen=True)
+class StartRecord:
+    """How one start ended. `unknowns` are the optimiser's; objective None: there is no fit.
+
+    analyses : in all; external_runs : of them, run by an external solver; cached_runs : of them, by
+    an external solver earlier and taken from the cache of runs. failure : why the solver
+    failed, where that ended it: it is no finished start, and is run again on going on. reached :
+    largest strain (eps1, eps2, gamma12) at the optimum.
+
+    mesh : that the objective is of. Of a start that ran coarse to fine: coarse_objective, what it
+    left on the coarse mesh; coarse_analyses, how many of the analyses ran there; same_as, the start
+    with the same optimum there, which alone was fitted on the full mesh and whose fit this is.
+    """
+
+    number: int
+    seed: tuple[int, int]
+    objective: float | None
+    status: str
+    analyses: int
+    unknowns: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    wall_s: float
+    external_runs: int = 0
+    failure: str = ""
+    reached: tuple[float, ...] = ()
+    mesh: MeshName = "full"
+    coarse_objective: float | None = None
+    coarse_analyses: int = 0
+    same_as: int | None = None
+    cached_runs: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, exact in JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> StartRecord:
+        """The inverse of `to_json`; KeyError or TypeError when it is not one."""
+        return cls(
+            number=int(values["number"]),
+            seed=(int(values["seed"][0]), int(values["seed"][1])),
+            objective=_number(values["objective"]),
+            status=str(values["status"]),
+            analyses=int(values["analyses"]),
+            unknowns=tuple(map(float, values["unknowns"])),
+            coefficients=tuple(map(float, values["coefficients"])),
+            wall_s=float(values["wall_s"]),
+            external_runs=int(values.get("external_runs", 0)),
+            failure=str(values.get("failure", "")),
+            reached=tuple(map(float, values.get("reached", ()))),
+            mesh="coarse" if values.get("mesh") == "coarse" else "full",
+            coarse_objective=_number(values.get("coarse_objective")),
+            coarse_analyses=int(values.get("coarse_analyses", 0)),
+            cached_runs=int(values.get("cached_runs", 0)),
+        )
+
+
+def run_start(
+    problem: FitProblem,
+    options: FitOptions,
+    seed: int,
+    number: int,
+    tell: Callable[[EvaluationRecord], None],
+    mesh: MeshName = "full",
+    coarse: StartRecord | None = None,
+) -> StartRecord:
+    """Draw feasible start `number` of study `seed` and fit from it; tell every evaluation.
+
+    mesh : of the problem, for the records. coarse : how the start ended on the coarse mesh: the fit
+    begins at its optimum, if it has one, and its analyses are counted on.
+    """
+    begun = time.perf_counter()
+    problem.reset()
+    size = problem.unknowns.size
+    near = coarse is not None and coarse.objective is not None
+
+    runs = 0
+    before = analyses = 0 if coarse is None else coarse.analyses
+
+    def watch(y: NDArray, value: float | None, status: str, solver: str) -> None:
+        nonlocal analyses, runs
+        analyses += 1
+        runs += problem.solver.external and solver == problem.solver.name
+        coefficients = problem.unknowns.to_coefficients @ y[:size]
+        tell(
+            EvaluationRecord(
+                number,
+                analyses,
+                value,
+                status,
+                tuple(coefficients.tolist()),
+                tuple(np.asarray(y[size:]).tolist()),
+                solver,
+                mesh,
+            )
+        )
+
+    watched = [p for p in (problem, problem.surrogate) if p is not None]
+    for p in watched:
+        p.watch = watch
+    try:
+        if coarse is not None and near:
+            start = np.array(coarse.unknowns)
+        else:
+            start = feasible_start(problem, seed, number)
+        optimum = fit_from(problem, start, options, near)
+        failure = optimum.failure if optimum is not None else _why(watched)
+        status = f"{problem.solver.name} failed: {failure}"
+    except NoFeasibleStart as error:
+        optimum, status, failure = None, str(error), ""
+    finally:
+        for p in watched:
+            p.watch = None
+    cached = problem.cached if problem.solver.external else 0
+    wall = time.perf_counter() - begun + (0.0 if coarse is None else coarse.wall_s)
+    none = StartRecord(
+        number, (seed, number), None, status, analyses, (), (), wall, runs - cached, failure,
+        mesh=mesh, coarse_objective=None if coarse is None else coarse.objective,
+        coarse_analyses=before, cached_runs=cached,
+    )  # fmt: skip
+    if optimum is None:
+        return none
+    return replace(
+        none,
+        objective=optimum.value,
+        status=optimum.status,
+        unknowns=tuple(optimum.best.unknowns.tolist()),
+        coefficients=tuple(optimum.coefficients.tolist()),
+        reached=tuple(np.max([strains_of(h) for h in optimum.best.histories], axis=0).tolist()),
+    )
+
+
+def coarse_columns(record: StartRecord) -> dict[str, Any]:
+    """What a table says of a start that ran coarse to fine."""
+    names = ("coarse_objective", "coarse_analyses", "same_as")
+    return {name: getattr(record, name) for name in names}
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _why(problems: Sequence[FitProblem]) -> str:
+    """Why nothing came of the first that failed: the solver that counts, else what leads it."""
+    return next((p.failure for p in problems if p.failure), "the first analysis failed")
+
+
+STARTS, HISTORY = "starts.jsonl", "history.csv"
+#: What every history begins with; the mesh is "full", or "coarse" where it leads to the full one.
+HEADER = ("start", "analysis", "solver", "mesh", "objective", "status")
+MESH = HEADER.index("mesh")
+
+
+class RunningFiles:
+    """The running files of a fit in its store.
+
+    Parameters
+    ----------
+    columns : names of the unknowns' values after the columns that every history has; coefficients
+        are divided by `scale` (MPa per unit of the file) and carry their unit in the name.
+    """
+
+    def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:
+        self.store, self.columns, self.scale = store, tuple(columns), tuple(scale)
+        self._rows: FileIO | None = None
+        self._starts: FileIO | None = None
+
+    def begin(self, resume: bool) -> list[StartRecord]:
+        """Open the files; the starts that are finished already (none unless going on).
+
+        One that the solver's failure ended is not. A start that runs coarse to fine can be finished
+        on either mesh.
+
+        Raises
+        ------
+        InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
+        """
+        done = self.finished() if resume else []
+        ended = {(str(record.number), record.mesh) for record in done}
+        rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
+        lines = [json.dumps(record.to_json()) + "\n" for record in done]
+        self.store.write(STARTS, "".join(lines))
+        self.store.write(HISTORY, _table([[*HEADER, *self.columns], *rows]))
+        with telling(self.store.path):
+            # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
+            self._starts = open(self.store.path / STARTS, "ab", buffering=0)
+            self._rows = open(self.store.path / HISTORY, "ab", buffering=0)
+        return done
+
+    def add(self, record: EvaluationRecord | StartRecord) -> None:
+        """Append to history.csv or starts.jsonl and hand it to the system at once.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        assert self._rows is not None and self._starts is not None
+        with telling(self.store.path):
+            if isinstance(record, StartRecord):
+                _append(self._starts, json.dumps(record.to_json()) + "\n")
+                os.fsync(self._starts.fileno())
+                return
+            values = (*record.coefficients, *record.nuisance)
+            numbers = [repr(v / s) for v, s in zip(values, self.scale, strict=True)]
+            value = "" if record.objective is None else repr(record.objective)
+            said = record.start, record.analysis, record.solver, record.mesh, value, record.status
+            _append(self._rows, _table([[*said, *numbers]]))
+
+    def finish(self) -> None:
+        """Close the files and put history.csv in order of start and analysis.
+
+        Of a start that began again, because its process died, the rows of the last time count.
+        """
+        self.close()
+        rows = self._read()
+        last = {(int(row[0]), int(row[1])): row for row in rows[1:]}
+        body = [last[number] for number in sorted(last)]
+        self.store.write(HISTORY, _table([rows[0], *body]))
+
+    def close(self) -> None:
+        """Close the files (harmless when they are not open)."""
+        for stream in (self._rows, self._starts):
+            if stream is not None:
+                stream.close()
+        self._rows = self._starts = None
+
+    def finished(self) -> list[StartRecord]:
+        """The starts that ended, as starts.jsonl has them.
+
+        Raises
+        ------
+        InputError : a line of it is damaged.
+        """
+        path = self.store.path / STARTS
+        done: dict[tuple[int, str], StartRecord] = {}
+        # A crash can leave bytes that are no text where the last line should be.
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        lines = text.splitlines()
+        for i, line in enumerate(lines):
+            try:
+                record = StartRecord.from_json(json.loads(line))
+            except (ValueError, KeyError, TypeError, IndexError):
+                if i == len(lines) - 1:
+                    break  # cut off by a kill: that start is run again
+                problem = "is damaged; use --overwrite"
+                raise InputError(path, f"line {i + 1}", problem) from None
+            done[record.number, record.mesh] = record
+        return [record for record in done.values() if not record.failure]
+
+    def _read(self) -> list[list[str]]:
+        path = self.store.path / HISTORY
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        whole = text[: text.rfind("\n") + 1]  # a last line without its end was cut off
+        return [row for row in csv.reader(io.StringIO(whole)) if len(row) > MESH]
+
+
+def _append(stream: FileIO, text: str) -> None:
+    content = text.encode()
+    if stream.write(content) != len(content):
+        # The rest would not fit; a last line without its end is left out when it is read.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _table(rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+log = logging.getLogger(__name__)
+
+
+def log_record(record: EvaluationRecord | StartRecord | None) -> None:
+    """An analysis, or how a start ended; nothing where only time has passed."""
+    if isinstance(record, EvaluationRecord):
+        left = "failed" if record.objective is None else f"objective {record.objective:.6g}"
+        coarse = ", coarse mesh" if record.mesh == "coarse" else ""
+        log.info(
+            "start %d, analysis %d by %s%s: %s, %s",
+            record.start, record.analysis, record.solver, coarse, left, record.status,
+        )  # fmt: skip
+    elif isinstance(record, StartRecord):
+        left = "no fit" if record.objective is None else f"objective {record.objective:.6g}"
+        log.info(
+            "start %d ended: %s, %s; %d analyses in %.2f s",
+            record.number, record.status, left, record.analyses, record.wall_s,
+        )  # fmt: skip
+
+
+def log_run(title: str, record: RunRecord, again: bool) -> None:
+    """A prediction: how it ended, or that the folder held it."""
+    how = record.failure or (f"stopped early, {record.early}" if record.early else "finished")
+    log.info("%s: %s; %.2f s%s", title, how, record.seconds, ", kept from before" * again)
+
+
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Log how long a part of a command took."""
+    begun = time.perf_counter()
+    yield
+    log.info("%s: %.2f s", what, time.perf_counter() - begun)

@@ -1,0 +1,332 @@
+"""Hencky's inflated circular membrane (1915): series solution, and ours at small strains.
+
+With S = N_r (E t p^2 R^2)^(-1/3) and r in units of R the equilibrium and compatibility of a flat,
+linear elastic membrane under vertical pressure are  S'' + 3 S'/r + 1/(8 S^2) = 0, regular at
+r = 0, with u = 0 at the rim: N_theta = nu N_r, (1 - nu) S + S' = 0 at r = 1. The slope of the
+dome is -r/(2 S) (p R/(E t))^(1/3), whose integral is the height of the apex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, newton
+
+from ...errors import SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.cylinder_model import InflatedModel
+from ...meshes.disk import disk_mesh
+from ...meshes.mesh import Mesh, middle_strain
+from ...meshes.tube import half_tube, sphere_octant, tube_warp
+from ...solvers.base import History
+from ...solvers.membrane.bubble import Wall
+from ...solvers.membrane.closed import closed_membrane
+from ...solvers.membrane.solver import MembraneSolver
+from .number import Number
+
+TERMS = 60
+RADIUS, THICKNESS, MODULUS = 100.0, 0.81, 300.0
+#: b_0 = 4 S(0) by nu.
+FICHTER = {0.0: 1.6204, 0.1: 1.6487, 0.2: 1.6827, 0.3: 1.7244, 0.34: 1.7439, 0.4: 1.7769}
+SOURCE = "Fichter, NASA TP 3658 (1997)"
+#: Height over radius at which ours are computed (strains of about 2.5e-4), and quads of the disk.
+HEIGHT, QUADS = 0.02, 3200
+#: Ours is 2e-4 off for the mesh and for slopes that are not small; 0.653 has three digits.
+ALLOWED, APEX_ALLOWED = 1e-3, 2e-3
+
+
+def stress_series(first: float) -> NDArray[np.float64]:
+    """Coefficients c_n (TERMS,) of S = sum c_n r^(2n) for S(0) = first."""
+    c, square = np.zeros(TERMS), np.zeros(TERMS)
+    c[0], square[0] = first, first**2
+    # Powers of S^2 (S'' + 3 S'/r) = -1/8; S'' + 3 S'/r = sum 2n (2n + 2) c_n r^(2n - 2).
+    curvature = np.zeros(TERMS)
+    for n in range(1, TERMS):
+        k = n - 1
+        target = -0.125 if k == 0 else 0.0
+        curvature[k] = (target - square[1 : k + 1] @ curvature[k - 1 :: -1][:k]) / square[0]
+        c[n] = curvature[k] / (2 * n * (2 * n + 2))
+        square[n] = c[: n + 1] @ c[n::-1]
+    return c
+
+
+def first_coefficient(nu: float) -> float:
+    """S(0): the one whose series fulfils the condition at the rim."""
+    powers = 2 * np.arange(TERMS)
+
+    def rim(first: float) -> float:
+        c = stress_series(first)
+        return float((1 - nu) * c.sum() + powers @ c)
+
+    # The series converges at the rim for all of these; b_0 is 1.6 to 2 in the tables.
+    return float(brentq(rim, 0.36, 0.60, xtol=1e-14))
+
+
+def apex_coefficient(nu: float) -> float:
+    """Apex height over R (p R/(E t))^(1/3)."""
+    c, powers = stress_series(first_coefficient(nu)), 2 * np.arange(TERMS)
+    r, weight = np.polynomial.legendre.leggauss(40)
+    r, weight = 0.5 * (r + 1), 0.5 * weight
+    return float(weight @ (r / (2 * (c @ r ** powers[:, None]))))
+
+
+def hencky_membranes() -> Iterator[Number]:
+    """Stress at the centre and height of the apex of the embedded membrane's bubble."""
+    for nu, b_0 in FICHTER.items():
+        height, stress = bubble(nu)
+        yield Number(f"b_0 of Hencky's membrane, nu {nu:g}", stress, b_0, "", ALLOWED, SOURCE)
+        if nu == 0.3:
+            what = "apex over R (pR/Et)^(1/3), nu 0.3"
+            yield Number(what, height, 0.653, "", APEX_ALLOWED, "Hencky (1915)")
+
+
+def bubble(nu: float) -> tuple[float, float]:
+    """Apex over R (p R/(E t))^(1/3), and b_0 from the strain at the centre, by the membrane."""
+    pressure = (HEIGHT / apex_coefficient(nu)) ** 3 * MODULUS * THICKNESS / RADIUS
+    law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2 / (1 + nu), nu)
+    mesh = disk_mesh(RADIUS, QUADS, "quarter")
+    history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, [pressure]), law)
+    u, apex = history.displacement[0], mesh.node_sets["apex"][0]
+    height = u[apex, 2] / RADIUS * (pressure * RADIUS / MODULUS / THICKNESS) ** (-1 / 3)
+    around = np.flatnonzero((mesh.quads == apex).any(axis=1))
+    strain = middle_strain(mesh, u, np.array([1.0, 0.0, 0.0]))[around, :2].mean()
+    force = MODULUS * THICKNESS * strain / (1 - nu)
+    scale = (MODULUS * THICKNESS * pressure**2 * RADIUS**2) ** (1 / 3)
+    return float(height), float(4 * force / scale)
+
+
+E, NU, THICKNESS_THIN_WALLS, RADIUS_THIN_WALLS = 300.0, 0.3, 0.8, 75.0
+ISOTROPIC = HypoelasticLaw.linear(E, E, 0.5 * E / (1 + NU), NU)
+OCTANT = {"symmetry_x": (0,), "symmetry_y": (1,), "symmetry_z": (2,)}
+ALLOWED_THIN_WALLS = 5e-3
+TUBE_MPA, SPHERE_MPA = 0.2, 0.8
+
+
+def thin_walls() -> Iterator[Number]:
+    """Radius and stresses of both, computed with the embedded membrane."""
+    strain = capped_strain(ISOTROPIC, TUBE_MPA, RADIUS_THIN_WALLS, THICKNESS_THIN_WALLS)
+    radius = RADIUS_THIN_WALLS * float(np.exp(strain[1]))
+    hoop = TUBE_MPA * radius / THICKNESS_THIN_WALLS
+    steps = TUBE_MPA * np.array([0.05, *np.arange(1, 11) / 10])
+    exact = (radius, hoop / 2, hoop)
+    names = (("radius", "mm"), ("axial stress", "MPa"), ("hoop stress", "MPa"))
+    for (name, unit), ours, theirs in zip(names, middle_of_tube(steps), exact, strict=True):
+        yield Number(
+            f"{name} of a capped tube",
+            ours,
+            theirs,
+            unit,
+            ALLOWED_THIN_WALLS,
+            "p r/t and p r/(2 t)",
+        )
+    strain_of_sphere = sphere_strain(SPHERE_MPA)
+    radius = RADIUS_THIN_WALLS * float(np.exp(strain_of_sphere))
+    found = sphere((0.01, 0.1, 0.4, SPHERE_MPA))
+    exact = (radius, 4 / 3 * np.pi * radius**3, E / (1 - NU) * strain_of_sphere)
+    names = (("radius", "mm"), ("volume", "mm3"), ("stress", "MPa"))
+    for (name, unit), ours, theirs in zip(names, found, exact, strict=True):
+        yield Number(f"{name} of a sphere", ours, theirs, unit, ALLOWED_THIN_WALLS, "p r/(2 t)")
+
+
+def capped_strain(
+    law: HypoelasticLaw, pressure: float, radius: float, thickness: float
+) -> NDArray[np.float64]:
+    """Axial and hoop log strain of a long capped tube: D(eps) deps = d(p r/(2 t), p r/t)."""
+    parts = np.array([0.5, 1.0])
+
+    def rate(p: float, strain: NDArray[np.float64]) -> NDArray[np.float64]:
+        e1, e2 = float(law.E1(strain[0])), float(law.E2(strain[1]))
+        den = 1 - law.nu12**2 * e2 / e1
+        d = np.array([[e1, law.nu12 * e2], [law.nu12 * e2, e2]]) / den
+        line = radius * np.exp(strain[1]) / thickness * parts
+        return np.linalg.solve(d - p * np.outer(line, [0.0, 1.0]), line)
+
+    solution = solve_ivp(rate, (0, pressure), [0.0, 0.0], rtol=1e-10, atol=1e-12)
+    return np.asarray(solution.y[:, -1])
+
+
+def sphere_strain(pressure: float) -> float:
+    """Log strain of a sphere: p r/(2 t) = E/(1 - nu) log(r/R), constant thickness."""
+
+    def excess(strain: float) -> float:
+        return E / (1 - NU) * strain - pressure * RADIUS_THIN_WALLS * np.exp(strain) / (
+            2 * THICKNESS_THIN_WALLS
+        )
+
+    return float(brentq(excess, 0.0, 0.9))
+
+
+def middle_of_tube(pressures: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
+    """Radius (mm), axial and hoop stress (MPa) in the middle of a tube with flat caps."""
+    model, solver = tube_model(24, 12, 600.0, pressures), MembraneSolver(1e-9)
+    return in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
+
+
+def tube_model(
+    across: int,
+    along: int,
+    length: float,
+    pressures: Sequence[float] | NDArray[np.float64],
+    caps: bool = True,
+) -> InflatedModel:
+    """Half of half a tube: x >= 0, z >= 0, its lowest node in the middle held up.
+
+    across, along : facets. caps : a flat one at the end, which otherwise keeps its place along z.
+    """
+    mesh = half_tube(across, along, RADIUS_THIN_WALLS, length, caps)
+    hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
+    mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
+    supports: dict[str, tuple[int, ...]] = {
+        "symmetry_x": (0,), "symmetry_z": (2,), "hang": (1,)
+    }  # fmt: skip
+    if not caps:
+        supports["end"] = (2,)
+    warp = tube_warp(mesh, length)
+    return InflatedModel(mesh, THICKNESS_THIN_WALLS, warp, list(pressures), supports, copies=4)
+
+
+def in_the_middle(
+    model: InflatedModel, history: History, stress: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure.
+
+    stress : (quads, points, 3) MPa, at the last pressure.
+    """
+    near = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
+    ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
+    height = (model.mesh.points + history.displacement[-1])[ring, 1]
+    axial, hoop, _ = stress[near].mean(axis=(0, 1))
+    return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
+
+
+def sphere_model(
+    n: int, pressures: Sequence[float], warp: tuple[float, float, float] = (0.3, 0.2, 1.0)
+) -> InflatedModel:
+    """An octant of 3 n^2 facets."""
+    mesh = sphere_octant(n, RADIUS_THIN_WALLS)
+    return InflatedModel(mesh, THICKNESS_THIN_WALLS, warp, list(pressures), OCTANT, copies=8)
+
+
+def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
+    """Radius (mm), volume (mm^3) and stress (MPa) of a sphere at the last pressure."""
+    model, solver = sphere_model(12, pressures), MembraneSolver(1e-9)
+    history = solver.run(model, ISOTROPIC)
+    radius = np.linalg.norm(model.mesh.points + history.displacement[-1], axis=1).mean()
+    volume = history.cavity_volume
+    assert volume is not None
+    return float(radius), float(volume[-1]), float(solver.stress[..., :2].mean())
+
+
+# A pressurised tube bent beyond its first wrinkle (Comer and Levy 1963).
+#
+# A tube under pressure p, its ends kept plane and turned against each other. No stress at angles
+# below t from the compressed side, where cos t = (mean strain over strain by bending), and
+# M/(pi p r^3) between 1/2 (first wrinkle) and 1.
+
+RADIUS_BENT_TUBE, LENGTH, THICKNESS_BENT_TUBE, MODULUS_BENT_TUBE, PRESSURE = (
+    100.0,
+    60.0,
+    1.0,
+    1000.0,
+    0.02,
+)
+#: Curvature (1/mm) at which the first wrinkle comes, and multiples of it.
+FIRST = 0.5 * PRESSURE / (THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE)
+TIMES = (1.5, 2.5, 4.0)
+FACETS, SHARE = 32, 1e-4
+SOURCE_BENT_TUBE = "Comer and Levy, AIAA Journal 1 (1963)"
+
+
+def bent_tubes() -> Iterator[Number]:
+    """Bending moments at multiples of the curvature of the first wrinkle."""
+    tube = PlaneEnds(FACETS, SHARE)
+    for times in TIMES:
+        _, moment, radius = tube.moment(times * FIRST)
+        what = f"M/(pi p r^3) at {times:g} times the first wrinkle's curvature"
+        yield Number(
+            what, moment, published_moment(times * FIRST, radius)[1], "", 2e-3, SOURCE_BENT_TUBE
+        )
+
+
+def published_moment(curvature: float, radius: float) -> tuple[float, float]:
+    """Share of the circumference that wrinkles, and M/(pi p r^3), at a curvature in 1/mm."""
+
+    def excess_force(t: float) -> float:
+        by_bending = 2.0 * radius**2 * THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE * curvature
+        return by_bending * ((np.pi - t) * np.cos(t) + np.sin(t)) - np.pi * radius**2 * PRESSURE
+
+    t = float(brentq(excess_force, 0.0, 3.1))
+    moment = (2 * np.pi - 2 * t + np.sin(2 * t)) / (4 * (np.sin(t) + (np.pi - t) * np.cos(t)))
+    return t / np.pi, float(moment)
+
+
+class PlaneEnds:
+    """Half of half a tube whose end at `LENGTH` stays plane, at a given turn and stretch.
+
+    Parameters
+    ----------
+    across : facets around the half circle. share : of its stiffness that the wall keeps across
+        wrinkles; None carries compression.
+
+    Raises
+    ------
+    SolverFailure : here and in `moment`, no equilibrium was found.
+    """
+
+    def __init__(self, across: int, share: float | None) -> None:
+        tube = half_tube(across, across // 8, RADIUS_BENT_TUBE, LENGTH, caps=False)
+        self.points = tube.points
+        self.end = np.flatnonzero(tube.points[:, 2] > LENGTH - 1e-6)
+        low = np.array([np.argmin(tube.points @ [0.0, 1.0, 1e-3])])
+        sets = {**tube.node_sets, "end": self.end, "low": low}
+        mesh = Mesh(tube.points, tube.quads, sets)
+        supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
+        model = InflatedModel(
+            mesh, THICKNESS_BENT_TUBE, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4
+        )
+        law = HypoelasticLaw.linear(
+            MODULUS_BENT_TUBE, MODULUS_BENT_TUBE, MODULUS_BENT_TUBE / 2.6, 0.3
+        )
+        self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
+        self.stretched = (
+            0.2 * PRESSURE * RADIUS_BENT_TUBE / (THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE)
+        )
+        start = np.zeros_like(self.points)
+        start[self.end, 2] = LENGTH * self.stretched
+        self.displacement = _found(self.membrane.equilibrium_from_slack(start, PRESSURE))
+
+    def moment(self, curvature: float) -> tuple[float, float, float]:
+        """Share of the wall that wrinkles, M/(pi p r^3), r; the end carries what p pushes on it."""
+
+        def excess_force(stretch: float) -> float:
+            start = self.displacement.copy()
+            start[self.end, 2] = LENGTH * (stretch + curvature * self.points[self.end, 1])
+            self.displacement = _found(self.membrane.equilibrium(start, PRESSURE))
+            return float(self.pull().sum() - np.pi * self.radius() ** 2 * PRESSURE)
+
+        ahead = self.stretched - 0.05 * curvature * RADIUS_BENT_TUBE
+        self.stretched = float(newton(excess_force, self.stretched, x1=ahead, tol=1e-11))
+        excess_force(self.stretched)
+        radius, height = self.radius(), (self.points + self.displacement)[self.end, 1]
+        middle = 0.5 * (height.max() + height.min())
+        wrinkled = self.membrane.wrinkled_share(np.ones(len(self.membrane.quads), dtype=bool))
+        moment = float(self.pull() @ (height - middle)) / (np.pi * PRESSURE * radius**3)
+        return wrinkled, moment, radius
+
+    def pull(self) -> NDArray[np.float64]:
+        """(nodes of the end,) N along the tube, of the whole circumference."""
+        return np.asarray(2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2])
+
+    def radius(self) -> float:
+        """Mean radius of the end, mm."""
+        return float(np.hypot(*(self.points + self.displacement)[self.end, :2].T).mean())
+
+
+def _found(displacement: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    if displacement is None:
+        raise SolverFailure("no equilibrium of a bent tube", "membrane")
+    return displacement

@@ -1,0 +1,362 @@
+"""What the weight between kinds of test does to a fit: one kind counts a quarter to four times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from ..inference.problem import FitProblem
+from ..inference.search import fit_from
+from ..materials.forms.base import COMPONENTS
+from ..notes import Note, NoteKind, rows, write_notes
+from ..project.project import Project
+from ..writing import replacing
+from .compare import errors
+from .fit import FitEvent
+from .result import Fit
+from .series import begin_study, mark_of, read_marked, write_marked
+from .setup import FitSetup, fingerprints
+from .stored_fit import stored_fit
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Shares of the strain reached at which moduli are followed.
+PLACES = (0.0, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class WeightedFit:
+    """The optimum where the tests of a kind count so many times.
+
+    relative : mean relative RMS error by test; rms : by comparison, in its unit. moduli : MPa at
+    the `PLACES` of the strain that the fit at the project's weights reached. unknowns : the
+    optimiser's. failure : why there is no fit, and nothing else.
+    """
+
+    count: float
+    relative: Mapping[str, float]
+    rms: Mapping[str, float]
+    moduli: Mapping[str, Sequence[float]]
+    unknowns: Sequence[float]
+    analyses: int
+    failure: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, exact in JSON."""
+        return asdict(self)
+
+
+RUNS = "weights-runs.json"
+
+
+class WeightsRecord:
+    """Fits under a mark of all that they depend on, the optimum they began at among it.
+
+    folder : None where nothing is written. resume : go on with what it holds.
+    """
+
+    def __init__(self, folder: Path | None, found: Fit, names: Sequence[str], resume: bool) -> None:
+        own = [f"{value:.9g}" for value in found.best.point.unknowns]
+        parts = {**fingerprints(found.setup, found.problem), "tests": list(names), "at": own}
+        self._mark = mark_of(parts)
+        self._folder, self._runs = folder, dict[float, dict[str, Any]]()
+        if folder is not None and resume:
+            self._runs = read_marked(folder / RUNS, self._mark, _by_count) or {}
+
+    def read(self, count: float) -> WeightedFit | None:
+        """The fit at this weight; None where there is none, or it failed."""
+        row = self._runs.get(count)
+        return None if row is None or row["failure"] else WeightedFit(**row)
+
+    def write(self, run: WeightedFit) -> None:
+        """Write a fit; raises OutputError."""
+        self._runs[run.count] = run.to_json()
+        if self._folder is not None:
+            write_marked(self._folder, RUNS, self._mark, {"runs": list(self._runs.values())})
+
+
+def _by_count(content: dict[str, Any]) -> dict[float, dict[str, Any]]:
+    return {row["count"]: WeightedFit(**row).to_json() for row in content["runs"]}
+
+
+TABLE, FIGURE = "weights.csv", "weights.png"
+ERROR = "mean relative RMS error of a test"
+
+
+@dataclass(frozen=True, eq=False)
+class WeightStudy:
+    """Fits over the weight of some of the tests.
+
+    counted : the kind or name asked for, names : of the tests. found : the fit at the project's
+    weights. runs : by rising weight.
+    """
+
+    title: str
+    counted: str
+    names: Sequence[str]
+    found: Fit
+    runs: Sequence[WeightedFit]
+
+    @property
+    def ended(self) -> list[WeightedFit]:
+        """The fits that ended well."""
+        return [run for run in self.runs if not run.failure]
+
+    def strain(self, name: str, place: float) -> float:
+        """The strain at which a modulus is followed."""
+        return float(place * self.found.best.valid[COMPONENTS[name]])
+
+    def table(self) -> pd.DataFrame:
+        """A row a weight: how many times it counts, errors by test and comparison, moduli."""
+        import pandas as pd
+
+        units = {c.name: c.objective.unit for c in self.found.problem.comparisons}
+        told = []
+        for run in self.ended:
+            row: dict[str, float] = {"weight_times": run.count}
+            row |= {f"relative {test}": value for test, value in run.relative.items()}
+            row |= {f"rms {name}, {units[name]}": value for name, value in run.rms.items()}
+            for name, values in run.moduli.items():
+                for place, value in zip(PLACES, values, strict=True):
+                    row[f"{name}_MPa at {self.strain(name, place):.4g}"] = value
+            told.append({**row, "analyses": run.analyses})
+        return pd.DataFrame(told)
+
+    def change(self, name: str) -> tuple[float, float]:
+        """Least and largest relative change of a modulus at any place, over all weights."""
+        own = next(run for run in self.runs if run.count == 1)
+        before = np.array(own.moduli[name])
+        changes = np.array([run.moduli[name] for run in self.ended]) / before - 1.0
+        low, high = np.round([changes.min(), changes.max()], 9) + 0.0  # no rounding of the fits
+        return float(low), float(high)
+
+    def sigma(self, name: str) -> list[float] | None:
+        """1 sigma, relative, at the places, at the project's weights; None where not known."""
+        sure = self.found.best.certainty
+        if sure is None:
+            return None
+        strains = [self.strain(name, place) for place in PLACES]
+        return [float(v) for v in np.interp(strains, sure.strain[name], sure.total[name])]
+
+    @property
+    def notes(self) -> list[Note]:
+        """Fits that failed, and what a reader should know of the one at the project's weights."""
+        failed = [
+            Note(NoteKind.FAILED, run.failure, f"weight times {run.count:.3g}")
+            for run in self.runs
+            if run.failure
+        ]
+        return [*failed, *self.found.notes]
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What result.json says."""
+        return {
+            "command": "validate",
+            "title": self.title,
+            "version": __version__,
+            "weights_of": self.counted,
+            "tests_counted": list(self.names),
+            "error": ERROR,
+            "strain": {n: [self.strain(n, p) for p in PLACES] for n in COMPONENTS},
+            "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
+            "change": {name: list(self.change(name)) for name in COMPONENTS},
+            "rows": [
+                {
+                    "weight_times": run.count,
+                    "relative": dict(run.relative),
+                    "rms": dict(run.rms),
+                    "moduli_MPa": {name: list(values) for name, values in run.moduli.items()},
+                    "analyses": run.analyses,
+                }
+                for run in self.ended
+            ],
+            "notes": rows(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """A table for the terminal, and how far the weight moves each modulus."""
+        tests = list(self.ended[0].relative)
+        wide = [max(12, 2 + len(name)) for name in tests]
+        head = "".join(f"{name:>{w}}" for name, w in zip(tests, wide, strict=True))
+        half = [f"{name} at {self.strain(name, 0.5):.3g}" for name in COMPONENTS]
+        said = [
+            f"weight of {self.counted}, times what the project says; {ERROR}; moduli in MPa",
+            f"{'weight':>8}{head}" + "".join(f"{words:>16}" for words in half),
+        ]
+        middle = list(PLACES).index(0.5)
+        for run in self.ended:
+            values = "".join(
+                f"{run.relative[name]:>{w}.4g}" for name, w in zip(tests, wide, strict=True)
+            )
+            moduli = "".join(f"{run.moduli[name][middle]:>16.4g}" for name in COMPONENTS)
+            said.append(f"{run.count:>8.3g}{values}{moduli}")
+        for name in COMPONENTS:
+            low, high = self.change(name)
+            sigma = self.sigma(name)
+            beside = "" if sigma is None else f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
+            said.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
+        return said
+
+    def write(self, folder: Path) -> None:
+        """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
+        from ..reports.html import write_report
+        from ..reports.weights import plot_weights
+        from ..reports.weights_charts import weights_charts
+        from .folder import Store
+        from .series import study_page
+
+        with replacing(folder / TABLE) as path:
+            self.table().to_csv(path, index=False, float_format="%.9g")
+        shown = (
+            self.counted,
+            [run.count for run in self.ended],
+            {name: [run.relative[name] for run in self.ended] for name in self.ended[0].relative},
+            {
+                name: {
+                    self.strain(name, place): [run.moduli[name][k] for run in self.ended]
+                    for k, place in enumerate(PLACES)
+                }
+                for name in COMPONENTS
+            },
+            {name: self.sigma(name) for name in COMPONENTS},
+        )
+        plot_weights(folder / FIGURE, *shown)
+        write_notes(folder, self.notes)
+        title = f"{self.title}: the weight of {self.counted}"
+        said = (title, self.lines(), self.table(), TABLE, self.notes)
+        write_report(folder, study_page(*said, FIGURE, weights_charts(*shown)))
+        Store(folder).finish(self.result)
+
+
+STARTS = 5
+#: How many times as much the tests of the kind count, in steps of the square root of two.
+COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
+FITTED = "fit"
+#: Told the words of what is fitted, then the records of its starts; None now and then.
+Progress = Callable[[str | FitEvent | None], None]
+
+
+def weight_study(
+    project: Project,
+    counted: str,
+    tests: str | Sequence[str] | None = None,
+    *,
+    starts: int = STARTS,
+    counts: Sequence[float] = COUNTS,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    command_line: Sequence[str] | None = None,
+) -> WeightStudy:
+    """Fit the tests together, then with other weights of one kind, each from its neighbour.
+
+    Parameters
+    ----------
+    counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
+    starts : of the fit at the project's weights; the others begin at the optimum beside them.
+    counts : how many times their weight in the project the tests count.
+    out : folder in which every fit is written as it ends.
+
+    Raises
+    ------
+    InputError : in the project or its data; no test of that kind or name, or no other one.
+    OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    """
+    tell = progress or (lambda event: None)
+    project = project.with_fit(starts=starts)
+    chosen = project.chosen(tests, fitted=True)
+    names = [test.name for test in chosen if counted in (test.kind, test.name)]
+    if not names or len(names) == len(chosen):
+        there = ", ".join(dict.fromkeys(name for t in chosen for name in (t.kind, t.name)))
+        problem = (
+            f"expected a kind or a name of some of the tests that are fitted, not of all: {there}; "
+            f"got {counted!r}"
+        )
+        raise InputError(project.path, "--weights", problem)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        of = {"version": __version__, "counted": ", ".join(names)}
+        begin_study(folder, of, resume, overwrite, [FITTED], [RUNS])
+    tell("the fit at the project's weights")
+    found = stored_fit(
+        project,
+        [test.name for test in chosen],
+        None if folder is None else folder / FITTED,
+        resume=resume,
+        overwrite=overwrite,
+        progress=tell,
+        command_line=command_line,
+    )
+    record = WeightsRecord(folder, found, names, resume)
+    runs = sorted(_runs(found, names, sorted(counts), record, tell), key=lambda run: run.count)
+    return WeightStudy(project.title, counted, tuple(names), found, tuple(runs))
+
+
+def _runs(
+    found: Fit,
+    names: Sequence[str],
+    counts: Sequence[float],
+    record: WeightsRecord,
+    tell: Progress,
+) -> Iterator[WeightedFit]:
+    """At the project's weights, then upwards from there, then downwards."""
+    own = found.best.point
+    yield _weighted(found.setup, found, 1.0, found.problem, own.residual, own.unknowns, 0)
+    above = [c for c in counts if c > 1]
+    below = [c for c in reversed(counts) if c < 1]
+    for way in (above, below):
+        y = np.array(own.unknowns)
+        for count in way:
+            run = record.read(count)
+            if run is None:
+                tell(f"weight times {count:.3g}")
+                run = refitted(found, names, count, y)
+                record.write(run)
+            yield run
+            if not run.failure:
+                y = np.array(run.unknowns)
+
+
+def refitted(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> WeightedFit:
+    """The fit with tests that count so many times, from the unknowns y of a neighbour."""
+    setup = replace(found.setup, counts=dict.fromkeys(names, count))
+    problem = setup.problem()
+    optimum = fit_from(problem, y, setup.options, near=True)
+    if optimum is None:
+        return WeightedFit(count, {}, {}, {}, (), problem.analyses, problem.failure or "no fit")
+    best = optimum.best
+    return _weighted(setup, found, count, problem, best.residual, best.unknowns, optimum.analyses)
+
+
+def _weighted(
+    setup: FitSetup,
+    found: Fit,
+    count: float,
+    problem: FitProblem,
+    residual: np.ndarray,
+    unknowns: np.ndarray,
+    analyses: int,
+) -> WeightedFit:
+    law = problem.unknowns.law(found.law, unknowns)
+    moduli = {
+        name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()
+        for name, component in COMPONENTS.items()
+    }
+    relative = {}
+    norms, block = problem.blocks.norms(residual), 0
+    number = {c.name: len(c.objective.sizes) for c in problem.comparisons}
+    for test, weighting in zip(setup.tests, setup.weightings, strict=True):
+        blocks = sum(number[c.name] for c in setup.own(test))
+        relative[test.test.name] = float(norms[block : block + blocks].sum() / weighting.weight)
+        block += blocks
+    rms = errors(problem, residual)
+    return WeightedFit(count, relative, rms, moduli, unknowns.tolist(), analyses)
