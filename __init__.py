@@ -17,7 +17,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import bubblefit.solvers.marc.t19_format
+# meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
+# this file a second time, as a module without a package.
+import bubblefit.solvers.calculix.frd_format
+import bubblefit.solvers.marc.t19_format  # noqa: F401
 
 if TYPE_CHECKING:
     from .materials.card import MaterialCard, read_card
@@ -30,10 +33,6 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-# meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
-# this file a second time, as a module without a package.
-
-
 __version__ = "0.2.0"
 __all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predict", "profile",
            "read_card", "read_project", "simulate"]  # fmt: skip
@@ -41,17 +40,17 @@ __all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predic
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
 _PLACES = {
-    "Fit": "fits.result",
+    "Fit": "runs.result",
     "MaterialCard": "materials.card",
-    "Project": "fits.project",
-    "bootstrap": "studies.bootstrap",
-    "fit": "fits.fit",
-    "plan": "studies.plan",
-    "predict": "fits.predictions",
-    "profile": "studies.profile",
+    "Project": "project.project",
+    "bootstrap": "runs.bootstrap",
+    "fit": "runs.fit",
+    "plan": "runs.plan",
+    "predict": "runs.predictions",
+    "profile": "runs.profile",
     "read_card": "materials.card",
-    "read_project": "fits.project",
-    "simulate": "fits.simulation",
+    "read_project": "project.project",
+    "simulate": "runs.simulation",
 }
 
 

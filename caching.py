@@ -17,15 +17,11 @@ ROOT = Path(__file__).parent
 #: while numba's own cache looks only at the file a function stands in.
 KERNELS = (
     "materials/point_law.py",
-    "materials/point_law.py",
-    "materials/point_law.py",
-    "materials/wrinkles.py",
     "materials/wrinkles.py",
     "materials/law.py",
     "materials/responses.py",
     "meshes/mesh.py",
     "solvers/membrane/kernel.py",
-    "solvers/membrane/sensitivity.py",
     "solvers/membrane/sensitivity.py",
 )
 

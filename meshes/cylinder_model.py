@@ -71,11 +71,11 @@ def usual_collar(diameter: float) -> Collar:
 
 
 def _check(body: RigidSupports | Collar, name: str) -> None:
-    for field in fields(body):
-        value = getattr(body, field.name)
+    for one in fields(body):
+        value = getattr(body, one.name)
         if not 0 < value < math.inf:
             problem = f"expected a length above 0 mm, got {value!r}"
-            raise InputError(None, f"{name}.{field.name}", problem)
+            raise InputError(None, f"{name}.{one.name}", problem)
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,10 @@ class Gas:
     density: float = 1.2041
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for one in fields(self):
+            value = getattr(self, one.name)
             if not 0 < value < math.inf:
-                raise InputError(None, f"gas.{field.name}", f"expected > 0, got {value!r}")
+                raise InputError(None, f"gas.{one.name}", f"expected > 0, got {value!r}")
 
     def mass(self, gauge: float, volume: float) -> float:
         """Mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""

@@ -40,8 +40,8 @@ _PLACES = {
     "read_fields": "fields",
     "read_frames": "frames",
     "read_load_curves": "curves",
-    "read_machine_loads": "machine_loads",
-    "read_published_polynomials": "published_polynomials",
+    "read_machine_loads": "machine_tables",
+    "read_published_polynomials": "polynomials",
     "read_surfaces": "surfaces",
 }
 

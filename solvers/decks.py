@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import jinja2.meta as jinja2_module
+import jinja2.meta
 
 from ..caching import ROOT
 from ..errors import InputError
@@ -237,10 +237,10 @@ def code_mark(module: str) -> str:
 def _included(template: Path) -> list[Path]:
     """Files that a template names in full; what a run is to find wrong with it is left to it."""
     try:
-        tree = environment(jinja2_module.BaseLoader()).parse(_content(template).decode("utf-8"))
-    except (jinja2_module.TemplateSyntaxError, UnicodeDecodeError):
+        tree = environment(jinja2.BaseLoader()).parse(_content(template).decode("utf-8"))
+    except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
-    found = jinja2_module.meta.find_referenced_templates(tree)
+    found = jinja2.meta.find_referenced_templates(tree)
     return [Path(name) for name in found if name is not None]
 
 

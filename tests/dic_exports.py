@@ -1,6 +1,6 @@
 """Frames of a bubble as the programs of image correlation export them, each with rejected points.
 
-Layouts are those that the readers in `data/formats` name their sources of. Frames are lists of
+Layouts are those that the readers in `readers/formats` name their sources of. Frames are lists of
 (points (n, 3), displacement (n, 3)) in mm; every writer gives the files, in order.
 """
 

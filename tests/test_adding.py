@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "docs" / "adding.md").read_text()
 EXTRAS = ROOT / "examples" / "plug-in" / "bubblefit_extras"
-COBYLA = ROOT / "identification" / "methods" / "cobyla.py"
+COBYLA = ROOT / "inference" / "methods" / "cobyla.py"
 
 
 def test_the_code_is_that_of_the_example():
@@ -52,7 +52,7 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
         "from bubblefit.materials.forms.registry import register_form\n\nregister_form(SATURATING)",
     )
     put(
-        house / "data/formats/riglog.py",
+        house / "readers/formats/riglog.py",
         "riglog.py",
         "from bubblefit.readers.registry import register_format\n\nregister_format(RIGLOG)",
     )

@@ -40,7 +40,7 @@ def shipped() -> set[str]:
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
     documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
-    for folder in ("examples", "templates", "studies/verification/published"):
+    for folder in ("examples", "templates", "runs/verification/published"):
         for file in (ROOT / folder).rglob("*"):
             inside = file.relative_to(ROOT)
             if file.is_file() and not any(p.startswith((".", "out")) for p in inside.parts):

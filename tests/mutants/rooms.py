@@ -9,20 +9,18 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 #: Patterns of files, from the repository's root. The numerics have tests of another kind.
 ROOMS = (
-    "data/*.py",
-    "data/formats/*.py",
+    "readers/*.py",
+    "readers/formats/*.py",
     "experiments/*.py",
     "experiments/*/*.py",
-    "fits/*.py",
+    "project/*.py",
     "inference/assessment.py",
     "inference/comparison.py",
     "inference/search.py",
     "inference/resampling.py",
     "materials/card.py",
     "reports/*.py",
-    "readers/sections.py",
-    "readers/sections.py",
-    "studies/*.py",
+    "runs/*.py",
     "writing.py",
 )
 

@@ -60,7 +60,7 @@ def test_what_runs_when_a_module_is_loaded():
 
 
 def test_a_seed_draws_the_same_and_another_seed_others():
-    source = (ROOT / "identification" / "assessment.py").read_text()
+    source = (ROOT / "inference" / "assessment.py").read_text()
     one, again, other = (drawn(seed, 12, source) for seed in (1, 1, 2))
     assert one == again != other and len(one) >= 11
     for mutant in one:

@@ -1,6 +1,6 @@
 """The bubble against an Abaqus M3D4 analysis with linear orthotropic constants.
 
-Digitised figures of a public repository (`studies/verification/published`); about 0.03 mm.
+Digitised figures of a public repository (`runs/verification/published`); about 0.03 mm.
 Abaqus' membranes are incompressible in thickness. 400 quads of a quarter; 1600 find no
 equilibrium of test 1, model e beyond 290 kPa. Likely reason: with so low a G12 the acoustic tensor
 is indefinite near the rim from 115 kPa on (on every mesh), so the problem is not well posed under
