@@ -12,11 +12,11 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.kinds import FittableTest
+from bubblefit.experiments.registry import kind_named
 from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from PIL import Image
@@ -38,8 +38,9 @@ def write_frames(folder: Path) -> None:
     text = EXAMPLE.read_text().replace("elements = 800", "elements = 1800")
     (folder / "computed.toml").write_text(text.replace('"quarter"', '"full"'))
     project = bf.read_project(folder / "computed.toml")
-    test = cast(FittableTest, project.tests["bubble"])
-    computed: Any = test.prepare(law_of(project, [test.reach]), MembraneSolver)
+    test = project.tests["bubble"]
+    law = law_of(project, [test.reach])
+    computed: Any = kind_named(test.kind).prepare(test, law, MembraneSolver)
     draw = np.random.default_rng(1)
     x, y = (a.ravel() for a in np.meshgrid(*[np.arange(-95, 96, SPACING)] * 2))
     places = np.column_stack([x, y])[np.hypot(x, y) < 97]

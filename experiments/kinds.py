@@ -31,36 +31,12 @@ if TYPE_CHECKING:
     from ..inference.assessment import Certainty
     from ..inference.comparison import Comparison
     from ..materials.law import HypoelasticLaw, ThicknessChange
-    from ..reports.content import Part, Table
     from ..solvers.base import BandEnd, Solver
 
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
 #: Bytes of a test's name in the names of its files.
 LONGEST = 80
-
-
-@dataclass(frozen=True, eq=False)
-class Exhibit:
-    """What a test puts on a page: facts, figures, tables, files that it wrote.
-
-    parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
-    record : tables of how it was measured, for the record at the end of the page.
-    """
-
-    facts: Sequence[tuple[str, object]] = ()
-    figures: Sequence[Shown] = ()
-    tables: Sequence[Table] = ()
-    files: Sequence[Shown] = ()
-    parts: Sequence[Part] = ()
-    record: Sequence[Table] = ()
-
-    def all_parts(self, title: str = "") -> list[Part]:
-        """What stands in the body of the page, in order; title : before it, "" for none."""
-        from ..reports.content import Facts, pictures
-
-        facts = [Facts(self.facts, title)] if self.facts or title else []
-        return [*facts, *self.parts, *pictures(self.figures), *self.tables]
 
 
 @dataclass(frozen=True)
@@ -248,22 +224,22 @@ class Kind(Protocol):
     studied: Studied | None
 
     def read(self, section: Any, place: Place, name: str) -> Test:
-        """The test of a section, in mm, N, MPa.
+        """Return the test of a section, in mm, N, MPa.
 
         Raises
         ------
         InputError : naming the file and the dotted key, or a data file.
         """
 
-    def simulate(
-        self,
-        test: Any,
-        cards: Mapping[str, MaterialCard],
-        runs: Mapping[tuple[str, str], CardRun],
-        out: Output,
-        within_range: bool = False,
-    ) -> Simulation:
-        """Write and tell what cards do in a test: `runs` by (card, part); files go to `out`."""
+    def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
+        """Read the data of a test that is fitted, or compute them from its known solution.
+
+        law : all but the coefficients. Kinds that are only predicted do not have it.
+
+        Raises
+        ------
+        InputError : in the data. SolverFailure : the known solution cannot be run.
+        """
 
 
 #: Which of the measured points a fit matches, by name of the comparison.
@@ -283,18 +259,8 @@ class Weighting:
     weight: float = 1.0
 
 
-class FittableTest(Test, Protocol):
-    """A test whose measurement a fit can match."""
-
-    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
-        """Read the data, or compute them with the law where the section has a known solution.
-
-        law : all but the coefficients.
-
-        Raises
-        ------
-        InputError : in the data. SolverFailure : the known solution cannot be run.
-        """
+#: A test whose measurement a fit can match.
+FittableTest = Test
 
 
 class PreparedTest(Protocol):
@@ -303,9 +269,8 @@ class PreparedTest(Protocol):
     One whose data are measured files also offers them for the record of a run
     (`data_files.OfFiles`), as a test that is predicted does.
 
-    A kind that looks at its data before a fit also has `doubts(expected)`, what makes them doubtful
-    (`doubts.Doubt`), and `examine(out)`, what was seen, as an `Exhibit`; the kind itself then lists
-    the names of its doubts, `Kind.doubts`.
+    A kind that looks at its data before a fit also has `doubts(expected)`, the reasons to doubt
+    them (`Doubt`); the kind itself then lists the names of its doubts, `Kind.doubts`.
     """
 
     @property
@@ -337,15 +302,6 @@ class PreparedTest(Protocol):
 
         Each is named as the test, followed by its part where there are several: "strips: warp".
         """
-
-    def findings(self, fitted: FittedTest) -> Findings:
-        """What the best fit means for this test."""
-
-    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """Write the test's own figures, tables and files."""
-
-    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched value: part, where, quantity, measured, modelled, difference, unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -492,9 +448,6 @@ class PredictedOutcome(Protocol):
 
     def lines(self) -> Sequence[str]:
         """A table for the terminal."""
-
-    def show(self, out: Output) -> Exhibit:
-        """Write figures, tables and files of the runs."""
 
 
 def record_of(

@@ -8,6 +8,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import Any
 
 from ..errors import InputError, PlugInFailure
 from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
@@ -15,7 +16,7 @@ from .kinds import Kind
 
 GROUP: Group = "bubblefit.tests"
 #: What a plug-in's kind must have to be one.
-NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", "simulate")
+NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", "report")
 
 log = logging.getLogger(__name__)
 
@@ -51,6 +52,28 @@ def kind_named(name: str) -> Kind:
         known = ", ".join(names_with(GROUP, _folders()))
         raise InputError(None, "kind", f"{name!r} is not one of: {known}")
     return _of(plug_in)
+
+
+def report_of(name: str) -> Any:
+    """Return the presenter of a kind of test: the module `report` of its folder, or `Kind.report`.
+
+    It has `simulate(test, cards, runs, out, within_range)`, which writes the results of forward
+    analyses, runs by (card, part), and returns a `Simulation`.
+
+    Of tests that are fitted it also has `findings(prepared, fitted)`, which returns `Findings`;
+    `show(prepared, fitted, findings, out)`, which writes the files of a fit and returns an
+    `Exhibit`; `residuals(prepared, fitted)`, a table of every matched value (part, where,
+    quantity, measured, modelled, difference, unit); and, where the data are looked at before a
+    fit, `examine(prepared, out)`. Of tests that are predicted it has `show_outcome(outcome, out)`.
+
+    Raises
+    ------
+    InputError : there is no such kind. PlugInFailure : a plug-in that does not work.
+    """
+    if name in _folders():
+        return import_module(f".{name}.report", __package__)
+    kind: Any = kind_named(name)
+    return kind.report
 
 
 def _of(plug_in: PlugIn) -> Kind:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..runs.bootstrap import METHOD, SAMPLES
-from ..runs.result import two_digits
 from ..runs.series import FILES, write_folder
 from .bootstrap_charts import Array, bootstrap_charts
 from .bootstraps import plot_bootstrap
 from .content import Report, Section, Table
+from .fit_page import two_digits
 from .html import percent
 
 if TYPE_CHECKING:

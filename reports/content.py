@@ -129,3 +129,25 @@ class Report:
 def pictures(shown: Sequence[tuple[str, str]]) -> list[Picture]:
     """Of (file relative to the page, caption)."""
     return [Picture(file, caption) for file, caption in shown]
+
+
+@dataclass(frozen=True, eq=False)
+class Exhibit:
+    """The contribution of one test to a page: facts, figures, tables, files that it wrote.
+
+    figures, files : a file below the output folder, and its caption or what it is.
+    parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
+    record : tables of how it was measured, for the record at the end of the page.
+    """
+
+    facts: Sequence[tuple[str, object]] = ()
+    figures: Sequence[tuple[str, str]] = ()
+    tables: Sequence[Table] = ()
+    files: Sequence[tuple[str, str]] = ()
+    parts: Sequence[Part] = ()
+    record: Sequence[Table] = ()
+
+    def all_parts(self, title: str = "") -> list[Part]:
+        """What stands in the body of the page, in order; title : before it, "" for none."""
+        facts = [Facts(self.facts, title)] if self.facts or title else []
+        return [*facts, *self.parts, *pictures(self.figures), *self.tables]

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import NoFeasibleStart, OutputError, SolverFailure
-from ..experiments.kinds import Exhibit, by_strain
+from ..experiments.kinds import by_strain
+from ..experiments.registry import report_of
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, write_notes
-from ..runs.folder import RESULT, Store
-from ..runs.result import STRAINS, answer_at, coefficients_table
+from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Store
+from ..runs.record import Record
+from ..runs.result import STRAINS, answer_at, coefficients_of
 from ..writing import replacing
 from .charts import Charts
-from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
+from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
 from .moduli import plot_moduli
 from .moduli_charts import moduli_charts, pinned_charts
@@ -33,7 +36,8 @@ from .optima_charts import optima_chart
 from .pinned import plot_pinned
 
 if TYPE_CHECKING:
-    from ..runs.result import Fit
+    from ..runs.folder import AS_RUN, DIGITS, PROVENANCE
+from ..runs.result import Fit
 
 Array = NDArray[np.float64]
 
@@ -425,12 +429,12 @@ def write_fit(fit: Fit, folder: Path) -> Path:
 def _page(fit: Fit, folder: Path) -> Report:
     result = fit.result
     exhibits = {
-        t.test.name: t.show(
-            fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
+        t.test.name: report_of(t.test.kind).show(
+            t, fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
         )
         for t in fit.setup.tests
     }
-    record = [] if fit.record is None else fit.record.tables()
+    record = [] if fit.record is None else record_tables(fit.record)
     files = [
         *FILES,
         *([] if fit.record is None else fit.record.files),
@@ -544,3 +548,90 @@ def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
             with suppress(OutputError):  # the failure itself says more
                 write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
         raise
+
+
+COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"
+
+
+def two_digits(correlation: float) -> str:
+    """Without a sign of nothing."""
+    return f"{round(correlation, 2) + 0.0:.2f}"
+
+
+def coefficients_table(fit: Fit) -> list[Table]:
+    """The same for the page, without the bounds; nothing where it is not known."""
+    if fit.best.certainty is None or fit.best.certainty.posterior is None:
+        return []
+    found = coefficients_of(fit)
+    names = found["unknown"].tolist()
+    own = ["unknown", "value", "sigma", "unit"]
+    rows: list[list[object]] = [
+        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
+        for _, row in found.iterrows()
+    ]
+    note = (
+        "One standard deviation by noise, bounds left aside; then the correlations. Coefficients "
+        "make up for each other: single ones are far less certain than the moduli they make."
+    )
+    header = ["unknown", "value", "1 sigma", "unit", *names]
+    return [Table(COEFFICIENTS_TITLE, header, rows, note, text=(3,))]
+
+
+RECORD_TITLE = "The record"
+NO_COMMAND = "none: called from Python"
+NO_FILES = "none: computed, or of a kind that names no files"
+
+
+def record_tables(record: Record) -> list[Table]:
+    """Return the record for the page: one row a thing, and one a data file."""
+    rows: list[list[object]] = [["project file", os.path.abspath(record.project)]]
+    for run in record.runs:
+        command = run.get("command_line")
+        machine = run.get("machine", {})
+        rows += [
+            ["command", NO_COMMAND if command is None else " ".join(command)],
+            ["begun", run.get("date", "")],
+            ["machine", ", ".join(f"{value}" for value in machine.values())],
+            ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
+        ]
+    rows.append(["solver", _solver(record.solver)])
+    if not record.data:
+        rows.append(["data files", NO_FILES])
+    note = f"All of it, with the text of the project: {PROVENANCE}."
+    if record.settings is not None:
+        note += f" The project with the options of the command, to be run again: {AS_RUN}."
+    tables = [Table(RECORD_TITLE, ["", ""], rows, note, text=(1,))]
+    if record.data:
+        tables.append(_data_table(record.data))
+    return tables
+
+
+def _solver(facts: Mapping[str, str]) -> str:
+    settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
+    return "; ".join([facts.get("version") or facts.get("name", ""), *settings])
+
+
+def _data_table(data: Sequence[Mapping[str, Any]]) -> Table:
+    header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
+    rows: list[list[object]] = [
+        [
+            row["test"],
+            row["name"],
+            row["sha256"][:DIGITS],
+            row["format"],
+            _columns(row["columns"], row["units"]),
+            row["rows_used"],
+            ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
+        ]
+        for row in data
+    ]
+    note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
+    return Table(f"{RECORD_TITLE}: data files", header, rows, note, text=(1, 2, 3, 4, 6))
+
+
+def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
+    said = []
+    for quantity, name in columns.items():
+        unit = f" in {units[quantity]}" if quantity in units else ""
+        said.append(f"{quantity}: {name}{unit}")
+    return ", ".join(said)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..errors import SolverFailure
 from ..experiments.kinds import CardRun, Output, Shown
-from ..experiments.registry import kind_named
+from ..experiments.registry import report_of
 from ..notes import NOTES, NOTES_ARE, rows, write_notes
 from ..runs.best import noise_of
 from ..runs.compare import AS_GOOD
@@ -192,7 +192,7 @@ def _side_by_side(comparison: LawComparison, test: PreparedTest, folder: Path) -
         for part, model in own.models().items()
     }
     out = Output.of(folder, own.name, several)
-    return kind_named(own.kind).simulate(own, cards, runs, out).figures
+    return report_of(own.kind).simulate(own, cards, runs, out).figures
 
 
 def _outcome(solver: Any, model: Any, law: Any) -> Any:

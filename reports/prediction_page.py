@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..experiments.kinds import Exhibit, Output
+from ..experiments.kinds import Output
+from ..experiments.registry import report_of
 from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
 from ..runs.folder import RESULT, Store
 from ..writing import replacing
-from .content import Report, Section, Table
-from .fit_page import citation
+from .content import Exhibit, Report, Section, Table
+from .fit_page import citation, record_tables
 from .html import percent, write_report
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
         predictions.record.write(folder)
     several = len(predictions.outcomes) > 1
     exhibits = {
-        kind: outcome.show(Output(folder, f"{kind}/" if several else ""))
+        kind: report_of(kind).show_outcome(outcome, Output(folder, f"{kind}/" if several else ""))
         for kind, (outcome, _) in predictions.outcomes.items()
     }
     write_notes(folder, predictions.notes)
@@ -53,6 +54,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             summary += f" Marked {mark.value!r}: {count}."
     if predictions.worst is not None:
         summary += f" Largest error against measured values: {percent(predictions.worst)}."
+    record = [] if predictions.record is None else record_tables(predictions.record)
     return Report(
         title=predictions.project.title,
         summary=summary,
@@ -78,7 +80,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             ]),
             Section("What to know of the runs", _notes(predictions)),
             Section(
-                "The record", [] if predictions.record is None else predictions.record.tables()
+                "The record", record
             ),
             Section("How to cite", citation()),
         ],

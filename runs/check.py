@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,13 +11,11 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..experiments.kinds import Exhibit, Expected, FittableTest, Judgement, Output, judged
+from ..experiments.kinds import Expected, FittableTest, Judgement, judged
 from ..experiments.registry import kinds
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
-from ..reports.content import Report, Section, Table
-from ..reports.html import write_report
-from ..writing import write_text
+from .presenters import write_report
 from .setup import FitSetup, prepare_fit
 
 
@@ -92,14 +89,6 @@ class Check:
         }
         return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
 
-    def _summary(self) -> str:
-        if not self.sound:
-            return "A fit would not begin."
-        doubts = sum(len(judgement.doubts) for judgement in self.judgements)
-        if doubts:
-            return f"A fit would begin, and carry {doubts} of the doubts below with it."
-        return "The data are fit to be fitted."
-
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Test, what it is, name of the doubt, text: a line a doubt, one for a test without."""
         rows = []
@@ -121,51 +110,13 @@ class Check:
         ]
 
     def report(self, folder: Path | str) -> Path:
-        """Write check.json, the tests' own figures and report.html; the page.
+        """Write check.json, the tests' own figures and report.html; return the page's path.
 
         Raises
         ------
         OutputError : they cannot be written.
         """
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / "check.json", json.dumps(self.result, indent=1) + "\n")
-        several = len(self.setup.tests) > 1
-        exhibits: list[tuple[str, Exhibit]] = []
-        for one in self.setup.tests:
-            if (examine := getattr(one, "examine", None)) is not None:
-                out = Output.of(folder, one.test.name, several)
-                exhibits.append((one.test.name, examine(out)))
-        header = ["test", "", "doubt", "what was seen"]
-        doubts = Table("Doubts", header, [list(row) for row in self.rows()], text=(1, 2, 3))
-        facts = [
-            (f"{name}: {label}" if several else label, value)
-            for name, exhibit in exhibits
-            for label, value in exhibit.facts
-        ]
-        report = Report(
-            title=f"{self.setup.project.title}: a look at the data",
-            summary=self._summary(),
-            facts=facts,
-            warnings=[
-                words
-                for j in self.judgements
-                for words in (
-                    *(f"{j.test}: {d.text}" for d in j.errors),
-                    *(n.line for n in j.notes),
-                )
-            ],
-            sections=[
-                Section("Doubts", [doubts]),
-                Section(
-                    "What was seen",
-                    [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
-                ),
-            ],
-            files=[("check.json", "the doubts in plain values")],
-            versions={"bubblefit": __version__},
-        )
-        return write_report(folder, report)
+        return write_report(self, folder)
 
 
 def check(

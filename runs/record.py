@@ -22,11 +22,10 @@ from ..inference.assessment import notes_of_verdicts, pinned_by
 from ..inference.misfit import notes_of_noise
 from ..notes import Note, NoteKind, as_note, rows
 from ..project.project import Project, plain, project_text, settings_of
-from ..reports.content import Table
 from ..solvers.base import Solver
 from ..writing import checksum, write_text
 from .best import TAKEN_OUT, TOLD
-from .folder import AS_RUN, DIGITS, PROVENANCE
+from .folder import AS_RUN, PROVENANCE
 from .setup import UNCOUNTED, FitSetup
 from .starts import coarse_columns
 
@@ -237,11 +236,6 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     return notes
 
 
-TITLE = "The record"
-NO_COMMAND = "none: called from Python"
-NO_FILES = "none: computed, or of a kind that names no files"
-
-
 @dataclass(frozen=True, eq=False)
 class Record:
     """What a folder's results came from.
@@ -298,29 +292,6 @@ class Record:
             write_text(folder / AS_RUN, content["project"]["as_run"])
         write_text(folder / PROVENANCE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
-    def tables(self) -> list[Table]:
-        """The record for the page: one row a thing, and one a data file."""
-        rows: list[list[object]] = [["project file", os.path.abspath(self.project)]]
-        for run in self.runs:
-            command = run.get("command_line")
-            machine = run.get("machine", {})
-            rows += [
-                ["command", NO_COMMAND if command is None else " ".join(command)],
-                ["begun", run.get("date", "")],
-                ["machine", ", ".join(f"{value}" for value in machine.values())],
-                ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
-            ]
-        rows.append(["solver", _solver(self.solver)])
-        if not self.data:
-            rows.append(["data files", NO_FILES])
-        note = f"All of it, with the text of the project: {PROVENANCE}."
-        if self.settings is not None:
-            note += f" The project with the options of the command, to be run again: {AS_RUN}."
-        tables = [Table(TITLE, ["", ""], rows, note, text=(1,))]
-        if self.data:
-            tables.append(_data_table(self.data))
-        return tables
-
     @property
     def files(self) -> list[tuple[str, str]]:
         """What it writes, and what that is."""
@@ -366,37 +337,6 @@ def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
         },
         "versions": versions(),
     }
-
-
-def _solver(facts: Mapping[str, str]) -> str:
-    settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
-    return "; ".join([facts.get("version") or facts.get("name", ""), *settings])
-
-
-def _data_table(data: Sequence[Mapping[str, Any]]) -> Table:
-    header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
-    rows: list[list[object]] = [
-        [
-            row["test"],
-            row["name"],
-            row["sha256"][:DIGITS],
-            row["format"],
-            _columns(row["columns"], row["units"]),
-            row["rows_used"],
-            ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
-        ]
-        for row in data
-    ]
-    note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
-    return Table(f"{TITLE}: data files", header, rows, note, text=(1, 2, 3, 4, 6))
-
-
-def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
-    said = []
-    for quantity, name in columns.items():
-        unit = f" in {units[quantity]}" if quantity in units else ""
-        said.append(f"{quantity}: {name}{unit}")
-    return ", ".join(said)
 
 
 #: What a test is called and where its files lie changes nothing.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import InputError
 from ..experiments.kinds import Findings, FittedTest, Judgement, Output, PreparedTest
+from ..experiments.registry import report_of
 from ..inference.assessment import Verdict, verdicts
 from ..inference.misfit import NoiseTest, noise_tests
 from ..inference.noise import Misfit, misfits
@@ -23,8 +24,8 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note
 from ..project.project import Project
-from ..reports.content import Table
 from .best import BestFit, card_certainty
+from .presenters import write_report
 from .record import Record
 from .setup import CoarseToFine, FitSetup
 from .starts import coarse_columns
@@ -129,7 +130,10 @@ class Fit:
     @cached_property
     def findings(self) -> dict[str, Findings]:
         """What the fit means for every test, by name."""
-        return {t.test.name: t.findings(self.tests[t.test.name]) for t in self.setup.tests}
+        return {
+            t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
+            for t in self.setup.tests
+        }
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -233,7 +237,7 @@ class Fit:
         frames = []
         for prepared in self.setup.tests:
             name = prepared.test.name
-            table = prepared.residuals(self.tests[name])
+            table = report_of(prepared.test.kind).residuals(prepared, self.tests[name])
             table.insert(0, "test", name)
             frames.append(table)
         every = pd.concat(frames, ignore_index=True)
@@ -302,9 +306,7 @@ class Fit:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.fit_page import write_fit
-
-        return write_fit(self, Path(folder))
+        return write_report(self, folder)
 
     def output(self, folder: Path, test: str) -> Output:
         """Where a test writes: with its name before every file's where there are several."""
@@ -381,7 +383,6 @@ def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
 
 #: The columns before those of the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
-TITLE = "How sure the coefficients are, and how they hang together"
 
 
 def coefficients_of(fit: Fit) -> pd.DataFrame:
@@ -411,27 +412,3 @@ def coefficients_of(fit: Fit) -> pd.DataFrame:
     units = [scales.modulus_unit] * size + [n.unit for n in nuisance]
     table = pd.DataFrame(dict(zip(COLUMNS, (names, units, values, sigma, *ends), strict=True)))
     return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
-
-
-def two_digits(correlation: float) -> str:
-    """Without a sign of nothing."""
-    return f"{round(correlation, 2) + 0.0:.2f}"
-
-
-def coefficients_table(fit: Fit) -> list[Table]:
-    """The same for the page, without the bounds; nothing where it is not known."""
-    if fit.best.certainty is None or fit.best.certainty.posterior is None:
-        return []
-    found = coefficients_of(fit)
-    names = found["unknown"].tolist()
-    own = ["unknown", "value", "sigma", "unit"]
-    rows: list[list[object]] = [
-        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
-        for _, row in found.iterrows()
-    ]
-    note = (
-        "One standard deviation by noise, bounds left aside; then the correlations. Coefficients "
-        "make up for each other: single ones are far less certain than the moduli they make."
-    )
-    header = ["unknown", "value", "1 sigma", "unit", *names]
-    return [Table(TITLE, header, rows, note, text=(3,))]

@@ -23,6 +23,7 @@ from ..experiments.kinds import (
     Refinable,
     Weighting,
 )
+from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison, Nuisance
 from ..inference.methods.base import FitOptions
 from ..inference.problem import FitProblem
@@ -427,7 +428,7 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
         raise InputError(project.path, "law.form", error.problem) from None
     bounds = bounds_of(project, law.form)
     make = functools.partial(make_solver, project)
-    ready = tuple(test.prepare(law, make) for test in tests)
+    ready = tuple(kind_named(test.kind).prepare(test, law, make) for test in tests)
     setup = FitSetup(project, law, bounds, ready)
     return replace(setup, starts=_starts(setup))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import SolverFailure
 from ..experiments.kinds import CardRun, Output, Simulation, Test, notes_of, other_thickness
-from ..experiments.registry import kinds
+from ..experiments.registry import report_of
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, rows, write_notes
@@ -163,8 +163,7 @@ def simulate_cards(
             (name, part): run for name in cards for part, run in outcomes[test.name, name].items()
         }
         out = Output.of(folder, test.name, len(tests) > 1)
-        kind = kinds()[test.kind]
-        told[test.name] = kind.simulate(test, cards, of_test, out, within_range)
+        told[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
     notes = [
         note.about(of) if len(tests) > 1 else note
         for (of, name), parts in outcomes.items()

@@ -24,6 +24,7 @@ from ..experiments.kinds import (
     strains_of,
     unstable_words,
 )
+from ..experiments.registry import report_of
 from ..inference.comparison import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
@@ -80,7 +81,9 @@ def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolve
         return not_judged(name, f"no analysis: {problem.failure}", units)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
     rms = errors(problem, point.residual)
-    own = prepared.findings(_fitted(prepared, problem, point, law, make_solver))
+    own = report_of(prepared.test.kind).findings(
+        prepared, _fitted(prepared, problem, point, law, make_solver)
+    )
     return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
 
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from pydantic import BaseModel
 
-from ...materials.card import MaterialCard
+from ...materials.law import HypoelasticLaw
 from ..kinds import (
     Candidate,
-    CardRun,
     Kind,
-    Output,
+    MakeSolver,
     Place,
     Planning,
     Predicted,
-    Simulation,
     Studied,
 )
+from .candidates import candidates
+from .prepared import PreparedBiaxial
 from .section import BiaxialSection
 from .test import BiaxialTest, read
 
@@ -43,24 +43,15 @@ class Biaxial:
         """
         return read(section, place, name)
 
+    def prepare(
+        self, test: BiaxialTest, law: HypoelasticLaw, make_solver: MakeSolver
+    ) -> PreparedBiaxial:
+        """Return the test as it is: its data were read with its section."""
+        return PreparedBiaxial(test)
+
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
         """Single ratios, up to the strains that the law is known for."""
-        from .candidates import candidates
-
         return candidates(planning)
-
-    def simulate(
-        self,
-        test: BiaxialTest,
-        cards: Mapping[str, MaterialCard],
-        runs: Mapping[tuple[str, str], CardRun],
-        out: Output,
-        within_range: bool = False,
-    ) -> Simulation:
-        """Cards on the ratios: paths.csv, paths.png, RMS errors of strain."""
-        from .simulated import simulate
-
-        return simulate(test, cards, runs, out, within_range)
 
 
 KIND: Kind = Biaxial()

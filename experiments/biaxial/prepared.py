@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
@@ -15,13 +14,10 @@ from ...solvers.base import History
 from ..kinds import (
     DataFile,
     Doubt,
-    Exhibit,
     Expected,
-    Findings,
     FittedTest,
     MakeSolver,
     Masks,
-    Output,
     Reach,
     Weighting,
 )
@@ -139,27 +135,3 @@ class PreparedBiaxial:
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """What makes the paths doubtful."""
         return doubts_of_biaxial(self.test, expected)
-
-    def examine(self, out: Output) -> Exhibit:
-        """Loads and cycles as they were read."""
-        from .report import exhibit_examined as exhibit
-
-        return exhibit(self.test, out)
-
-    def findings(self, fitted: FittedTest) -> Findings:
-        """What the best fit means for this test."""
-        from .report import findings_of
-
-        return findings_of(self.test, self.fitted_paths(fitted))
-
-    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """Write paths.csv and the figure of the ratios."""
-        from .report import exhibit
-
-        return exhibit(self.test, self.fitted_paths(fitted), fitted.law, out)
-
-    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched strain: part, loads, quantity, measured, modelled, difference (%)."""
-        from .report import residual_table
-
-        return residual_table(self.fitted_paths(fitted))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import InputError
-from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import PatchModel
 from ...readers.biaxial import (
     BiaxialPath,
@@ -24,11 +23,11 @@ from ...readers.biaxial import (
 from ...readers.sections import beside
 from ...reading import is_file
 from ..keys import named_format
-from ..kinds import MakeSolver, Place, Reach, Refined
+from ..kinds import Place, Reach, Refined
 from .section import BiaxialSection, TablesSection
 
 if TYPE_CHECKING:
-    from .prepared import PreparedBiaxial
+    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,12 +146,6 @@ class BiaxialTest:
     def settings(self) -> Mapping[str, object]:
         """What of the section a result depends on; the data count by themselves."""
         return {"weight": self.weight, "noise": self.noise}
-
-    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBiaxial:
-        """The test as it is: its files were read with its section."""
-        from .prepared import PreparedBiaxial
-
-        return PreparedBiaxial(self)
 
 
 def reach_of(paths: Sequence[BiaxialPath]) -> Reach:

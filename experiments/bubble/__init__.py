@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from ...materials.card import MaterialCard
-from ..kinds import Candidate, CardRun, Output, Place, Planning, Simulation, Studied
+from ...materials.law import HypoelasticLaw
+from ..kinds import Candidate, MakeSolver, Place, Planning
+from .candidates import candidates
+from .data import prepare
+from .forward import STUDIED
+from .prepared import PreparedBubble
 from .section import BubbleSection
 from .test import BubbleTest, read
 
@@ -29,36 +32,26 @@ class BubbleKind:
     section = BubbleSection
     fitted = True
     predicted = None
+    studied = STUDIED
     doubts = NAMES
-
-    @property
-    def studied(self) -> Studied:
-        """Apex heights and largest displacements."""
-        from .forward import STUDIED
-
-        return STUDIED
 
     def read(self, section: BubbleSection, place: Place, name: str) -> BubbleTest:
         """The test of a section; raises InputError."""
         return read(section, place, name)
 
-    def simulate(
-        self,
-        test: Any,
-        cards: Mapping[str, MaterialCard],
-        runs: Mapping[tuple[str, str], CardRun],
-        out: Output,
-        within_range: bool = False,
-    ) -> Simulation:
-        """Tables, surfaces and cuts of every card."""
-        from .forward import simulate
+    def prepare(
+        self, test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver
+    ) -> PreparedBubble:
+        """Read the measured fields, or compute those of the known solution.
 
-        return simulate(test, cards, runs, out, within_range)
+        Raises
+        ------
+        InputError : in the data. SolverFailure : the known solution cannot be run.
+        """
+        return prepare(test, law, make_solver)
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
         """The same again, to more pressure, with an elliptic rim."""
-        from .candidates import candidates
-
         return candidates(planning)
 
 

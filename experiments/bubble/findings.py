@@ -5,39 +5,26 @@ out.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...inference.assessment import moduli_error
 from ...materials.forms.base import COMPONENTS
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.disk import Outline
 from ...notes import Note, NoteKind
-from ...readers.fields import DisplacementField
 from ...readers.pressure_log import ClockOffset
-from ...reports.clock import plot_clock
-from ...reports.content import Table
-from ...reports.registration import plot_registration
-from ...reports.surface import plot_disk
-from ...writing import replacing
-from ..kinds import Findings, FittedTest, Output, Shown
+from ...reports.html import percent
+from ..kinds import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
 from .point_files import PointFiles, RecordedFrames
+from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS
 
-if TYPE_CHECKING:
-    from .prepared import PreparedBubble
-    from .test import BubbleTest
-
 Array = NDArray[np.float64]
 
-PICTURE, TABLE = "reference_surface.png", "reference_surface.csv"
-CONSTANT_PICTURE, CONSTANT_TABLE = "constant_field.png", "constant_field.csv"
 NOT_BELIEVED = (
     "the moduli of this test are not to be believed: the sheet is taken for flat and taut in the "
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "
@@ -60,7 +47,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     heights, surface = model.mesh.points[:, 2], prepared.sheet.surface
     moved = model.rim_motion
     numbers: dict[str, Any] = {
-        "used": _used(prepared),
+        "used": used_of(prepared),
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
@@ -70,7 +57,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "from_pressure_kPa": None,
     }
     if sheet.constant:
-        field = _constant(fitted)[1]
+        field = constant_field(fitted)[1]
         rms = np.sqrt(np.mean(field**2, axis=0))
         numbers["constant_field_rms_mm"] = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
     if sheet.since is not None:
@@ -109,33 +96,7 @@ def sheet_warnings(prepared: PreparedBubble) -> list[Note]:
     return [Note(NoteKind.FLAT_SHEET, NOT_BELIEVED)]
 
 
-def sheet_exhibit(
-    prepared: PreparedBubble, fitted: FittedTest, out: Output
-) -> tuple[list[Shown], list[Shown]]:
-    """Figures and files of the surface and of a constant field, where there are any."""
-    figures, files = [], []
-    sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
-    if sheet.measured or sheet.modes:
-        points = fitted_model(fitted).mesh.points
-        _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
-        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], edge)
-        how = " and ".join(w for w in _used(prepared) if w in ("measured surface", "modes"))
-        words = "surface of the sheet in the reference picture"
-        figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
-        files.append((out.name(TABLE), f"{words}, node by node"))
-    if sheet.constant:
-        places, field = _constant(fitted)
-        own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
-        columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
-        _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
-        plot_disk(out.path(CONSTANT_PICTURE), own, edge)
-        words = "measured less modelled, as far as it is the same at all pressures"
-        figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
-        files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))
-    return figures, files
-
-
-def _used(prepared: PreparedBubble) -> list[str]:
+def used_of(prepared: PreparedBubble) -> list[str]:
     sheet = prepared.test.sheet
     return [
         words
@@ -151,7 +112,7 @@ def _used(prepared: PreparedBubble) -> list[str]:
     ]
 
 
-def _constant(fitted: FittedTest) -> tuple[Array, Array]:
+def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
     """Places (n, 2) mm and the field (n, 3) mm that was taken out there."""
     (comparison,) = fitted.comparisons
     objective = comparison.objective
@@ -161,14 +122,6 @@ def _constant(fitted: FittedTest) -> tuple[Array, Array]:
     for target in objective.targets:
         places[target.places] = target.at(comparison.model.mesh.points[:, :2])
     return places, field
-
-
-def _write(out: Output, name: str, columns: dict[str, Array]) -> None:
-    with replacing(out.path(name)) as path:
-        pd.DataFrame(columns).to_csv(path, index=False, float_format="%.6g")
-
-
-PICTURE_RECORDED_WORDS = "clock.png"
 
 
 def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
@@ -213,49 +166,11 @@ def recorded_lines(taken: RecordedFrames) -> list[str]:
             f" {1e3 * taken.asked[worst]:.4g} kPa"
         )
     if taken.clock is not None:
-        lines.append(_clock_words(taken.clock))
+        lines.append(clock_words(taken.clock))
     return lines
 
 
-def recorded_table(taken: RecordedFrames) -> Table:
-    """The frames taken, and at which pressures they were recorded."""
-    columns = ["frame", "pressure, kPa"]
-    cells: list[list[object]] = [
-        [n, 1e3 * p] for n, p in zip(taken.names, taken.pressure.tolist(), strict=True)
-    ]
-    if taken.asked is not None:
-        columns += ["asked for, kPa", "farther by, kPa"]
-        for row, p, a in zip(cells, taken.pressure, taken.asked, strict=True):
-            row += [1e3 * float(a), 1e3 * float(p - a)]
-    if taken.doubt is not None and taken.clock is not None and taken.clock.misfit is not None:
-        columns.append("uncertain by the clocks, +- kPa")
-        for row, d in zip(cells, taken.doubt, strict=True):
-            row.append(1e3 * float(d))
-    left_out = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
-    note = f"pressures from {taken.source}; {len(cells)} of {taken.count} frames{left_out}"
-    if taken.clock is not None:
-        note += ". " + _clock_words(taken.clock)
-    return Table("Frames taken", columns, cells, note)
-
-
-def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
-    """Pressures of the log beside the heights of all frames; none without a log."""
-    clock = taken.clock
-    if clock is None:
-        return []
-    times = clock.times + clock.offset
-    plot_clock(
-        out.path(PICTURE_RECORDED_WORDS), times, clock.pressure, clock.heights, taken.pressure
-    )
-    return [
-        (
-            out.name(PICTURE_RECORDED_WORDS),
-            "pressures of the log and heights of the frames, by one clock",
-        )
-    ]
-
-
-def _clock_words(clock: ClockOffset) -> str:
+def clock_words(clock: ClockOffset) -> str:
     ahead = f"clock of the log less that of the frames: {clock.offset:.2f} s"
     if clock.misfit is None:
         return f"{ahead}, given"
@@ -265,16 +180,6 @@ def _clock_words(clock: ClockOffset) -> str:
         f" at best) is at most doubled; pressures uncertain by {1e3 * np.nanmean(clock.doubt):.2g}"
         " kPa on average"
     )
-
-
-PICTURE_REGISTRATION = "registration.png"
-
-#: What each choice of the plane means.
-PLANES = {
-    "clamp": "through the points beyond the rim",
-    "edge": "through the edge of the sheet",
-    "camera": "the camera's own x and y",
-}
 
 
 def registration_numbers(found: Registration) -> dict[str, Any]:
@@ -297,32 +202,6 @@ def registration_numbers(found: Registration) -> dict[str, Any]:
     }
 
 
-def registration_table(found: Registration) -> Table:
-    """What was found and what was given, step by step."""
-    x, y, z = found.placement.origin
-    rim, warp = found.rim, found.warp
-    plane = f"tilted by {found.placement.tilt:.2f} degrees"
-    how = PLANES[found.plane_of]
-    if found.plane_of != "camera":
-        how += f", which deviate by {found.flatness:.2g} mm"
-    rows: list[list[object]] = [
-        ["plane of the rim", plane, how],
-        [
-            "centre of the rim, mm",
-            f"{x:.2f}, {y:.2f}, {z:.2f}",
-            "given" if rim is None else f"found where the sheet does not rise, +- {rim.error:.2g}",
-        ],
-        [
-            "warp, degrees from the camera's x",
-            f"{found.warp_angle:.2f}",
-            "given" if warp is None else _warp_words(found),
-        ],
-        ["motion of the clamp", *_motion_words(found)],
-    ]
-    note = "lengths and directions in the camera's coordinates"
-    return Table("Registration", ["step", "value", "how"], rows, note)
-
-
 def registration_line(found: Registration) -> str:
     """One line for the terminal."""
     x, y, z = found.placement.origin
@@ -331,41 +210,6 @@ def registration_line(found: Registration) -> str:
         f"registration: centre {x:.2f}, {y:.2f}, {z:.2f} mm, tilt {found.placement.tilt:.2f}, warp "
         f"{found.warp_angle:.2f} degrees ({how})"
     )
-
-
-def _warp_words(found: Registration) -> str:
-    assert found.warp is not None
-    if found.warp.clear is None:
-        return f"found by the turn of the elliptic rim, +- {found.warp.error:.2g}"
-    stiff = "stiffer" if found.options.warp_is_stiff else "softer"
-    return (
-        f"found by symmetry ({found.warp.clear:.0%} clear), +- {found.warp.error:.2g}; the "
-        f"{stiff} of the two axes"
-    )
-
-
-def _motion_words(found: Registration) -> tuple[str, str]:
-    seen = [m for m in found.motions if m.points]
-    if not seen:
-        return "not known", "no points beyond the rim all around"
-    shift = max(float(np.linalg.norm(m.shift)) for m in seen)
-    turn = max(m.angle for m in seen)
-    removed = "removed" if found.options.remove_clamp_motion else "left in"
-    return f"{shift:.3g} mm, {turn:.2g} degrees at most", removed
-
-
-def registration_picture(
-    fields: Sequence[DisplacementField], outline: Outline, out: Output
-) -> Shown:
-    """Maps of the reference height, where it was measured, and of the highest rise."""
-    last = fields[-1]
-    maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
-    if last.z is not None:
-        maps.insert(0, ("reference height z, mm", last.z))
-    plot_registration(out.path(PICTURE_REGISTRATION), last.points, maps, outline.edge())
-    return out.name(
-        PICTURE_REGISTRATION
-    ), "measured points in the test's coordinates, the rim, warp and fill"
 
 
 #: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
@@ -383,7 +227,7 @@ def objective_of(fitted: FittedTest) -> FieldObjective:
     return comparison.objective
 
 
-def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
+def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     """Numbers for result.json, warnings, and words for terminal, card and page."""
     test, objective = prepared.test, objective_of(fitted)
     offset = displacement_offset(fitted.nuisance)
@@ -418,7 +262,7 @@ def findings_of(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
         numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
         said = ", ".join(
-            f"{name} {_percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
+            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
         )
         lines.append(f"largest error of the moduli over the strain reached: {said}")
     if prepared.registration is not None:
@@ -469,71 +313,3 @@ def _warnings(prepared: PreparedBubble) -> list[Note]:
         "and bias the moduli, also without noise; matching by points does not"
     )
     return [*notes, Note(NoteKind.SURFACES, words)]
-
-
-def _percent(value: float) -> str:
-    from ...reports.html import percent
-
-    return percent(value)
-
-
-NOT_GIVEN = "not given"
-TITLE = "Image correlation"
-NOTE = (
-    "The fields that the good practices guide of the International Digital Image Correlation "
-    "Society asks for. What is not given stands in no file that was read: give it in "
-    "[bubble.data.points.correlation] before the report leaves the laboratory."
-)
-#: Of the hardware and the analysis, which exports of image correlation do not hold: what the
-#: section's keys are called on the page.
-ASKED = {
-    "camera": "camera",
-    "resolution": "image resolution",
-    "lens": "lens and aperture",
-    "field_of_view": "field of view",
-    "scale": "image scale",
-    "stereo": "stereo angle and stand-off",
-    "exposure": "exposure and frame rate",
-    "pattern": "patterning technique",
-    "pattern_size": "pattern feature size",
-    "subset": "subset size",
-    "step": "step size",
-    "strain_window": "strain window and virtual gauge length",
-    "matching": "shape function, matching criterion, interpolant",
-    "prefilter": "prefilter and data filter",
-}
-
-
-def correlation_table(prepared: PreparedBubble) -> list[Table]:
-    """A row a field; nothing where the data were computed."""
-    test = prepared.test
-    if not isinstance(test.data, PointFiles) or not prepared.fields:
-        return []
-    given = {**_of_filter(test), **test.data.correlation}
-    formats = sorted({f.source.format for f in prepared.fields if f.source.format})
-    points = [len(f.points) for f in prepared.fields]
-    software = [given.get("software", ""), ", ".join(formats)]
-    known: list[list[object]] = [
-        ["software and format of the export", "; ".join(filter(None, software)) or NOT_GIVEN],
-        ["images evaluated", str(len(prepared.fields))],
-        ["points in an image", f"{min(points)} to {max(points)}"],
-        ["points left out as doubtful", str(prepared.dropped)],
-        ["coordinates", "registered on the rim" if prepared.registration else "as exported"],
-        ["noise floor of a displacement", _mm(test.noise) or NOT_GIVEN],
-    ]
-    if test.match_by == "surfaces":
-        known.append(["smoothing", f"polynomial surfaces of degree {test.match_degree}"])
-    asked: list[list[object]] = [[name, given.get(key, NOT_GIVEN)] for key, name in ASKED.items()]
-    return [Table(f"{TITLE}: {test.name}", ["", ""], [*known, *asked], NOTE, text=(1,))]
-
-
-def _of_filter(test: BubbleTest) -> dict[str, str]:
-    """What the section of the camera's own filter tells, mm."""
-    if test.facet is None:
-        return {}
-    told = {"subset": _mm(test.facet.size), "step": _mm(test.facet.step)}
-    return {key: words for key, words in told.items() if words}
-
-
-def _mm(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g} mm"

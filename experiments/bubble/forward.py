@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import QhullError, cKDTree
 
-from ...errors import SolverFailure
-from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import surface_strain
-from ...reports.profiles import plot_profiles
-from ...reports.pvd import write_pvd
-from ...reports.vtu import write_vtu
 from ...solvers.base import History
-from ...writing import replacing
-from ..kinds import STRAINS, CardRun, Output, Simulation, Studied, strains_of
-from .section import Sheet
-from .test import PART, BubbleTest
+from ..kinds import Studied
 
 # The inflated sheet pressure by pressure: strain, stress, wrinkles, and what a fit leaves.
 #
@@ -112,46 +102,6 @@ def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
     return found
 
 
-def write_series(
-    model: BubbleModel,
-    history: History,
-    law: HypoelasticLaw,
-    path: Path,
-    residuals: Sequence[Array | None] = (),
-) -> Path:
-    """Write the series; each file holds the sheet as it is inflated, with its fields.
-
-    Point data: displacement (mm), and residual_mm, measured less modelled, where there are
-    `residuals` (nodes, 3), one a reported pressure. Cell data: log_strain_1_2_12,
-    stress_1_2_12_MPa, wrinkling (0 taut, 1 wrinkled, 2 slack).
-
-    Parameters
-    ----------
-    path : of the collection, ends in .pvd; the files lie in a folder of its name.
-
-    Raises
-    ------
-    OutputError : they cannot be written.
-    """
-    folder, files = path.with_name(f"{path.stem}-vtu"), []
-    for number, sheet in enumerate(inflated_sheets(model, history, law)):
-        own = residuals[number] if number < len(residuals) else None
-        file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
-        write_vtu(
-            model.mesh,
-            sheet.displacement,
-            file,
-            {} if own is None else {"residual_mm": own},
-            {
-                "log_strain_1_2_12": sheet.strain,
-                "stress_1_2_12_MPa": sheet.stress,
-                "wrinkling": sheet.state,
-            },
-        )
-        files.append((1e3 * sheet.pressure, file))
-    return write_pvd(path, files)
-
-
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
     """(frames,) mm."""
     apex = int(model.mesh.node_sets["apex"][0])
@@ -179,72 +129,3 @@ STUDIED = Studied(
     responses=responses,
     response="largest displacement",
 )
-
-
-def simulate(
-    test: BubbleTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-    within_range: bool = False,
-) -> Simulation:
-    """displacement.csv, bubble.pvd and profiles.png of every card, and the apex heights."""
-    numbers: dict[str, dict[str, object]] = {}
-    lines: list[str] = []
-    for i, name in enumerate(cards, start=1):
-        run = runs[name, PART]
-        if isinstance(run.outcome, SolverFailure):
-            numbers[name] = {"failed": run.outcome.reason}
-            lines.append(f"{name}: failed: {run.outcome.reason}")
-            continue
-        suffix = "" if len(cards) == 1 else f"-{i}"
-        history, model = run.outcome, run.model
-        heights = apex_heights(model, history)
-        reached = strains_of(history)
-        numbers[name] = {
-            "pressure_kPa": (1e3 * history.load).tolist(),
-            "apex_mm": heights.tolist(),
-            "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
-        }
-        with replacing(out.path(f"displacement{suffix}.csv")) as path:
-            displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
-        write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
-        plot_profiles(
-            out.path(f"profiles{suffix}.png"),
-            test.pressures,
-            model.mesh.points,
-            history.displacement,
-        )
-        lines += [f"{name}:"] if len(cards) > 1 else []
-        lines += [
-            f"{p:8.1f} kPa   apex {z:8.3f} mm"
-            for p, z in zip(1e3 * history.load, heights, strict=True)
-        ]
-    lines += [f"note: {words}" for words in _flat(test)]
-    only = numbers[next(iter(cards))] if len(cards) == 1 else {}
-    return Simulation({**only, "cards": numbers}, lines)
-
-
-def _flat(test: BubbleTest) -> list[str]:
-    """That a forward analysis knows nothing of how the sheet of the test lay."""
-    if test.sheet == Sheet():
-        return []
-    return ["simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"]
-
-
-def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
-    """A row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
-    points, count = model.mesh.points[:, :2], len(model.mesh.points)
-    frames = [
-        pd.DataFrame(
-            {
-                "pressure_kPa": np.full(count, 1e3 * load),
-                "node": np.arange(count),
-                "x_mm": points[:, 0],
-                "y_mm": points[:, 1],
-                **{f"d{axis}_mm": u[:, k] for k, axis in enumerate("xyz")},
-            }
-        )
-        for load, u in zip(history.load, history.displacement, strict=True)
-    ]
-    return pd.concat(frames, ignore_index=True)

@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import pandas as pd
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...inference.comparison import Comparison, Nuisance
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.mesh import Mesh
+from ...meshes.reading import FacetReading, SmoothReading
 from ...readers.fields import DisplacementField
 from ...readers.frames import FrameSource
 from ...readers.surfaces import DisplacementSurface
 from ..kinds import (
     DataFile,
     Doubt,
-    Exhibit,
     Expected,
-    Findings,
-    FittedTest,
     MakeSolver,
     Masks,
-    Output,
     Reach,
     Weighting,
     joined,
 )
 from .doubts import View, doubts_of
-from .findings import findings_of
 from .objective import (
     OFFSETS,
     FieldObjective,
@@ -40,12 +40,15 @@ from .objective import (
     at_rest,
     counted_from,
     folded,
+    reading_of,
     with_places,
 )
 from .point_files import PointFiles
 from .registration import Registration
 from .sheet import FLAT, MeasuredSheet, sheet_nuisance, with_sheet
-from .test import BubbleTest
+from .test import PART, BubbleTest
+
+Array = NDArray[np.float64]
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
 OBJECTIVES = {
@@ -92,8 +95,6 @@ class PreparedBubble:
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Frames, where no field that is constant over them is projected out."""
-        from .parts import frames_of
-
         return frames_of(self)
 
     def reach(self, masks: Masks) -> Reach:
@@ -114,8 +115,6 @@ class PreparedBubble:
         ------
         InputError : data that cannot be matched.
         """
-        from .parts import kept_targets
-
         test, model, sheet = self.test, self.model, self.test.sheet
         whole = self.targets
         targets = kept_targets(whole, (masks or {}).get(test.name))
@@ -160,8 +159,6 @@ class PreparedBubble:
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """The same places on a finer mesh with finer increments, or on a coarser mesh."""
-        from .parts import finer_bubble
-
         if self.by_this_model and factor > 1:
             return self.comparisons(make_solver, weighting)
         return finer_bubble(self, make_solver, weighting, factor)
@@ -208,28 +205,6 @@ class PreparedBubble:
         """What makes the measured fields doubtful; nothing where they were computed."""
         return () if self.known is not None else doubts_of(self.view, expected)
 
-    def examine(self, out: Output) -> Exhibit:
-        """Maps, heights and equilibrium of the measured fields."""
-        from .report import exhibit_examined as exhibit
-
-        return exhibit(self, out)
-
-    def findings(self, fitted: FittedTest) -> Findings:
-        """What the best fit means for this test."""
-        return findings_of(self, fitted)
-
-    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """Write cuts, heights, moduli, surfaces.csv and bubble.pvd."""
-        from .report import exhibit
-
-        return exhibit(self, fitted, findings, out)
-
-    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched displacement component, see `tables.residual_table`."""
-        from .report import residual_table
-
-        return residual_table(self, fitted)
-
 
 def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
     """The offsets that the test's section turns on."""
@@ -240,3 +215,121 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
         least = LEAST_SHARE * 1e3 * min(test.increments)
         on.append(Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3))
     return tuple(on)
+
+
+#: Quads of the full disk: with fewer it is no disk any more.
+LEAST_QUADS = 48
+#: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
+INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
+
+
+def finer_bubble(
+    prepared: PreparedBubble, make_solver: MakeSolver, weighting: Weighting, factor: float
+) -> tuple[Comparison, ...]:
+    """Its one comparison, of quads and increments divided by a factor; only of quads below one.
+
+    What lies between nodes is read as the fit reads it: what that does is part of the
+    difference.
+
+    Raises
+    ------
+    InputError : the mesh would be too coarse for a disk, or for the places of the data.
+    """
+    test = prepared.test
+    (own,) = prepared.comparisons(make_solver, weighting)
+    finer = test.models(what="elements", factor=factor)[PART]
+    whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
+    if whole < LEAST_QUADS and factor < 1:
+        problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
+        raise InputError(None, "elements", problem)
+    steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
+    model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, prepared.sheet)
+    objective = own.objective
+    assert isinstance(objective, FieldObjective)
+    moved = copy.copy(objective)
+    reading = reading_of(test, model.mesh)
+    moved.targets = resampled(objective.targets, own.model.mesh, model.mesh, reading)
+    return (replace(own, model=model, objective=moved),)
+
+
+def resampled(
+    targets: tuple[FieldTarget, ...],
+    own: Mesh,
+    other: Mesh,
+    reading: SmoothReading | FacetReading | None = None,
+) -> tuple[FieldTarget, ...]:
+    """The same targets at the same places, from the nodes of another mesh.
+
+    reading : of that mesh, smooth unless given.
+    """
+    reading = reading or SmoothReading.of(other)
+    found: list[tuple[Array, sp.csr_matrix]] = []
+    moved = []
+    for target in targets:
+        rest = target.at(own.points)[:, :2] if target.at_rest is None else target.at_rest
+        places = np.ascontiguousarray(rest)
+        sample = next((s for p, s in found if np.array_equal(p, places)), None)
+        if sample is None:
+            sample = _sample(reading, places)
+            found.append((places, sample))
+        moved.append(replace(target, sample=sample))
+    return tuple(moved)
+
+
+def _sample(reading: SmoothReading | FacetReading, places: Array) -> sp.csr_matrix:
+    at, inside = places.copy(), np.zeros(len(places), dtype=bool)
+    for share in INWARD:
+        at[~inside] = share * places[~inside]
+        matrix, inside = reading.matrix(at)
+        if inside.all():
+            return matrix
+    problem = f"{(~inside).sum()} places of the data lie outside of it"
+    raise InputError(None, "mesh", problem)
+
+
+def frames_of(prepared: PreparedBubble) -> Mapping[str, Mapping[str, Masks]]:
+    """The points that are kept without each frame, by its pressure.
+
+    None of a single frame, nor where a field that is the same in all frames is projected out: it
+    is known of all of them together only.
+    """
+    if prepared.test.sheet.constant:
+        return {}
+    targets = prepared.targets
+    if len(targets) < 2:
+        return {}
+    whose = np.repeat(np.arange(len(targets)), [len(t.displacement) for t in targets])
+    names = [f"{1e3 * target.pressure:.5g} kPa" for target in targets]
+    if len(set(names)) < len(names):
+        names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
+    return {
+        "frames": {name: {prepared.test.name: whose != k} for k, name in enumerate(names)},
+    }
+
+
+def kept_targets(
+    targets: Sequence[FieldTarget], mask: NDArray[np.bool_] | None
+) -> list[FieldTarget]:
+    """What a mask over the points of all targets leaves of them, each of its own frame."""
+    if mask is None:
+        return list(targets)
+    ends = np.cumsum([len(target.displacement) for target in targets])[:-1]
+    kept = []
+    for k, (target, own) in enumerate(zip(targets, np.split(mask, ends), strict=True)):
+        if not own.any():
+            continue
+        frame = k if target.frame is None else target.frame
+        whole = target.sample
+        if whole is None and not own.all():
+            whole = sp.identity(len(own), format="csr")
+        kept.append(
+            replace(
+                target,
+                displacement=target.displacement[own],
+                sample=whole if whole is None else sp.csr_matrix(whole[own]),
+                places=None if target.places is None else target.places[own],
+                at_rest=None if target.at_rest is None else target.at_rest[own],
+                frame=frame,
+            )
+        )
+    return kept

@@ -2,42 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...errors import SolverFailure
 from ...inference.comparison import Blocks
+from ...materials.card import MaterialCard
+from ...materials.law import HypoelasticLaw
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.disk import Outline
+from ...readers.fields import DisplacementField
 from ...readers.surfaces import write_surfaces
 from ...reports.charts import Chart, Charts, Series, dots, line
-from ...reports.content import Part, Table
+from ...reports.clock import plot_clock
+from ...reports.content import Exhibit, Part, Table
 from ...reports.cuts import node_cut, point_cut
 from ...reports.maps import Maps, Shade, Shades, Solid, maps_of
 from ...reports.packed import pack
 from ...reports.profiles import plot_profiles
+from ...reports.pvd import write_pvd
+from ...reports.registration import plot_registration
 from ...reports.rises import plot_rises
 from ...reports.scatter import plot_heights
+from ...reports.surface import plot_disk
+from ...reports.vtu import write_vtu
+from ...solvers.base import History
 from ...writing import replacing
-from ..kinds import Exhibit, Findings, FittedTest, Output, Shown
+from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .findings import (
-    clock_pictures,
-    correlation_table,
+    clock_words,
+    constant_field,
     fitted_model,
     objective_of,
     recorded_of,
-    recorded_table,
-    registration_picture,
-    registration_table,
-    sheet_exhibit,
     sheet_lines,
+    used_of,
 )
-from .forward import at_nodes, inflated_sheets, write_series
+from .forward import apex_heights, at_nodes, inflated_sheets
 from .objective import displacement_offset
+from .point_files import PointFiles, RecordedFrames
+from .prepared import PreparedBubble
+from .registration import Registration
+from .section import DIRECTIONS, Sheet
+from .test import PART, BubbleTest
 
-if TYPE_CHECKING:
-    from .prepared import PreparedBubble
+PICTURE, TABLE = "reference_surface.png", "reference_surface.csv"
+CONSTANT_PICTURE, CONSTANT_TABLE = "constant_field.png", "constant_field.csv"
+PICTURE_RECORDED_WORDS = "clock.png"
+PICTURE_REGISTRATION = "registration.png"
+#: What each choice of the plane means.
+PLANES = {
+    "clamp": "through the points beyond the rim",
+    "edge": "through the edge of the sheet",
+    "camera": "the camera's own x and y",
+}
+
+NOT_GIVEN = "not given"
+TITLE = "Image correlation"
+NOTE = (
+    "The fields that the good practices guide of the International Digital Image Correlation "
+    "Society asks for. What is not given stands in no file that was read: give it in "
+    "[bubble.data.points.correlation] before the report leaves the laboratory."
+)
+#: Of the hardware and the analysis, which exports of image correlation do not hold: what the
+#: section's keys are called on the page.
+ASKED = {
+    "camera": "camera",
+    "resolution": "image resolution",
+    "lens": "lens and aperture",
+    "field_of_view": "field of view",
+    "scale": "image scale",
+    "stereo": "stereo angle and stand-off",
+    "exposure": "exposure and frame rate",
+    "pattern": "patterning technique",
+    "pattern_size": "pattern feature size",
+    "subset": "subset size",
+    "step": "step size",
+    "strain_window": "strain window and virtual gauge length",
+    "matching": "shape function, matching criterion, interpolant",
+    "prefilter": "prefilter and data filter",
+}
 
 NOT_MATCHED = "for the record: the fit matched the points themselves"
 SURFACES = "surfaces.csv"
@@ -81,7 +129,7 @@ def write_surface_table(prepared: PreparedBubble, out: Output) -> list[Shown]:
     return [(out.name(SURFACES), "polynomial surfaces of the data")]
 
 
-def residual_table(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
+def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     """A row a place, pressure and direction.
 
     Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
@@ -232,7 +280,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
 
 #: Signs of x and y of the parts of a whole: a quarter is seen four times.
 WHOLE, QUARTERS = ((1, 1),), ((1, 1), (-1, 1), (-1, -1), (1, -1))
-STRAINS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
+STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
 STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
 
 
@@ -249,7 +297,7 @@ def bubble_solid(
     residual = np.tile(np.array([_sizes(own, mesh.quads) for own in left]), len(signs))
     shades = [Shade("residual, length", "mm", pack(residual))]
     fields = (
-        (STRAINS, "1", np.array([sheet.strain for sheet in sheets])),
+        (STRAIN_LABELS, "1", np.array([sheet.strain for sheet in sheets])),
         (STRESSES, "MPa", np.array([sheet.stress for sheet in sheets])),
     )
     for names, unit, values in fields:
@@ -287,9 +335,7 @@ def _around(values: Array, signs: Array) -> Array:
 PROFILES, HEIGHTS, SERIES = "profiles.png", "heights.png", "bubble.pvd"
 
 
-def exhibit(
-    prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output
-) -> Exhibit:
+def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write the figures, surfaces.csv and bubble.pvd with its files."""
     files = [
         *write_surface_table(prepared, out),
@@ -377,7 +423,7 @@ def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, obje
 HEIGHTS_EXAMINED = "rises.png"
 
 
-def exhibit_examined(prepared: PreparedBubble, out: Output) -> Exhibit:
+def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     """Write the maps and the rise by pressure."""
     tables = [_frames(prepared)]
     if prepared.registration is not None:
@@ -444,3 +490,277 @@ def _rises(prepared: PreparedBubble, out: Output) -> Shown:
     pressures = [field.pressure for field in prepared.fields]
     plot_rises(out.path(HEIGHTS_EXAMINED), pressures, prepared.view.rises)
     return out.name(HEIGHTS_EXAMINED), "rise about the centre against pressure"
+
+
+def sheet_exhibit(
+    prepared: PreparedBubble, fitted: FittedTest, out: Output
+) -> tuple[list[Shown], list[Shown]]:
+    """Figures and files of the surface and of a constant field, where there are any."""
+    figures, files = [], []
+    sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
+    if sheet.measured or sheet.modes:
+        points = fitted_model(fitted).mesh.points
+        _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
+        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], edge)
+        how = " and ".join(w for w in used_of(prepared) if w in ("measured surface", "modes"))
+        words = "surface of the sheet in the reference picture"
+        figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
+        files.append((out.name(TABLE), f"{words}, node by node"))
+    if sheet.constant:
+        places, field = constant_field(fitted)
+        own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
+        columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
+        _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
+        plot_disk(out.path(CONSTANT_PICTURE), own, edge)
+        words = "measured less modelled, as far as it is the same at all pressures"
+        figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
+        files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))
+    return figures, files
+
+
+def _write(out: Output, name: str, columns: dict[str, Array]) -> None:
+    with replacing(out.path(name)) as path:
+        pd.DataFrame(columns).to_csv(path, index=False, float_format="%.6g")
+
+
+def recorded_table(taken: RecordedFrames) -> Table:
+    """The frames taken, and at which pressures they were recorded."""
+    columns = ["frame", "pressure, kPa"]
+    cells: list[list[object]] = [
+        [n, 1e3 * p] for n, p in zip(taken.names, taken.pressure.tolist(), strict=True)
+    ]
+    if taken.asked is not None:
+        columns += ["asked for, kPa", "farther by, kPa"]
+        for row, p, a in zip(cells, taken.pressure, taken.asked, strict=True):
+            row += [1e3 * float(a), 1e3 * float(p - a)]
+    if taken.doubt is not None and taken.clock is not None and taken.clock.misfit is not None:
+        columns.append("uncertain by the clocks, +- kPa")
+        for row, d in zip(cells, taken.doubt, strict=True):
+            row.append(1e3 * float(d))
+    left_out = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
+    note = f"pressures from {taken.source}; {len(cells)} of {taken.count} frames{left_out}"
+    if taken.clock is not None:
+        note += ". " + clock_words(taken.clock)
+    return Table("Frames taken", columns, cells, note)
+
+
+def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
+    """Pressures of the log beside the heights of all frames; none without a log."""
+    clock = taken.clock
+    if clock is None:
+        return []
+    times = clock.times + clock.offset
+    plot_clock(
+        out.path(PICTURE_RECORDED_WORDS), times, clock.pressure, clock.heights, taken.pressure
+    )
+    return [
+        (
+            out.name(PICTURE_RECORDED_WORDS),
+            "pressures of the log and heights of the frames, by one clock",
+        )
+    ]
+
+
+def registration_table(found: Registration) -> Table:
+    """What was found and what was given, step by step."""
+    x, y, z = found.placement.origin
+    rim, warp = found.rim, found.warp
+    plane = f"tilted by {found.placement.tilt:.2f} degrees"
+    how = PLANES[found.plane_of]
+    if found.plane_of != "camera":
+        how += f", which deviate by {found.flatness:.2g} mm"
+    rows: list[list[object]] = [
+        ["plane of the rim", plane, how],
+        [
+            "centre of the rim, mm",
+            f"{x:.2f}, {y:.2f}, {z:.2f}",
+            "given" if rim is None else f"found where the sheet does not rise, +- {rim.error:.2g}",
+        ],
+        [
+            "warp, degrees from the camera's x",
+            f"{found.warp_angle:.2f}",
+            "given" if warp is None else _warp_words(found),
+        ],
+        ["motion of the clamp", *_motion_words(found)],
+    ]
+    note = "lengths and directions in the camera's coordinates"
+    return Table("Registration", ["step", "value", "how"], rows, note)
+
+
+def _warp_words(found: Registration) -> str:
+    assert found.warp is not None
+    if found.warp.clear is None:
+        return f"found by the turn of the elliptic rim, +- {found.warp.error:.2g}"
+    stiff = "stiffer" if found.options.warp_is_stiff else "softer"
+    return (
+        f"found by symmetry ({found.warp.clear:.0%} clear), +- {found.warp.error:.2g}; the "
+        f"{stiff} of the two axes"
+    )
+
+
+def _motion_words(found: Registration) -> tuple[str, str]:
+    seen = [m for m in found.motions if m.points]
+    if not seen:
+        return "not known", "no points beyond the rim all around"
+    shift = max(float(np.linalg.norm(m.shift)) for m in seen)
+    turn = max(m.angle for m in seen)
+    removed = "removed" if found.options.remove_clamp_motion else "left in"
+    return f"{shift:.3g} mm, {turn:.2g} degrees at most", removed
+
+
+def registration_picture(
+    fields: Sequence[DisplacementField], outline: Outline, out: Output
+) -> Shown:
+    """Maps of the reference height, where it was measured, and of the highest rise."""
+    last = fields[-1]
+    maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
+    if last.z is not None:
+        maps.insert(0, ("reference height z, mm", last.z))
+    plot_registration(out.path(PICTURE_REGISTRATION), last.points, maps, outline.edge())
+    return out.name(
+        PICTURE_REGISTRATION
+    ), "measured points in the test's coordinates, the rim, warp and fill"
+
+
+def correlation_table(prepared: PreparedBubble) -> list[Table]:
+    """A row a field; nothing where the data were computed."""
+    test = prepared.test
+    if not isinstance(test.data, PointFiles) or not prepared.fields:
+        return []
+    given = {**_of_filter(test), **test.data.correlation}
+    formats = sorted({f.source.format for f in prepared.fields if f.source.format})
+    points = [len(f.points) for f in prepared.fields]
+    software = [given.get("software", ""), ", ".join(formats)]
+    known: list[list[object]] = [
+        ["software and format of the export", "; ".join(filter(None, software)) or NOT_GIVEN],
+        ["images evaluated", str(len(prepared.fields))],
+        ["points in an image", f"{min(points)} to {max(points)}"],
+        ["points left out as doubtful", str(prepared.dropped)],
+        ["coordinates", "registered on the rim" if prepared.registration else "as exported"],
+        ["noise floor of a displacement", _mm(test.noise) or NOT_GIVEN],
+    ]
+    if test.match_by == "surfaces":
+        known.append(["smoothing", f"polynomial surfaces of degree {test.match_degree}"])
+    asked: list[list[object]] = [[name, given.get(key, NOT_GIVEN)] for key, name in ASKED.items()]
+    return [Table(f"{TITLE}: {test.name}", ["", ""], [*known, *asked], NOTE, text=(1,))]
+
+
+def _of_filter(test: BubbleTest) -> dict[str, str]:
+    """What the section of the camera's own filter tells, mm."""
+    if test.facet is None:
+        return {}
+    told = {"subset": _mm(test.facet.size), "step": _mm(test.facet.step)}
+    return {key: words for key, words in told.items() if words}
+
+
+def _mm(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g} mm"
+
+
+def write_series(
+    model: BubbleModel,
+    history: History,
+    law: HypoelasticLaw,
+    path: Path,
+    residuals: Sequence[Array | None] = (),
+) -> Path:
+    """Write the series; each file holds the sheet as it is inflated, with its fields.
+
+    Point data: displacement (mm), and residual_mm, measured less modelled, where there are
+    `residuals` (nodes, 3), one a reported pressure. Cell data: log_strain_1_2_12,
+    stress_1_2_12_MPa, wrinkling (0 taut, 1 wrinkled, 2 slack).
+
+    Parameters
+    ----------
+    path : of the collection, ends in .pvd; the files lie in a folder of its name.
+
+    Raises
+    ------
+    OutputError : they cannot be written.
+    """
+    folder, files = path.with_name(f"{path.stem}-vtu"), []
+    for number, sheet in enumerate(inflated_sheets(model, history, law)):
+        own = residuals[number] if number < len(residuals) else None
+        file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
+        write_vtu(
+            model.mesh,
+            sheet.displacement,
+            file,
+            {} if own is None else {"residual_mm": own},
+            {
+                "log_strain_1_2_12": sheet.strain,
+                "stress_1_2_12_MPa": sheet.stress,
+                "wrinkling": sheet.state,
+            },
+        )
+        files.append((1e3 * sheet.pressure, file))
+    return write_pvd(path, files)
+
+
+def simulate(
+    test: BubbleTest,
+    cards: Mapping[str, MaterialCard],
+    runs: Mapping[tuple[str, str], CardRun],
+    out: Output,
+    within_range: bool = False,
+) -> Simulation:
+    """displacement.csv, bubble.pvd and profiles.png of every card, and the apex heights."""
+    numbers: dict[str, dict[str, object]] = {}
+    lines: list[str] = []
+    for i, name in enumerate(cards, start=1):
+        run = runs[name, PART]
+        if isinstance(run.outcome, SolverFailure):
+            numbers[name] = {"failed": run.outcome.reason}
+            lines.append(f"{name}: failed: {run.outcome.reason}")
+            continue
+        suffix = "" if len(cards) == 1 else f"-{i}"
+        history, model = run.outcome, run.model
+        heights = apex_heights(model, history)
+        reached = strains_of(history)
+        numbers[name] = {
+            "pressure_kPa": (1e3 * history.load).tolist(),
+            "apex_mm": heights.tolist(),
+            "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
+        }
+        with replacing(out.path(f"displacement{suffix}.csv")) as path:
+            displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
+        write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
+        plot_profiles(
+            out.path(f"profiles{suffix}.png"),
+            test.pressures,
+            model.mesh.points,
+            history.displacement,
+        )
+        lines += [f"{name}:"] if len(cards) > 1 else []
+        lines += [
+            f"{p:8.1f} kPa   apex {z:8.3f} mm"
+            for p, z in zip(1e3 * history.load, heights, strict=True)
+        ]
+    lines += [f"note: {words}" for words in _flat(test)]
+    only = numbers[next(iter(cards))] if len(cards) == 1 else {}
+    return Simulation({**only, "cards": numbers}, lines)
+
+
+def _flat(test: BubbleTest) -> list[str]:
+    """That a forward analysis knows nothing of how the sheet of the test lay."""
+    if test.sheet == Sheet():
+        return []
+    return ["simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"]
+
+
+def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
+    """A row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
+    points, count = model.mesh.points[:, :2], len(model.mesh.points)
+    frames = [
+        pd.DataFrame(
+            {
+                "pressure_kPa": np.full(count, 1e3 * load),
+                "node": np.arange(count),
+                "x_mm": points[:, 0],
+                "y_mm": points[:, 1],
+                **{f"d{axis}_mm": u[:, k] for k, axis in enumerate("xyz")},
+            }
+        )
+        for load, u in zip(history.load, history.displacement, strict=True)
+    ]
+    return pd.concat(frames, ignore_index=True)

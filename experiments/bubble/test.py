@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.reading import Facet
-from ..kinds import MakeSolver, Place, PreparedTest, Reach, Refined
+from ..kinds import Place, Reach, Refined
 from .point_files import PointFiles, measured_files
 from .section import (
     BubbleSection,
@@ -240,17 +239,6 @@ class BubbleTest:
             known = asdict(self.data)
             said["known_solution"] = {**known, "beta": self.data.beta.tolist()}
         return said
-
-    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
-        """Read the measured fields, or compute those of the known solution.
-
-        Raises
-        ------
-        InputError : in the data. SolverFailure : the known solution cannot be run.
-        """
-        from .data import prepare
-
-        return prepare(self, law, make_solver)
 
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:

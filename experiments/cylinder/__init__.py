@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from ...materials.card import MaterialCard
-from ..kinds import CardRun, Output, Place, Predicted, Simulation, Studied
+from ..kinds import Place
+from .predicted import STUDIED, CylinderPredicted
 from .section import CylinderSection
 from .test import CylinderTest, read
 
@@ -21,37 +18,12 @@ class CylinderKind:
     folder_key = "measured.folder"
     section = CylinderSection
     fitted = False
-
-    @property
-    def predicted(self) -> Predicted:
-        """What cards say of it."""
-        from .predicted import CylinderPredicted
-
-        return CylinderPredicted()
-
-    @property
-    def studied(self) -> Studied:
-        """Shape when inflated, stiffness, loads, buckling."""
-        from .predicted import STUDIED
-
-        return STUDIED
+    predicted = CylinderPredicted()
+    studied = STUDIED
 
     def read(self, section: CylinderSection, place: Place, name: str) -> CylinderTest:
         """The test of a section; raises InputError."""
         return read(section, place, name)
-
-    def simulate(
-        self,
-        test: Any,
-        cards: Mapping[str, MaterialCard],
-        runs: Mapping[tuple[str, str], CardRun],
-        out: Output,
-        within_range: bool = False,
-    ) -> Simulation:
-        """Tables, figures and the bent beams of every card."""
-        from .predicted import simulate
-
-        return simulate(test, cards, runs, out)
 
 
 KIND = CylinderKind()

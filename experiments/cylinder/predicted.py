@@ -12,24 +12,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
-from ...materials.card import MaterialCard
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...notes import marks
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
 from ..kinds import (
-    CardRun,
-    Exhibit,
-    Output,
     PredictedRun,
     RunRecord,
-    Simulation,
     Studied,
     band_of,
-    record_of,
 )
-from .test import PART, CylinderTest
+from .test import CylinderTest
 
 Array = NDArray[np.float64]
 
@@ -516,12 +510,6 @@ class CylinderOutcome:
         sigma = {i: self.sigma(i) for i in self.spreads}
         return [*terminal_table(self.runs, self.measures, ended, sigma), *self.unsure]
 
-    def show(self, out: Output) -> Exhibit:
-        """Write figures, tables and beams."""
-        from .report import exhibit
-
-        return exhibit(self, out)
-
 
 def _point(point: Point | None) -> dict[str, float | None]:
     return {"deflection_mm": point[0] if point else None, "load_N": point[1] if point else None}
@@ -549,29 +537,6 @@ class CylinderPredicted:
     def outcome(self, runs: Sequence[PredictedRun]) -> CylinderOutcome:
         """What runs say."""
         return CylinderOutcome(runs)
-
-
-def simulate(
-    test: CylinderTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-) -> Simulation:
-    """load_deflection.csv, figures and beams; the numbers of every card."""
-    kind, predicted = CylinderPredicted(), []
-    for name, card in cards.items():
-        run = runs[name, PART]
-        record = record_of(kind, run.model, run.outcome)
-        predicted.append(PredictedRun(test, name, card, run.model, record))
-    outcome = CylinderOutcome(predicted)
-    if outcome.measures:
-        outcome.show(out)
-    numbers = {
-        run.card: {"ended": outcome.ended(i)}
-        | (dict(outcome.numbers(i)) if i in outcome.measures else {})
-        for i, run in enumerate(predicted)
-    }
-    return Simulation({"cards": numbers}, outcome.lines())
 
 
 def deflection_curve(model: CylinderModel, history: History) -> tuple[Array, Array]:

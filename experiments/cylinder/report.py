@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...materials.card import BAND, LEVEL
+from ...materials.card import BAND, LEVEL, MaterialCard
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
 from ...notes import marks
@@ -28,13 +28,20 @@ from ...reports.bending import (
 )
 from ...reports.bending_charts import bending_charts
 from ...reports.charts import Charts
-from ...reports.content import Part, Table, Words
+from ...reports.content import Exhibit, Part, Table, Words
 from ...reports.html import percent
 from ...reports.vtu import write_vtu
 from ...writing import replacing
-from ..kinds import Exhibit, Output, Shown
-from .predicted import BendingRun, load_words, measured_table, place_names
-from .test import CylinderTest
+from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
+from .predicted import (
+    BendingRun,
+    CylinderOutcome,
+    CylinderPredicted,
+    load_words,
+    measured_table,
+    place_names,
+)
+from .test import PART, CylinderTest
 
 if TYPE_CHECKING:
     from .predicted import CylinderOutcome
@@ -310,7 +317,7 @@ CURVES = "load_deflection.csv"
 MEASURED = "measured.csv"
 
 
-def exhibit(outcome: CylinderOutcome, out: Output) -> Exhibit:
+def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     """Write everything below the folder and say what is where."""
     tests = tests_of(outcome)
     figures = draw_figures(outcome, out)
@@ -440,3 +447,27 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
 def _unbroken(row: Sequence[object]) -> list[object]:
     """The row with names and numbers that stay on one line."""
     return [c.replace(" ", "\u00a0") if isinstance(c, str) and len(c) < SHORT else c for c in row]
+
+
+def simulate(
+    test: CylinderTest,
+    cards: Mapping[str, MaterialCard],
+    runs: Mapping[tuple[str, str], CardRun],
+    out: Output,
+    within_range: bool = False,
+) -> Simulation:
+    """load_deflection.csv, figures and beams; the numbers of every card."""
+    kind, predicted = CylinderPredicted(), []
+    for name, card in cards.items():
+        run = runs[name, PART]
+        record = record_of(kind, run.model, run.outcome)
+        predicted.append(PredictedRun(test, name, card, run.model, record))
+    outcome = CylinderOutcome(predicted)
+    if outcome.measures:
+        show_outcome(outcome, out)
+    numbers = {
+        run.card: {"ended": outcome.ended(i)}
+        | (dict(outcome.numbers(i)) if i in outcome.measures else {})
+        for i, run in enumerate(predicted)
+    }
+    return Simulation({"cards": numbers}, outcome.lines())

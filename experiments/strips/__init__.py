@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from pydantic import BaseModel
 
-from ...materials.card import MaterialCard
+from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ...solvers.base import History
 from ..kinds import (
     Candidate,
-    CardRun,
     Kind,
-    Output,
+    MakeSolver,
     Place,
     Planning,
     Predicted,
-    Simulation,
     Studied,
 )
+from .candidates import candidates
 from .objective import Array
+from .prepared import PreparedStrips
 from .section import StripsSection
 from .test import StripsTest, read
 
@@ -63,23 +63,14 @@ class Strips:
         """
         return read(section, place, name)
 
-    def simulate(
-        self,
-        test: StripsTest,
-        cards: Mapping[str, MaterialCard],
-        runs: Mapping[tuple[str, str], CardRun],
-        out: Output,
-        within_range: bool = False,
-    ) -> Simulation:
-        """Cards on the strips: loads.csv, loads.png, the deformed bias strips, RMS errors."""
-        from .simulated import simulate
-
-        return simulate(test, cards, runs, out, within_range)
+    def prepare(
+        self, test: StripsTest, law: HypoelasticLaw, make_solver: MakeSolver
+    ) -> PreparedStrips:
+        """Return the test as it is: its data were read with its section."""
+        return PreparedStrips(test)
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
         """Strips along the yarns and at angles to them."""
-        from .candidates import candidates
-
         return candidates(planning)
 
 

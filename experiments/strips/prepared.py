@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...inference.comparison import Comparison
@@ -18,13 +17,10 @@ from ...solvers.base import History
 from ..kinds import (
     DataFile,
     Doubt,
-    Exhibit,
     Expected,
-    Findings,
     FittedTest,
     MakeSolver,
     Masks,
-    Output,
     Reach,
     Weighting,
     joined,
@@ -257,30 +253,6 @@ class PreparedStrips:
         """What makes the load curves doubtful."""
         test = self.test
         return doubts_of_strips(test.strips, test.width, test.thickness, expected)
-
-    def examine(self, out: Output) -> Exhibit:
-        """The load curves as they were read."""
-        from .report import exhibit_examined as exhibit
-
-        return exhibit(self.test, out)
-
-    def findings(self, fitted: FittedTest) -> Findings:
-        """What the best fit means for this test."""
-        from .report import findings_of
-
-        return findings_of(self.test, self.fitted_strips(fitted))
-
-    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-        from .report import exhibit
-
-        return exhibit(self.test, self.fitted_strips(fitted), fitted, out)
-
-    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
-        """Every matched load, see `tables.residual_table`."""
-        from .report import residual_table
-
-        return residual_table(self.fitted_strips(fitted))
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:

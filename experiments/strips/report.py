@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, SolverFailure
+from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
-from ...reports.content import Table
+from ...reports.content import Exhibit, Table
 from ...reports.curves import plot_curves
 from ...reports.load_charts import load_charts
 from ...reports.loads import StripCurves, plot_loads
@@ -25,11 +27,11 @@ from ...reports.strip import plot_strip
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
 from ...writing import replacing
-from ..kinds import Exhibit, Findings, FittedTest, Output, Shown
+from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .data import Strip
 from .doubts import curves_of
 from .polynomials import compare_orders
-from .prepared import FittedStrip
+from .prepared import FittedStrip, PreparedStrips
 from .test import StripsTest
 
 #: The modulus that each direction pins down.
@@ -344,3 +346,162 @@ def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
     ]  # fmt: skip
     table = Table("Load curves as read", header, rows, text=(1,))
     return Exhibit(figures=[(out.name(CURVES), "load curves as they were read")], tables=[table])
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """One card on one strip: how many of its increments are shown, and how far off they are (N)."""
+
+    model: UniaxialModel
+    history: History
+    shown: int
+    rms: float | None
+
+    @property
+    def elongation(self) -> Array:
+        """mm of the gauge, at every increment."""
+        return np.array(self.model.elongations)
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is left out."""
+        return self.shown == len(self.model.elongations)
+
+
+#: By (card, direction).
+Pulls = Mapping[tuple[str, str], "Pull | SolverFailure"]
+
+
+def simulate(
+    test: StripsTest,
+    cards: Mapping[str, MaterialCard],
+    runs: Mapping[tuple[str, str], CardRun],
+    out: Output,
+    within_range: bool = False,
+) -> Simulation:
+    """Write loads.csv, loads.png and the deformed bias strips; a failed analysis is told as such.
+
+    within_range : show each curve only to where the card's valid range ends.
+    """
+    pulls = {
+        (name, direction): _pull(test, cards[name], direction, run, within_range)
+        for (name, direction), run in runs.items()
+    }
+    told = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
+    _write_loads(test, list(cards), pulls, out)
+    figures = [(out.name("loads.png"), "Load over gauge elongation")]
+    return Simulation({"cards": told}, _lines_of_cards(told), figures)
+
+
+def _pull(
+    test: StripsTest, card: MaterialCard, direction: str, run: CardRun, within_range: bool
+) -> Pull | SolverFailure:
+    if isinstance(run.outcome, SolverFailure):
+        return run.outcome
+    history, u = run.outcome, np.array(run.model.elongations)
+    shown = _within(run.model, card, history) if within_range else len(u)
+    polynomial, rms = test.strips[direction].polynomial, None
+    if polynomial is not None and shown:
+        error = history.load[:shown] - polynomial(u[:shown])
+        rms = float(np.sqrt(np.mean(error**2)))
+    return Pull(run.model, history, shown, rms)
+
+
+def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
+    """Increments before a strain in the middle of a quad leaves the card's valid range."""
+    for i, u in enumerate(history.displacement):
+        strain = middle_strain(model.mesh, u, model.warp)
+        reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
+        if (reached > card.law.strain_range * (1 + 1e-6)).any():
+            return i
+    return len(history.load)
+
+
+def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict[str, Any]:
+    """RMS errors, end loads and strains of a card, strip by strip."""
+    directions: dict[str, Any] = {}
+    total: float | None = 0.0
+    for direction in test.strips:
+        pull = pulls[name, direction]
+        if isinstance(pull, SolverFailure):
+            directions[direction], total = {"failed": pull.reason}, None
+            continue
+        reached = strains_of(pull.history)
+        directions[direction] = {
+            "rms_N": pull.rms,
+            "end_load_N": float(pull.history.load[-1]),
+            "shown_to_mm": float(pull.elongation[pull.shown - 1]) if pull.shown else 0.0,
+            "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
+        }
+        # A sum of errors over parts of the curves could be compared with nothing.
+        known = pull.whole and pull.rms is not None and total is not None
+        total = total + pull.rms if known else None  # type: ignore[operator]
+    return {"e_uniaxial_N": total, "directions": directions}
+
+
+def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> None:
+    ended = {key: pull for key, pull in pulls.items() if isinstance(pull, Pull)}
+    tables = [
+        pd.DataFrame(
+            {
+                "card": name,
+                "direction": direction,
+                "elongation_mm": pull.elongation,
+                "load_N": pull.history.load,
+            }
+        )
+        for (name, direction), pull in ended.items()
+    ]
+    with replacing(out.path("loads.csv")) as path:
+        pd.concat(tables).to_csv(path, index=False)
+    drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
+    rms: dict[str, list[float]] = {d: [] for d in test.strips}
+    for (name, direction), pull in ended.items():
+        if pull.shown:
+            part = slice(pull.shown)
+            drawn[direction].append((name, pull.elongation[part], pull.history.load[part]))
+            rms[direction] += [] if pull.rms is None else [pull.rms]
+    plot_loads(out.path("loads.png"), load_panels(list(test.strips.values()), drawn, rms))
+    for number, name in enumerate(cards, start=1):
+        if (name, "bias") in ended:
+            stem = "bias" if len(cards) == 1 else f"bias-{number}"
+            pull = ended[name, "bias"]
+            draw_bias(pull.model, pull.history, out.path(f"{stem}.png"), out.path(f"{stem}.vtu"))
+
+
+def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
+    """The same for the terminal."""
+    lines = []
+    for name, card in cards.items():
+        parts = []
+        for direction, told in card["directions"].items():
+            if "failed" in told:
+                parts.append(f"{direction} failed")
+            elif told["rms_N"] is None:
+                parts.append(f"{direction} {told['end_load_N']:.4g} N at the end")
+            else:
+                parts.append(f"{direction} {told['rms_N']:.4g} N to {told['shown_to_mm']:.3g} mm")
+        total = card["e_uniaxial_N"]
+        words = "" if total is None else f"; sum {total:.4g} N"
+        lines.append(f"{name}: RMS {', '.join(parts)}{words}")
+    return lines
+
+
+def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
+    """Return the numbers, warnings and words of the best fit."""
+    return findings_of(prepared.test, prepared.fitted_strips(fitted))
+
+
+def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+    """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
+    return exhibit(prepared.test, prepared.fitted_strips(fitted), fitted, out)
+
+
+def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
+    """Write the load curves as they were read."""
+    return exhibit_examined(prepared.test, out)
+
+
+def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
+    """Return every matched load, see `residual_table`."""
+    return residual_table(prepared.fitted_strips(fitted))

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import (
     GRIP_DISTANCE,
     WIDTH,
@@ -20,12 +19,12 @@ from ...meshes.strip_models import (
     refined_quads,
     straight_strip,
 )
-from ..kinds import MakeSolver, Place, Reach, Refined
+from ..kinds import Place, Reach, Refined
 from .data import Strip, read_strips
 from .section import Match, StripsSection, Unit
 
 if TYPE_CHECKING:
-    from .prepared import PreparedStrips
+    pass
 
 Mask = NDArray[np.bool_]
 
@@ -106,12 +105,6 @@ class StripsTest:
         said: dict[str, object] = {name: getattr(self, name) for name in names}
         lengths = {d: (s.gauge_length, s.final_length) for d, s in self.strips.items()}
         return {**said, "weights": dict(self.weights), "lengths": lengths}
-
-    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedStrips:
-        """The test as it is: its curves were read with its section, which they complete."""
-        from .prepared import PreparedStrips
-
-        return PreparedStrips(self)
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:

@@ -16,7 +16,6 @@ import pandas as pd
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.kinds import (
     CardRun,
-    Exhibit,
     Findings,
     FittedTest,
     MakeSolver,
@@ -33,6 +32,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import UniaxialModel, straight_strip
 from bubblefit.readers.sections import Positive, Section
+from bubblefit.reports.content import Exhibit
 from bubblefit.solvers.base import Array, History
 from pydantic import Field
 
@@ -90,10 +90,6 @@ class DatasheetTest:
         """What a result depends on."""
         return {"direction": self.direction, "strain": self.strain, "weight": self.weight}
 
-    def prepare(self, law: HypoelasticLaw, make_solver: MakeSolver) -> "PreparedDatasheet":
-        """There is nothing to read or to compute."""
-        return PreparedDatasheet(self)
-
 
 class LoadObjective:
     """The load of the last frame less the one stated, over the one stated: one block of one."""
@@ -150,52 +146,36 @@ class PreparedDatasheet:
         objective = LoadObjective(self.test.load, weighting.weight if weighting.relative else 1.0)
         return (Comparison(self.test.name, model, make_solver(), objective, contracts=True),)
 
-    def findings(self, fitted: FittedTest) -> Findings:
+
+class DatasheetReport:
+    """Write and word the results of a data sheet."""
+
+    def findings(self, prepared: PreparedDatasheet, fitted: FittedTest) -> Findings:
         """How far the best fit is from the sheet."""
-        off = float(fitted.histories[0].load[-1]) / self.test.load - 1
+        off = float(fitted.histories[0].load[-1]) / prepared.test.load - 1
         words = f"{off:+.2%} of the load stated"
-        numbers = {"relative_error": off, "load_N": self.test.load}
+        numbers = {"relative_error": off, "load_N": prepared.test.load}
         return Findings(numbers, (), (words,), words, words)
 
-    def show(self, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-        """No figure: one number says it."""
-        return Exhibit(facts=[("data sheet", findings.summary)])
+    def show(
+        self, prepared: PreparedDatasheet, fitted: FittedTest, found: Findings, out: Output
+    ) -> Exhibit:
+        """Return the one fact: there is no figure."""
+        return Exhibit(facts=[("data sheet", found.summary)])
 
-    def residuals(self, fitted: FittedTest) -> pd.DataFrame:
+    def residuals(self, prepared: PreparedDatasheet, fitted: FittedTest) -> pd.DataFrame:
         """The one matched value."""
-        modelled, measured = float(fitted.histories[0].load[-1]), self.test.load
+        modelled, measured = float(fitted.histories[0].load[-1]), prepared.test.load
         return pd.DataFrame(
             {
-                "part": [self.test.direction],
-                "strain": [self.test.strain],
+                "part": [prepared.test.direction],
+                "strain": [prepared.test.strain],
                 "quantity": ["load"],
                 "measured": [measured],
                 "modelled": [modelled],
                 "difference": [modelled - measured],
                 "unit": ["N"],
             }
-        )
-
-
-class Datasheet:
-    """[[datasheet]] of a project."""
-
-    name = "datasheet"
-    title = "the load per width of a data sheet"
-    section = DatasheetSection
-    fitted = True
-    predicted = None
-    studied = None
-
-    def read(self, section: DatasheetSection, place: Place, name: str) -> DatasheetTest:
-        """The test of a section."""
-        return DatasheetTest(
-            name=name,
-            place=place,
-            weight=section.weight,
-            direction=section.direction,
-            strain=section.strain,
-            load_per_width=section.load_per_width,
         )
 
     def simulate(
@@ -220,5 +200,34 @@ class Datasheet:
         return Simulation({"cards": told}, lines)
 
 
-#: What the entry point names.
+class Datasheet:
+    """[[datasheet]] of a project."""
+
+    name = "datasheet"
+    title = "the load per width of a data sheet"
+    section = DatasheetSection
+    fitted = True
+    predicted = None
+    studied = None
+    report = DatasheetReport()
+
+    def read(self, section: DatasheetSection, place: Place, name: str) -> DatasheetTest:
+        """The test of a section."""
+        return DatasheetTest(
+            name=name,
+            place=place,
+            weight=section.weight,
+            direction=section.direction,
+            strain=section.strain,
+            load_per_width=section.load_per_width,
+        )
+
+    def prepare(
+        self, test: DatasheetTest, law: HypoelasticLaw, make_solver: MakeSolver
+    ) -> PreparedDatasheet:
+        """Return the test as it is: there is nothing to read or to compute."""
+        return PreparedDatasheet(test)
+
+
+#: The object that the entry point names.
 KIND = Datasheet()
