@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any
 import bubblefit.solvers.calculix.frd_format
 import bubblefit.solvers.marc.t19_format  # noqa: F401
 
+from .files import __version__ as __version__
+
 if TYPE_CHECKING:
     from .materials.card import MaterialCard, read_card
     from .project.project import Project, read_project
@@ -33,7 +35,6 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-__version__ = "0.2.0"
 __all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predict", "profile",
            "read_card", "read_project", "simulate"]  # fmt: skip
 

@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
-from . import __version__
+from .files import __version__
 
 
 def digest_of(*things: object) -> str:

@@ -10,13 +10,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal
-
-import jinja2
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from typing import TYPE_CHECKING, Any, Literal
 
 from .errors import PlugInFailure
 
+if TYPE_CHECKING:
+    import jinja2
+
+__version__ = "0.2.0"
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
@@ -25,6 +26,9 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
 
     html : whether values are escaped.
     """
+    import jinja2
+    from jinja2.sandbox import ImmutableSandboxedEnvironment
+
     return ImmutableSandboxedEnvironment(
         loader=loader,
         undefined=jinja2.StrictUndefined,
@@ -42,6 +46,8 @@ def render(template: str, /, **context: Any) -> str:
     ------
     jinja2.UndefinedError : the template asks for what the context does not have.
     """
+    import jinja2
+
     return environment(jinja2.FileSystemLoader(TEMPLATES)).get_template(template).render(context)
 
 

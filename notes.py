@@ -181,3 +181,8 @@ def write_notes(folder: Path, notes: Iterable[Note]) -> None:
         table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
         table.writeheader()
         table.writerows(rows(notes))
+
+
+def percent(value: float) -> str:
+    """A fraction as percent with two significant digits, whole from 100 % on."""
+    return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -47,8 +47,8 @@ def command(
     report.html into the output folder. A run that fails is named and left out, everything else is
     written, the exit code is 4, and --resume tries it again.
     """
+    from ..project.cards import usual_folder
     from ..project.project import read_project
-    from ..runs.folder import usual_folder
 
     settings = read_project(project, data_folders(data))
     folder = options["out"]

@@ -56,10 +56,10 @@ def command(
     chosen here is written beside what all other choices give. A law of any form is fitted to the
     same tests by `bubblefit fit`, and made into such constants by `bubblefit export`.
     """
-    from .. import __version__
     from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of, write_tables
     from ..experiments.biaxial.test import BiaxialTest
     from ..experiments.kinds import Output
+    from ..files import __version__
     from ..materials.designers import Minimise, Options
     from ..notes import lines as note_lines
     from ..notes import write_notes

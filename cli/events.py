@@ -16,8 +16,8 @@ from typing import IO, Any
 
 import click
 
-from .. import __version__
 from ..errors import OutputError
+from ..files import __version__
 from ..writing import telling
 
 #: Between two lines of progress in which nothing more was done.

@@ -89,8 +89,8 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
     KeyboardInterrupt : after saying how to go on.
     """
+    from ..project.cards import usual_folder
     from ..runs.fit import fit
-    from ..runs.folder import usual_folder
     from ..runs.starts import timed
 
     path: Path = options["project"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .. import __version__
+from ..files import __version__
 from .events import with_events
 from .examples import examples
 from .home import place_matplotlib

@@ -44,7 +44,7 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 def folder_beside(project: Path, suffix: str) -> Path:
     """The usual output folder of what is no fit: out/NAME-`suffix`."""
-    from ..runs.folder import usual_folder
+    from ..project.cards import usual_folder
 
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")

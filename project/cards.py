@@ -18,7 +18,6 @@ from ..materials.forms.registry import form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import Name, Number, Positive, Section, StrainTriple
 from ..reading import is_file
-from ..runs.folder import usual_folder
 
 if TYPE_CHECKING:
     from .project import Project
@@ -47,6 +46,12 @@ class CardSection(Section):
     thickness_change: Literal["constant", "incompressible"] | None = None
     strain_range: StrainTriple | None = None
     test: str | None = None
+
+
+def usual_folder(project: Path) -> Path:
+    """out/NAME below the current folder, after the project's folder and file."""
+    name = project.resolve().parent.name
+    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
 
 
 @dataclass(frozen=True, eq=False)

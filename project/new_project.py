@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
-from ..files import TEMPLATES, render
+from ..files import TEMPLATES, __version__, render
 from ..materials.forms.registry import form_names
 from ..writing import write_text
 from .project import read_project

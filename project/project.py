@@ -16,7 +16,6 @@ from ..experiments.registry import kinds
 from ..materials.forms.registry import form_settings
 from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
 from ..reading import content_of, is_file
-from ..runs.executor import Executor
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
@@ -212,11 +211,6 @@ class Project:
         """
         said = self.fit.cache
         return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
-
-    @property
-    def executor(self) -> Executor:
-        """Where starts and other runs are done side by side."""
-        return Executor(self.fit.jobs, self.scheduler)
 
     def options_of(self, solver: str) -> dict[str, Any]:
         """What a solver is made with; a cluster counts its licences."""

@@ -6,9 +6,9 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from .. import __version__
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
+from ..files import __version__
 from ..runs.check import Check
 from ..writing import write_text
 from .content import Exhibit, Report, Section, Table

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
-from ..errors import NoFeasibleStart, OutputError, SolverFailure
 from ..experiments.kinds import by_strain
 from ..experiments.registry import report_of
+from ..files import __version__
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
@@ -523,31 +521,12 @@ def _pinned(fit: Fit, folder: Path) -> list[Charts]:
 FAILED = "This failed, and there is no result."
 
 
-@contextmanager
-def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
-    """Where what is done within fails, report.html of the folder says so, and nothing else does.
+def write_failure(folder: Path, title: str, said: str, more: Sequence[str]) -> Path:
+    """Write the page of a fit, or of predictions, that failed; return its path.
 
-    Parameters
-    ----------
-    folder : None: nothing is written. title : of the project.
-
-    Returns
-    -------
-    What else the page is to say, line by line, to be filled.
-
-    Raises
-    ------
-    What is raised within.
+    title : of the project. said : the failure in one line. more : other lines for the page.
     """
-    more: list[str] = []
-    try:
-        yield more
-    except (SolverFailure, NoFeasibleStart) as failure:
-        if folder is not None:
-            said = str(failure).splitlines()[0]
-            with suppress(OutputError):  # the failure itself says more
-                write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
-        raise
+    return write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
 
 
 COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"

@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import FileSystemLoader
 
 from ..files import TEMPLATES, environment
+from ..notes import percent as percent
 from ..writing import replacing
 from .chart_svg import chart_svg
 from .content import Report
@@ -110,8 +111,3 @@ def number(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     return f"{value:.4g}" if isfinite(value) else "–"
-
-
-def percent(value: float) -> str:
-    """A fraction as percent with two significant digits, whole from 100 % on."""
-    return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,8 @@ import pandas as pd
 from ..errors import SolverFailure
 from ..experiments.kinds import CardRun, Output, Shown
 from ..experiments.registry import report_of
-from ..notes import NOTES, NOTES_ARE, rows, write_notes
-from ..runs.best import noise_of
-from ..runs.compare import AS_GOOD
+from ..notes import NOTES, NOTES_ARE, write_notes
+from ..runs.compare import AS_GOOD, LawComparison, noise
 from ..runs.folder import RESULT, Store
 from ..writing import replacing
 from .content import Report, Section, Table, pictures
@@ -25,61 +23,6 @@ from .named_charts import law_charts
 
 if TYPE_CHECKING:
     from ..experiments.kinds import PreparedTest
-    from ..runs.compare import FormFit, LawComparison
-
-
-def result_of(comparison: LawComparison) -> dict[str, Any]:
-    """Errors form by form, and the simplest form that is as good as the best."""
-    forms, first = comparison.forms, comparison.forms[0]
-    whole = [f for f in forms if math.isfinite(f.validated)]
-    best = min(whole, key=lambda f: f.validated, default=None)
-    simplest = None
-    if best is not None:
-        limit = (1 + AS_GOOD) * best.validated
-        simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
-    return {
-        "command": "compare",
-        "title": comparison.project.title,
-        "tests": [test.test.name for test in first.fit.setup.tests],
-        "objective_is": first.fit.setup.objective_is,
-        "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
-                  if c.name in first.compared},
-        "fold_starts": comparison.fold_starts,
-        "forms": [_form(f) for f in forms],
-        "noise": sum(noise(first).values()),
-        "noise_by_part": noise(first),
-        "least_cross_validated": best.name if best else None,
-        "simplest_as_good": simplest.name if simplest else None,
-        "as_good_within": AS_GOOD,
-        "notes": rows(comparison.notes),
-    }  # fmt: skip
-
-
-def _form(form: FormFit) -> dict[str, Any]:
-    return {
-        "form": form.name,
-        **form.fit.law.form.to_card(),
-        "coefficients": form.coefficients,
-        "objective": form.fit.objective,
-        "fitted": form.fitted,
-        "rms": form.rms,
-        "cross_validated": _number(form.validated),
-        "cross_validated_by_part": {
-            name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
-        },
-        "folds": [_number(value) for value in form.left_out()],
-        "starts_objective": [r.objective for r in form.fit.best.ranked],
-    }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def noise(form: FormFit) -> dict[str, float]:
-    """What the data's own noise adds to the objective, by comparison: no form can do better."""
-    every = noise_of(form.fit.problem)
-    return {name: every[name] for name in form.compared}
 
 
 def table_of(comparison: LawComparison) -> pd.DataFrame:

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..errors import InputError
 from ..experiments.kinds import by_strain
+from ..files import __version__
 from ..inference.linear import moduli_of, summary
 from ..inference.methods.descent import descend
 from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
 from ..inference.resampling import Group, Unit, drawn, factors_of, rows_of
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, rows
+from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from ..reports.html import percent
-from .executor import cores
+from .executor import cores, executor_of
 from .folder import Store
+from .presenters import write_report
 from .refound import Card, Refound, refound
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
@@ -285,9 +285,7 @@ class Bootstrap:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.bootstrap_page import write_bootstrap
-
-        write_bootstrap(self, Path(folder))
+        write_report(self, folder)
 
 
 COUNT = 100
@@ -344,7 +342,7 @@ def bootstrap(
     tell(len(done), samples, "")
     missing = [n for n in range(samples) if n not in done]
     prepare = functools.partial(_task, found, groups, project.fit.seed)
-    for sample in project.executor.run_tasks(prepare, missing, "samples"):
+    for sample in executor_of(project).run_tasks(prepare, missing, "samples"):
         if isinstance(sample, Sample):
             done[sample.number] = sample
             record.write(sample)

@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError
 from ..experiments.kinds import Expected, FittableTest, Judgement, judged
 from ..experiments.registry import kinds
+from ..files import __version__
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .presenters import write_report

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
+from ..files import __version__
 from ..solvers.base import Announcement, hearing
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import Unwanted, unless

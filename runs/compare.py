@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.kinds import FittableTest, Masks
+from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.resampling import folds_of
 from ..inference.search import feasible_start, fit_from
@@ -21,7 +21,9 @@ from ..materials.forms.registry import form_names, form_settings, of_load_ratio
 from ..notes import Note, NoteKind
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
+from .executor import executor_of
 from .fit import FitEvent
+from .presenters import write_report
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
@@ -123,7 +125,7 @@ def validate(
     prepare = functools.partial(_task, setup, parts, starts)
     if not missing:
         return iter(())
-    return setup.project.executor.run_tasks(prepare, missing, "folds")
+    return executor_of(setup.project).run_tasks(prepare, missing, "folds")
 
 
 def _task(
@@ -310,8 +312,6 @@ class LawComparison:
     @property
     def result(self) -> dict[str, Any]:
         """Everything in plain values: what result.json holds."""
-        from ..reports.law_page import result_of
-
         return result_of(self)
 
     def report(self, folder: Path | str) -> Path:
@@ -321,9 +321,7 @@ class LawComparison:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.law_page import write_comparison
-
-        return write_comparison(self, Path(folder))
+        return write_report(self, folder)
 
 
 def compare_laws(
@@ -394,3 +392,57 @@ def compare_laws(
 
 def _fittable(tests: Sequence[Any]) -> Sequence[FittableTest]:
     return tests
+
+
+def result_of(comparison: LawComparison) -> dict[str, Any]:
+    """Errors form by form, and the simplest form that is as good as the best."""
+    forms, first = comparison.forms, comparison.forms[0]
+    whole = [f for f in forms if math.isfinite(f.validated)]
+    best = min(whole, key=lambda f: f.validated, default=None)
+    simplest = None
+    if best is not None:
+        limit = (1 + AS_GOOD) * best.validated
+        simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
+    return {
+        "command": "compare",
+        "title": comparison.project.title,
+        "tests": [test.test.name for test in first.fit.setup.tests],
+        "objective_is": first.fit.setup.objective_is,
+        "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
+                  if c.name in first.compared},
+        "fold_starts": comparison.fold_starts,
+        "forms": [_form(f) for f in forms],
+        "noise": sum(noise(first).values()),
+        "noise_by_part": noise(first),
+        "least_cross_validated": best.name if best else None,
+        "simplest_as_good": simplest.name if simplest else None,
+        "as_good_within": AS_GOOD,
+        "notes": rows(comparison.notes),
+    }  # fmt: skip
+
+
+def _form(form: FormFit) -> dict[str, Any]:
+    return {
+        "form": form.name,
+        **form.fit.law.form.to_card(),
+        "coefficients": form.coefficients,
+        "objective": form.fit.objective,
+        "fitted": form.fitted,
+        "rms": form.rms,
+        "cross_validated": _number(form.validated),
+        "cross_validated_by_part": {
+            name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
+        },
+        "folds": [_number(value) for value in form.left_out()],
+        "starts_objective": [r.objective for r in form.fit.best.ranked],
+    }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def noise(form: FormFit) -> dict[str, float]:
+    """What the data's own noise adds to the objective, by comparison: no form can do better."""
+    every = noise_of(form.fit.problem)
+    return {name: every[name] for name in form.compared}

@@ -11,6 +11,7 @@ from typing import Any
 from ..inference.methods.base import FitOptions
 from ..inference.problem import FitProblem
 from . import processes
+from ..project.project import Project
 from .starts import EvaluationRecord, MeshName, StartRecord, run_start
 from .workers import Task
 
@@ -103,3 +104,8 @@ def _starting(
 ) -> Task:
     problem = build()
     return lambda number, tell: run_start(problem, options, seed, number, tell, mesh)
+
+
+def executor_of(project: Project) -> Executor:
+    """Return what runs the starts and other tasks of a project side by side."""
+    return Executor(project.fit.jobs, project.scheduler)

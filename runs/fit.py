@@ -17,10 +17,11 @@ from ..experiments.kinds import FittableTest
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, settings_of
-from ..reports.fit_page import failure_page
 from .best import BestFit, best_fit, with_certainty
 from .check import judge
+from .executor import executor_of
 from .folder import Store
+from .presenters import failure_page
 from .record import Record, data_rows, facts_of, solver_facts, this_run
 from .result import Fit
 from .setup import FitSetup, coarse_problem, fingerprints, prepare_fit
@@ -114,7 +115,7 @@ def every_start(
     done : starts that have ended before. ran : is given every record as it ends, None now and then.
     told : is given a stage as it begins, and the records of it that were there before.
     """
-    fit, executor = setup.project.fit, setup.project.executor
+    fit, executor = setup.project.fit, executor_of(setup.project)
     full, coarse = (
         {r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
         for mesh in ("full", "coarse")
@@ -278,7 +279,7 @@ def fit(
         starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute())
     )
     project = project.with_scheduler(scheduler)
-    project.executor.check()
+    executor_of(project).check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     with timed("tests and their data made ready"):
         setup = prepare_fit(project, chosen)

@@ -115,12 +115,6 @@ PARTS = "parts"
 FACTS = "facts"
 
 
-def usual_folder(project: Path) -> Path:
-    """out/NAME below the current folder, after the project's folder and file."""
-    name = project.resolve().parent.name
-    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
-
-
 class Store:
     """A folder that holds one fit, or one series of predictions.
 

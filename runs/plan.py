@@ -35,10 +35,10 @@ from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, rows
+from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from ..reports.html import percent
+from .presenters import write_report
 from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
 
@@ -225,9 +225,7 @@ class Plan:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.plan_page import write_plan
-
-        write_plan(self, Path(folder))
+        write_report(self, folder)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,10 +32,11 @@ from ..notes import lines as note_lines
 from ..notes import rows as note_rows
 from ..project.cards import Cards, card_sources, chosen_cards
 from ..project.project import Project, settings_of_predictions
-from ..reports.fit_page import failure_page
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
+from .executor import executor_of
 from .folder import PROVENANCE, RunRecords
+from .presenters import failure_page, write_report
 from .record import Record, data_rows, solver_facts, this_run, versions
 from .starts import log_run
 from .workers import Task
@@ -195,9 +196,7 @@ class Predictions:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.prediction_page import write_predictions
-
-        return write_predictions(self, Path(folder))
+        return write_report(self, folder)
 
     def _own(self, number: int) -> tuple[PredictedOutcome, int]:
         """The outcome that a run belongs to, and its number there."""
@@ -288,7 +287,7 @@ def predict(
     """
     begun = time.perf_counter()
     project = project.with_scheduler(scheduler)
-    project.executor.check()
+    executor_of(project).check()
     chosen = predicted_tests(project, tests)
     solver = _usable(project)
     pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
@@ -468,7 +467,7 @@ def _run(
             end(number, record, True)
     missing = [number for number in range(len(pairs)) if number not in ended]
     prepare = functools.partial(_runner, project, pairs)
-    executor = project.with_fit(jobs=jobs).executor
+    executor = executor_of(project.with_fit(jobs=jobs))
     told: Iterable[Any] = executor.run_tasks(prepare, missing, "runs", _lost) if missing else ()
     for item in told:
         if item is None:

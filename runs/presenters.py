@@ -6,14 +6,23 @@ kinds of test, forms and readers are: one line a type of result.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ..errors import NoFeasibleStart, OutputError, SolverFailure
+
 #: Module of `reports` and its function, by the type of the result.
 PRESENTERS = {
+    "Bootstrap": ("bootstrap_page", "write_bootstrap"),
     "Check": ("check_page", "write_check"),
+    "LawComparison": ("law_page", "write_comparison"),
     "Fit": ("fit_page", "write_fit"),
+    "Plan": ("plan_page", "write_plan"),
+    "Predictions": ("prediction_page", "write_predictions"),
+    "Profiles": ("profile_page", "write_profiles"),
 }
 
 
@@ -28,3 +37,31 @@ def write_report(result: Any, folder: Path | str) -> Path:
     write = getattr(import_module(f"bubblefit.reports.{module}"), function)
     page: Path = write(result, Path(folder))
     return page
+
+
+@contextmanager
+def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
+    """Write report.html of the folder where what is done within fails, and go on failing.
+
+    Parameters
+    ----------
+    folder : None: nothing is written. title : of the project.
+
+    Returns
+    -------
+    Further lines for the page, to be filled.
+
+    Raises
+    ------
+    What is raised within.
+    """
+    more: list[str] = []
+    try:
+        yield more
+    except (SolverFailure, NoFeasibleStart) as failure:
+        if folder is not None:
+            said = str(failure).splitlines()[0]
+            present = import_module("bubblefit.reports.fit_page")
+            with suppress(OutputError):  # the failure itself says more
+                present.write_failure(folder, title, said, more)
+        raise

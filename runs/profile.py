@@ -26,7 +26,8 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from .executor import cores
+from .executor import cores, executor_of
+from .presenters import write_report
 from .refound import Card, Refound, refound
 from .setup import FitSetup
 from .workers import Task
@@ -242,9 +243,7 @@ class Profiles:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.profile_page import write_profiles
-
-        write_profiles(self, Path(folder))
+        write_report(self, folder)
 
 
 #: Told how many of how many sides are done, and of the one that takes its next step.
@@ -286,7 +285,7 @@ def profile(
     prepare = functools.partial(_task, found, places)
     sides: dict[int, Side] = {}
     tell = progress or (lambda done, total, what: None)
-    for record in project.executor.run_tasks(prepare, numbers, "profiles"):
+    for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
         if isinstance(record, tuple):
             sides[record[0]] = record[1]
         now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""

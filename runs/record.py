@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import __version__
 from ..experiments.kinds import beyond_range, by_strain, files_of, strains_of, unstable_words
+from ..files import __version__
 from ..inference.assessment import notes_of_verdicts, pinned_by
 from ..inference.misfit import notes_of_noise
 from ..notes import Note, NoteKind, as_note, rows

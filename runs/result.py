@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..errors import InputError
 from ..experiments.kinds import Findings, FittedTest, Judgement, Output, PreparedTest
 from ..experiments.registry import report_of
+from ..files import __version__
 from ..inference.assessment import Verdict, verdicts
 from ..inference.misfit import NoiseTest, noise_tests
 from ..inference.noise import Misfit, misfits

@@ -17,7 +17,7 @@ from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, Note, write_notes
-from ..project.cards import FITTED, chosen_cards
+from ..project.cards import FITTED, chosen_cards, usual_folder
 from ..project.project import Project
 from ..reports.charts import Charts
 from ..reports.content import Listing, Picture, Report, Section, Table
@@ -26,7 +26,7 @@ from ..reports.html import write_report
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from ..writing import replacing, write_text
-from .folder import RESULT, Store, usual_folder
+from .folder import RESULT, Store
 from .simulation import Analyses, Progress
 
 #: Of every study's page, after what is its own.

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError
 from ..experiments.kinds import (
     Divisible,
@@ -25,6 +24,7 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import report_of
+from ..files import __version__
 from ..inference.comparison import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
@@ -377,7 +377,7 @@ def foretold(
     numbers : of the parts that are left out. starts : random starts of each fit.
     """
     prepare = functools.partial(_task, setup, parts, starts)
-    return setup.project.executor.run_tasks(prepare, numbers, "parts")
+    return setup.executor_of(project).run_tasks(prepare, numbers, "parts")
 
 
 def _task(

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError
+from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import __version__
 from ...errors import InputError, one_line
+from ...files import __version__
 from ...notes import Note, NoteKind
 from ..card import LEVEL, MaterialCard, strains_of
 from ..forms.base import COMPONENTS, UNLIMITED, ratios_of

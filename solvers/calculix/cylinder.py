@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import __version__
 from ...errors import InputError
+from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
 from .. import rigid

@@ -10,8 +10,8 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import __version__
 from ...errors import InputError, SolverFailure
+from ...files import __version__
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Mesh

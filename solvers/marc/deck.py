@@ -11,8 +11,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import __version__
 from ...errors import InputError
+from ...files import __version__
 from ...materials.exports.marc import STATE_VARIABLES
 from ...materials.law import HypoelasticLaw
 from ...materials.tables import ModulusTable, modulus_tables

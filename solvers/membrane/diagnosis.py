@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import __version__
+from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import bar
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference

@@ -19,7 +19,7 @@ import cloudpickle
 import pytest
 from bubblefit.errors import BubblefitError, InputError
 from bubblefit.runs import cluster_worker
-from bubblefit.runs.executor import Executor
+from bubblefit.runs.executor import Executor, executor_of
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers import licence_leases, licences
 from bubblefit.solvers.base import Announcement, announce, hearing
@@ -416,7 +416,7 @@ def test_no_licence_is_leased_where_nobody_answers(
 
 def test_a_fit_hands_its_scheduler_to_the_solver(strips_project: bf.Project) -> None:
     project = strips_project.with_scheduler("tcp://there:1")
-    assert project.executor.scheduler == project.options_of("marc")["licence_scheduler"]
+    assert executor_of(project).scheduler == project.options_of("marc")["licence_scheduler"]
     assert "licence_scheduler" not in strips_project.options_of("marc")
     assert "licence_scheduler" not in project.solver_options["marc"]
 
