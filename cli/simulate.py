@@ -53,7 +53,7 @@ def card_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, run its tests (of a kind, or those named) with the cards, tell."""
-    from ..project.cards import chosen_cards
+    from ..project.project import chosen_cards
     from ..runs.folder import KeptAnalyses
     from ..runs.simulation import simulate_cards
 

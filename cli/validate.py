@@ -65,7 +65,7 @@ def command(
     over the weight of a kind of test: weights.csv, weights.png, result.json.
     """
     from ..notes import lines as note_lines
-    from ..project.cards import chosen_cards
+    from ..project.project import chosen_cards
     from ..runs.validation import STARTS, TESTS, judge_cards, validate
 
     path: Path = options["project"]

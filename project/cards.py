@@ -17,10 +17,9 @@ from ..materials.forms.base import UNLIMITED
 from ..materials.forms.registry import form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import Name, Number, Positive, Section, StrainTriple
-from ..reading import is_file
 
 if TYPE_CHECKING:
-    from .project import Project
+    pass
 
 #: Keys that a card's own file says.
 OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_range")
@@ -60,54 +59,6 @@ class NamedCard:
 
     card: MaterialCard
     test: str | None = None
-
-
-def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Cards by name: those given, else the project's, else the one that its fit left.
-
-    Raises
-    ------
-    InputError : a name that the project does not have, a file that is no card; none at all.
-    """
-    if isinstance(cards, Mapping):
-        return dict(cards)
-    own = {name: named.card for name, named in project.cards.items()}
-    if not cards and not own:
-        fitted = usual_folder(project.path) / FITTED
-        if not is_file(fitted):
-            problem = (
-                f"the project has no card and there is none in {fitted}: fit first (bubblefit "
-                "fit), name a card's file with --card, or add [[card]]"
-            )
-            raise InputError(project.path, "card", problem)
-        card = read_card(fitted)
-        return {card.name or fitted.stem: card}
-    if not cards:
-        return own
-    chosen = {name: card for name, card in own.items() if name in map(str, cards)}
-    for given in cards:
-        if str(given) in own:
-            continue
-        if not is_file(Path(given)):
-            problem = f"there is no card (and no file) {str(given)!r}; the project has: "
-            raise InputError(project.path, "--card", problem + (", ".join(own) or "none"))
-        card = read_card(Path(given))
-        name = card.name or Path(given).stem
-        chosen[f"{name} ({given})" if name in chosen else name] = card
-    return chosen
-
-
-def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
-    """The project's names, and the files, of the cards that `chosen_cards` gives.
-
-    None where they were handed over as they are, by Python: they have neither.
-    """
-    if isinstance(cards, Mapping):
-        return None
-    if not cards:
-        return list(project.cards) or [usual_folder(project.path) / FITTED]
-    named = [name for name in project.cards if name in map(str, cards)]
-    return [*named, *(card for card in cards if str(card) not in project.cards)]
 
 
 def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:

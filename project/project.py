@@ -13,13 +13,19 @@ import tomli_w
 from ..errors import InputError
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
+from ..materials.card import MaterialCard, read_card
 from ..materials.forms.registry import form_settings
-from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
+from ..readers.sections import (
+    LENGTH_UNITS,
+    MODULUS_UNITS,
+    PRESSURE_UNITS,
+    beside,
+)
 from ..reading import content_of, is_file
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
-from .cards import NamedCard, read_cards
+from .cards import FITTED, Cards, NamedCard, read_cards, usual_folder
 from .schema import FitSection, LawSection, ProjectFile, parse
 
 Settings = dict[str, Any]
@@ -387,3 +393,51 @@ def _names(kind: str, sections: Sequence[Any]) -> list[str]:
     """A test without a name is called by its kind, with a number where there are several."""
     alone = len(sections) == 1
     return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
+
+
+def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
+    """Cards by name: those given, else the project's, else the one that its fit left.
+
+    Raises
+    ------
+    InputError : a name that the project does not have, a file that is no card; none at all.
+    """
+    if isinstance(cards, Mapping):
+        return dict(cards)
+    own = {name: named.card for name, named in project.cards.items()}
+    if not cards and not own:
+        fitted = usual_folder(project.path) / FITTED
+        if not is_file(fitted):
+            problem = (
+                f"the project has no card and there is none in {fitted}: fit first (bubblefit "
+                "fit), name a card's file with --card, or add [[card]]"
+            )
+            raise InputError(project.path, "card", problem)
+        card = read_card(fitted)
+        return {card.name or fitted.stem: card}
+    if not cards:
+        return own
+    chosen = {name: card for name, card in own.items() if name in map(str, cards)}
+    for given in cards:
+        if str(given) in own:
+            continue
+        if not is_file(Path(given)):
+            problem = f"there is no card (and no file) {str(given)!r}; the project has: "
+            raise InputError(project.path, "--card", problem + (", ".join(own) or "none"))
+        card = read_card(Path(given))
+        name = card.name or Path(given).stem
+        chosen[f"{name} ({given})" if name in chosen else name] = card
+    return chosen
+
+
+def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
+    """The project's names, and the files, of the cards that `chosen_cards` gives.
+
+    None where they were handed over as they are, by Python: they have neither.
+    """
+    if isinstance(cards, Mapping):
+        return None
+    if not cards:
+        return list(project.cards) or [usual_folder(project.path) / FITTED]
+    named = [name for name in project.cards if name in map(str, cards)]
+    return [*named, *(card for card in cards if str(card) not in project.cards)]

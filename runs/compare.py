@@ -18,9 +18,10 @@ from ..inference.problem import FitProblem
 from ..inference.resampling import folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.registry import form_names, form_settings, of_load_ratio
-from ..notes import Note, NoteKind
+from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
+from .best import noise_of
 from .executor import executor_of
 from .fit import FitEvent
 from .presenters import write_report

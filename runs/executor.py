@@ -10,8 +10,8 @@ from typing import Any
 
 from ..inference.methods.base import FitOptions
 from ..inference.problem import FitProblem
-from . import processes
 from ..project.project import Project
+from . import processes
 from .starts import EvaluationRecord, MeshName, StartRecord, run_start
 from .workers import Task
 

@@ -30,8 +30,8 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, as_note, marks
 from ..notes import lines as note_lines
 from ..notes import rows as note_rows
-from ..project.cards import Cards, card_sources, chosen_cards
-from ..project.project import Project, settings_of_predictions
+from ..project.cards import Cards
+from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from .executor import executor_of

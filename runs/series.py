@@ -17,8 +17,8 @@ from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, Note, write_notes
-from ..project.cards import FITTED, chosen_cards, usual_folder
-from ..project.project import Project
+from ..project.cards import FITTED, usual_folder
+from ..project.project import Project, chosen_cards
 from ..reports.charts import Charts
 from ..reports.content import Listing, Picture, Report, Section, Table
 from ..reports.fit_page import citation

@@ -35,6 +35,7 @@ from ..project.project import Project
 from ..writing import replacing
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
+from .executor import executor_of
 from .fit import FitEvent
 from .folder import Store
 from .result import Fit
@@ -377,7 +378,7 @@ def foretold(
     numbers : of the parts that are left out. starts : random starts of each fit.
     """
     prepare = functools.partial(_task, setup, parts, starts)
-    return setup.executor_of(project).run_tasks(prepare, numbers, "parts")
+    return executor_of(setup.project).run_tasks(prepare, numbers, "parts")
 
 
 def _task(

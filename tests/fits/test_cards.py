@@ -11,7 +11,8 @@ import pytest
 from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.project.cards import CardSection, NamedCard, card_sources, chosen_cards, read_cards
+from bubblefit.project.cards import CardSection, NamedCard, read_cards
+from bubblefit.project.project import card_sources, chosen_cards
 
 from ..complaints import complaint
 

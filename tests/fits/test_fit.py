@@ -221,7 +221,7 @@ def test_the_command_says_so_and_writes_no_result(fitted: bf.Fit, tmp_path: Path
 
 
 def test_starts_that_a_failure_ended_are_told(fitted: bf.Fit):
-    from bubblefit.runs.record import notes_of_fit
+    from bubblefit.runs.result import notes_of_fit
 
     cut = replace(fitted.best.records[1], failure="killed by SIGKILL at once")
     best_of = replace(fitted.best, records=[fitted.best.records[0], cut])
@@ -291,7 +291,7 @@ def test_another_form_of_the_moduli(tmp_path: Path, form: str):
 
 
 def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
-    from bubblefit.runs.record import notes_of_fit
+    from bubblefit.runs.result import notes_of_fit
 
     def with_unstable(point, words):
         (history,) = point.histories
@@ -311,7 +311,7 @@ def test_where_the_best_fit_is_unstable_is_told(fitted: bf.Fit):
 
 
 def test_a_test_that_says_nothing_of_a_modulus_is_named(fitted: bf.Fit):
-    from bubblefit.runs.record import notes_of_fit
+    from bubblefit.runs.result import notes_of_fit
 
     def said(least: float) -> list[str]:
         sigma = {"least": least, "median": 2.0, "largest": 9.0}

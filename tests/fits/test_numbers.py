@@ -7,7 +7,8 @@ from dataclasses import replace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.runs.record import TOGETHER, notes_of_fit, versions
+from bubblefit.runs.record import versions
+from bubblefit.runs.result import TOGETHER, notes_of_fit
 
 OPEN = "rests on the other directions"
 LEFT = "points beyond the final length (or before zero) were left out"

@@ -16,8 +16,7 @@ from bubblefit.experiments.kinds import Exhibit, RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW
-from bubblefit.project.cards import chosen_cards
-from bubblefit.project.project import Project, read_project
+from bubblefit.project.project import Project, chosen_cards, read_project
 from bubblefit.reports.style import NAMED
 from bubblefit.runs import executor, processes
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
