@@ -1,7 +1,9 @@
-"""Write docs/reference/api: pages of the Python interface, from the docstrings.
+"""Write the pages of the Python interface from the docstrings.
 
-python docs/make_api.py            # write them (make docs)
-python docs/make_api.py --check    # exit 1 where one is not up to date
+They are not tracked: the site and the wheel make them when they are built.
+
+python docs/make_api.py            # into docs/reference/api (make docs)
+python docs/make_api.py FOLDER
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 API = HERE / "reference" / "api"
-#: By page: its title, and what is on it, as MODULE or MODULE:NAME,NAME (in bubblefit).
+#: Title and contents of each page, as MODULE or MODULE:NAME,NAME (in bubblefit).
 PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
@@ -43,15 +45,15 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "solvers": ("Solvers", ("solvers.base", "solvers.registry")),
     "methods": ("Optimisers", ("identification.methods.base", "identification.methods.registry")),
 }  # fmt: skip
-HEAD = "<!-- Written by docs/make_api.py from the docstrings: change those, then `make docs`. -->\n"
-#: "name : words", at the start of a line and after the end of another entry.
+HEAD = "<!-- Written by docs/make_api.py from the docstrings. -->\n"
+#: "name : words" at the start of a line, and after the end of another entry.
 ENTRY = re.compile(r"\S[\w*, ]* : ")
 BESIDE = re.compile(r"(?<=[.;]) ([A-Za-z_]\w*(?:, \w+)*) : ")
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 
 
 def page(title: str, parts: tuple[str, ...]) -> str:
-    """The whole page."""
+    """Return the text of a page."""
     blocks = [HEAD, f"# {title}"]
     for part in parts:
         module_name, _, names = part.partition(":")
@@ -65,7 +67,7 @@ def page(title: str, parts: tuple[str, ...]) -> str:
 
 
 def public_names(module: Any) -> list[str]:
-    """Functions and classes that the module itself defines, in its order."""
+    """Return the functions and classes that a module defines, in its order."""
     found = [
         (inspect.getsourcelines(thing)[1], name)
         for name, thing in vars(module).items()
@@ -77,7 +79,7 @@ def public_names(module: Any) -> list[str]:
 
 
 def described(name: str, thing: Any) -> list[str]:
-    """Heading, signature and docstring; of a class those of its members, too."""
+    """Return heading, signature and docstring, of a class also those of its members."""
     if not inspect.isclass(thing):
         return [f"### {name}", signature(name, thing), text_of(thing)]
     blocks = [f"### class {name}"]
@@ -101,7 +103,7 @@ def described(name: str, thing: Any) -> list[str]:
 
 
 def signature(name: str, thing: Any) -> str:
-    """As it is written, a line an argument where it is long."""
+    """Return the signature as Python code, one argument a line if it is long."""
     said = inspect.signature(thing)
     arguments = [_argument(p) for p in said.parameters.values() if p.name != "self"]
     starred = [i for i, p in enumerate(said.parameters.values()) if p.kind is p.KEYWORD_ONLY]
@@ -135,10 +137,10 @@ def _annotation(annotation: Any) -> str:
 
 
 def text_of(thing: Any) -> str:
-    """The docstring, its sections in bold, their entries as lists."""
+    """Return the docstring with sections in bold and entries as lists."""
     text = inspect.getdoc(thing) or ""
     if inspect.isclass(thing) and (thing.__doc__ or "").startswith(f"{thing.__name__}("):
-        return ""  # what `dataclass` writes where nobody wrote anything
+        return ""  # the default docstring of a dataclass
     parts = SECTION.split(text)
     blocks = [parts[0].strip()]
     for head, body in zip(parts[1::2], parts[2::2], strict=True):
@@ -147,7 +149,7 @@ def text_of(thing: Any) -> str:
 
 
 def _entries(body: str) -> str:
-    """A list of what is entered as "name : words", several in a line too."""
+    """Return a list of the entries "name : words", of which a line may hold several."""
     lines: list[str] = []
     for line in body.strip().splitlines():
         if ENTRY.match(line) or not lines:
@@ -161,30 +163,17 @@ def _entries(body: str) -> str:
     )
 
 
-def pages() -> dict[Path, str]:
-    """Every page by its file, the list of them among these."""
-    written = {API / f"{name}.md": page(*what) for name, what in PAGES.items()}
-    listed = "\n".join(f"- [{title}]({name}.md)" for name, (title, _) in PAGES.items())
-    about = "`import bubblefit as bf`: what a notebook writes, and all that the commands call."
-    written[API / "README.md"] = f"{HEAD}\n# Python interface\n\n{about}\n\n{listed}\n"
-    return written
+def pages() -> dict[str, str]:
+    """Return the text of every page by the name of its file."""
+    return {f"{name}.md": page(*what) for name, what in PAGES.items()}
 
 
-def main() -> int:
-    """Write, or check."""
-    stale = [
-        path for path, text in pages().items() if not path.exists() or path.read_text() != text
-    ]
-    if "--check" in sys.argv[1:]:
-        for path in stale:
-            print(f"{path.relative_to(HERE.parent)} is not up to date: make docs")
-        return 1 if stale else 0
-    API.mkdir(parents=True, exist_ok=True)
-    for path in stale:
-        path.write_text(pages()[path], encoding="utf-8")
-        print(f"wrote {path.relative_to(HERE.parent)}")
-    return 0
+def write(folder: Path) -> None:
+    """Write every page into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages().items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    write(Path(sys.argv[1]) if sys.argv[1:] else API)

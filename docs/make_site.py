@@ -1,4 +1,4 @@
-"""Build the documents, the notebook among them, as a site; a link that leads nowhere is an error.
+"""Build the documents and the notebook as a site; dead links are errors.
 
 python docs/make_site.py                # into out/site (make site)
 python docs/make_site.py FOLDER
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-#: What the site is made of, below the root. Links between them are relative, as they lie.
+#: Files of the site below the root.
 PAGES = ("*.md", "docs/**/*.md", "examples/*/*.md", "examples/**/*.ipynb")
 BESIDE = ("LICENSE", "docs/pictures/*", "examples/*/*")
 #: Sections by the folder of their pages, in order; in each the pages as docs/README.md has them.
@@ -28,19 +29,19 @@ SECTIONS = {
     "Validation": "docs/validation",
     "Examples": "examples",
 }
-#: Words of tables wrap, and the page is as wide as its window.
+#: Text in tables wraps, and pages may be wide.
 STYLE, CSS = (
     "style.css",
     """.wy-table-responsive table td, .wy-table-responsive table th { white-space: normal }
 .wy-nav-content { max-width: 1100px }
 """,
 )
-#: Before the title of a page that a program writes.
+#: Comment before the title of a generated page.
 WRITTEN = re.compile(r"\A<!--.*?-->\s*", re.DOTALL)
 
 
 def settings(source: Path, out: Path) -> dict[str, Any]:
-    """For mkdocs: nothing is loaded from elsewhere, whatever is not found is told."""
+    """Return the settings of mkdocs: nothing is loaded from elsewhere, dead links are warnings."""
     return {
         "site_name": "bubblefit",
         "docs_dir": str(source),
@@ -63,7 +64,7 @@ def settings(source: Path, out: Path) -> dict[str, Any]:
 
 
 def stage(source: Path, root: Path = ROOT) -> None:
-    """Copy what the site is made of; a notebook becomes a page beside where it was."""
+    """Copy the pages, make those of the Python interface, and turn notebooks into pages."""
     for pattern in (*PAGES, *BESIDE):
         for path in filter(Path.is_file, root.glob(pattern)):
             place = source / path.relative_to(root)
@@ -72,6 +73,8 @@ def stage(source: Path, root: Path = ROOT) -> None:
             if path.suffix == ".ipynb":
                 page = place.with_suffix(".md")
                 page.write_text("\n".join(notebook(json.loads(path.read_text()))), encoding="utf-8")
+    if root == ROOT:
+        runpy.run_path(str(ROOT / "docs/make_api.py"))["write"](source / "docs/reference/api")
     # A page that stands for a notebook is linked to in its place.
     for page in source.rglob("*.md"):
         text = WRITTEN.sub("", page.read_text(encoding="utf-8"))
@@ -80,7 +83,7 @@ def stage(source: Path, root: Path = ROOT) -> None:
 
 
 def notebook(content: dict[str, Any]) -> Iterator[str]:
-    """The lines of a notebook as a page: words, code, and what it printed or drew."""
+    """Yield the lines of a page from a notebook: text, code and outputs."""
     for cell in content["cells"]:
         text = "".join(cell["source"])
         yield text if cell["cell_type"] == "markdown" else f"\n```python\n{text}\n```\n"
@@ -95,7 +98,7 @@ def notebook(content: dict[str, Any]) -> Iterator[str]:
 
 
 def navigation(source: Path) -> list[dict[str, Any]]:
-    """Every page once: those of a folder in the order in which docs/README.md names them."""
+    """Return every page once, those of a folder in the order of docs/README.md."""
     pages = [path.relative_to(source).as_posix() for path in source.rglob("*.md")]
     index = (source / "docs/README.md").read_text(encoding="utf-8")
 
@@ -103,25 +106,27 @@ def navigation(source: Path) -> list[dict[str, Any]]:
         named = index.find(f"]({page.removeprefix('docs/')})")
         return (named if named >= 0 else len(index), page)
 
-    told = {name: [p for p in sorted(pages, key=place) if _section(p) == name] for name in SECTIONS}
+    listed = {
+        name: [p for p in sorted(pages, key=place) if _section(p) == name] for name in SECTIONS
+    }
     first = ["README.md", "docs/README.md"]
     rest = [p for p in sorted(pages) if p not in first and _section(p) is None]
     return [
         {"bubblefit": first[0]},
         {"Documents": first[1]},
-        *({name: listed} for name, listed in told.items() if listed),
+        *({name: pages_of} for name, pages_of in listed.items() if pages_of),
         {"About": rest},
     ]
 
 
 def _section(page: str) -> str | None:
-    """The one whose folder is the nearest above a page."""
+    """Return the section with the deepest folder above a page."""
     held = [(len(folder), name) for name, folder in SECTIONS.items() if page.startswith(folder)]
     return max(held)[1] if held else None
 
 
 def build(out: Path, root: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """Build; mkdocs' own words and exit code, which is not 0 where a link leads nowhere."""
+    """Build the site and return the mkdocs process; dead links give a non-zero exit code."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
         stage(source, root)
@@ -132,11 +137,11 @@ def build(out: Path, root: Path = ROOT) -> subprocess.CompletedProcess[str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Build, and say where."""
+    """Build the site and print its place."""
     out = Path(arguments[0]) if arguments else ROOT / "out" / "site"
     done = build(out)
-    told = f"wrote {out / 'index.html'}" if done.returncode == 0 else done.stderr
-    print(told, file=sys.stderr)
+    message = f"wrote {out / 'index.html'}" if done.returncode == 0 else done.stderr
+    print(message, file=sys.stderr)
     return done.returncode
 
 

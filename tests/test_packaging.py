@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from .scripts import script
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 #: Folders of the repository that are no part of the package.
@@ -40,6 +42,8 @@ def shipped() -> set[str]:
         wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
     documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
+    pages = script("docs/make_api.py").PAGES  # made when the wheel is built
+    wanted |= {f"bubblefit/docs/reference/api/{name}.md" for name in pages}
     for folder in ("examples", "templates", "runs/verification/published"):
         for file in (ROOT / folder).rglob("*"):
             inside = file.relative_to(ROOT)
