@@ -1,4 +1,4 @@
-"""kill -9 at random moments of fits, bendings and validations; each gone on with to its end.
+"""Kill fits, bendings and validations at random moments and resume each to its end.
 
     python benchmarks/bench_kills.py [kills a command, 4 unless given] [seed] [command ...]
 
@@ -41,32 +41,28 @@ PICTURE = bytes.fromhex(
     "1f15c4890000000d49444154789c6360606060000000050001a5f645400000000049454e44ae426082"
 )
 BUBBLE = """
-[fabric]
-thickness = 0.81
-[law]
-form = "constant"
-[law.bounds]
-lower = [0.03, 0.3, 0.3]
-upper = [0.2, 1.0, 1.0]
+fabric = { thickness = 0.81 }
+law = { form = "constant", bounds = { lower = [0.03, 0.3, 0.3], upper = [0.2, 1.0, 1.0] } }
+fit = { starts = {starts}, jobs = 2, tolerance = 1e-6 }
+solver = { calculix = { element = "S4" } }
 [[bubble]]
 radius = 100.0
 pressures = [22, 59]
 elements = 32
 symmetry = "quarter"
-[bubble.data.known_solution]
-beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
-[fit]
-starts = {starts}
-jobs = 2
-tolerance = 1e-6
-[solver.calculix]
-element = "S4"
+data = { known_solution = { beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8] } }
 """
 CYLINDERS = """
-[fabric]
-thickness = 0.81
-[fit]
-jobs = 2
+fabric = { thickness = 0.81 }
+fit = { jobs = 2 }
+cylinder = [
+    { name = "low", diameter = 150.0, pressure = 90.0 },
+    { name = "high", diameter = 150.0, pressure = 140.0 },
+]
+card = [
+    { name = "soft", beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8] },
+    { name = "stiff", beta = [0, 0, 0, 0.1, 0, 0, 0, 0.6, 0, 0, 0, 1.0] },
+]
 [defaults.cylinder]
 length = 1200.0
 span = 800.0
@@ -74,42 +70,21 @@ seam_width = 0.0
 element_size = 60.0
 deflection = 8.0
 frames = 2
-[[cylinder]]
-name = "low"
-diameter = 150.0
-pressure = 90.0
-[[cylinder]]
-name = "high"
-diameter = 150.0
-pressure = 140.0
-[[card]]
-name = "soft"
-beta = [0, 0, 0, 0.08, 0, 0, 0, 0.4, 0, 0, 0, 0.8]
-[[card]]
-name = "stiff"
-beta = [0, 0, 0, 0.1, 0, 0, 0, 0.6, 0, 0, 0, 1.0]
 """
 STRIPS = """
-[fabric]
-thickness = 0.8
+fabric = { thickness = 0.8 }
+fit = { starts = 1, jobs = 2 }
 [law]
 form = "constant"
 nu12 = 0.0
 strain_range = [0.12, 0.14, 0.1]
-[law.bounds]
-E1 = [0.02, 2.0]
-E2 = [0.03, 1.0]
-G12 = [0.005, 0.2]
+bounds = { E1 = [0.02, 2.0], E2 = [0.03, 1.0], G12 = [0.005, 0.2] }
 [[strips]]
 increments = 6
 match = "points"
 warp = { gauge_length = 20, final_length = 22.9 }
 fill = { gauge_length = 20, final_length = 22.9 }
-[strips.data]
-files = ["points.csv"]
-[fit]
-starts = 1
-jobs = 2
+data = { files = ["points.csv"] }
 """
 COMMANDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "fit": (BUBBLE.replace("{starts}", "4"), ("fit",)),
@@ -131,7 +106,7 @@ class Told:
 
 
 class Trial:
-    """One command in a folder of its own, killed and gone on with."""
+    """One command in a folder of its own, killed and resumed."""
 
     def __init__(self, folder: Path, name: str) -> None:
         text, (command, *options) = COMMANDS[name]
@@ -146,7 +121,7 @@ class Trial:
         self.said = folder / "stderr"
 
     def start(self) -> int:
-        """A copy of this process becomes the command, with --resume where there is something."""
+        """Fork this process into the command, with --resume where results exist."""
         used = any((self.out / name).exists() for name in ("run.json", "result.json"))
         arguments = [*self.arguments, *(["--resume"] if used else [])]
         sys.stdout.flush()
@@ -176,7 +151,7 @@ class Trial:
             os._exit(70)
 
     def all_alive(self, own: int) -> list[tuple[int, str]]:
-        """Processes of the trial that live, by name: its session's, and what it has started."""
+        """Return numbers and names of living processes of the trial: of its session or marked."""
         mark = f"{MARK}={self.folder}".encode()
         found = []
         for process in Path("/proc").glob("[0-9]*"):
@@ -196,7 +171,7 @@ class Trial:
         return found
 
     def left(self) -> list[str]:
-        """Scratch folders, half-written files and shared memory that are there."""
+        """Return scratch folders, half-written files and shared memory that are there."""
         places = [*(self.folder / "tmp").iterdir(), *self.folder.rglob(".*.part")]
         places += [path for path in self.out.rglob(".*") if path.is_file()]
         places += SHARED.iterdir() if OWN in os.environ else ()  # others may use it, too
@@ -204,7 +179,7 @@ class Trial:
 
 
 def _stub(figure: Any, target: Any, **given: Any) -> None:
-    """In place of a figure, whose drawing would be most of the time: the smallest picture."""
+    """Write the smallest picture in place of a figure, whose drawing takes most of the time."""
     if hasattr(target, "write"):
         target.write(PICTURE)
     else:
@@ -212,7 +187,7 @@ def _stub(figure: Any, target: Any, **given: Any) -> None:
 
 
 def until(done: Any, seconds: float) -> bool:
-    """Whether it came to be within the time."""
+    """Wait for a condition; return True if it came to hold within the time."""
     end = time.monotonic() + seconds
     while not done():
         if time.monotonic() > end:
@@ -222,13 +197,13 @@ def until(done: Any, seconds: float) -> bool:
 
 
 def ended(process: int) -> int | None:
-    """Its exit code (-9: killed), None while it lives."""
+    """Return the exit code (-9: killed), None while the process lives."""
     found, status = os.waitpid(process, os.WNOHANG)
     return os.waitstatus_to_exitcode(status) if found else None
 
 
 def finish(process: int) -> int:
-    """Its exit code; killed where it takes too long, which is told as -1000."""
+    """Return the exit code; -1000 where the process took too long and was killed."""
     end = time.monotonic() + LONGEST
     while (code := ended(process)) is None:
         if time.monotonic() > end:
@@ -240,7 +215,7 @@ def finish(process: int) -> int:
 
 
 def killed(trial: Trial, process: int, draw: random.Random) -> str:
-    """Kill one of the trial's processes; what it was, "" where it had ended."""
+    """Kill one of the trial's processes; return which, "" where it had ended."""
     alive = trial.all_alive(process)
     solvers = [number for number, name in alive if name.startswith("ccx")]
     workers = [number for number, name in alive if number != process and name != "sh"]
@@ -257,7 +232,7 @@ def killed(trial: Trial, process: int, draw: random.Random) -> str:
 
 
 def alive_still(process: int) -> bool:
-    """Whether our child has not ended (it is not waited for)."""
+    """Return True while our child has not ended (it is not waited for)."""
     try:
         said = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -266,7 +241,7 @@ def alive_still(process: int) -> bool:
 
 
 def content(out: Path) -> dict[str, Any]:
-    """All that a command found: result.json and tables, without what `UNEQUAL` names."""
+    """Return all that a command found: result.json and tables, without what `UNEQUAL` names."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, dict):
@@ -287,7 +262,7 @@ def content(out: Path) -> dict[str, Any]:
 
 def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, most: int,
               draw: random.Random, told: Told) -> int:  # fmt: skip
-    """Up to `most` kills of one command, and its end; how many there were."""
+    """Kill one command up to `most` times, wait for its end; return how many kills there were."""
     trial, count, failed = Trial(folder, name), 0, False
     while True:
         process = trial.start()
@@ -329,7 +304,7 @@ def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, mo
 
 
 def trials(place: Path, name: str, kills: int, seed: int) -> Told:
-    """So many kills of a command, in as many trials as that takes."""
+    """Kill a command so many times, in as many trials as that takes."""
     draw, told, count = random.Random(f"{name} {seed}"), Told(), 0
     first = Trial(place / f"{name} whole", name)
     for _ in range(2):  # the second time everything is compiled
@@ -351,7 +326,7 @@ def trials(place: Path, name: str, kills: int, seed: int) -> Told:
 
 
 def lines(name: str, told: Told) -> Iterator[str]:
-    """What there is to say of a command."""
+    """Return the lines of a command's trials."""
     killed_words = ", ".join(f"{what} {count}" for what, count in sorted(told.killed.items()))
     yield (
         f"{name:16} {told.trials:3} trials, killed: {killed_words}; the same to the last digit: "
@@ -361,7 +336,7 @@ def lines(name: str, told: Told) -> Iterator[str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run; the exit code."""
+    """Run and return the exit code."""
     if OWN not in os.environ and shutil.which("unshare"):
         words = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
         command = ["unshare", "-m", "sh", "-c", words, "sh", sys.executable, *sys.argv]

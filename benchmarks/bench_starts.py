@@ -1,89 +1,135 @@
-"""Where starts begin: random ones, a Sobol sequence, and starts that earlier evaluations propose.
-
-What counts is how many analyses it takes, on average, until a start ends in the best optimum known:
-all analyses over the number of starts that end there (their objective is within 1 % of the least,
-or below the tolerance). All ways side by side on the same problem, from the same seeds.
-
-The problem is the example with a known solution on 48 quads, which Levenberg-Marquardt solves from
-every start: what better starts can save are analyses.
-
-Proposals come from the evaluations of five random starts of another seed: of the same data, and of
-data of another fabric (the known moduli times 1.3).
-
-Usage: bench_starts.py [STARTS] [SEEDS]: 12 starts of each way and seed, 2 seeds.
-"""
+"""Compare starts on the known solution: methods, seeds, where starts begin, coarse to fine."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
+from bubblefit.inference.methods.base import FitOptions
 from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import ProposedStarts, RandomStarts, SobolStarts, Starts
-from bubblefit.runs.setup import FitSetup
-from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
-from known_solution import known_project, known_setup
+from bubblefit.inference.unknowns import ProposedStarts, RandomStarts, SobolStarts
+from bubblefit.project.project import read_project
+from bubblefit.runs import fit as stages
+from bubblefit.runs.executor import Executor
+from bubblefit.runs.fit import SAME_MODULI, distinct, moduli_apart
+from bubblefit.runs.setup import CoarseToFine, FitSetup, coarse_problem
+from bubblefit.runs.starts import StartRecord, run_start
+from common import known_project, known_setup, start_on
 
+#: By name: how, and what is remarkable about it.
+METHODS = {
+    "lm": (FitOptions("lm", tolerance=1e-7, max_analyses=100), "exact Jacobian, QP step"),
+    "slsqp": (FitOptions("slsqp", "exact", "margin", 1e-7, 500), "exact gradient, margin"),
+    "slsqp-thesis": (
+        FitOptions("slsqp", "differences", "boolean", 1e-7, 600), "differences, boolean"
+    ),
+    "cobyla": (FitOptions("cobyla", "exact", "boolean", 1e-7, 600), "no gradient, boolean"),
+}  # fmt: skip
+FOUND = 1e-6
 ELEMENTS, EARLIER_SEED, EARLIER, SAME, OTHER = 48, 99, 5, 0.01, 1.3
 
 
-def main(arguments: Sequence[str]) -> None:
-    starts = int(arguments[0]) if arguments else 12
-    seeds = range(1, 1 + (int(arguments[1]) if len(arguments) > 1 else 2))
+def ended(
+    setup: FitSetup, options: FitOptions, seed: int, count: int
+) -> tuple[np.ndarray, float, str]:
+    """Run starts; return e of each, the median of analyses, and best, median and worst e."""
+    found = Executor().run_starts(setup.problem, options, seed, range(count))
+    records = [record for record in found if isinstance(record, StartRecord)]
+    e = objectives(records)
+    words = f"{e.min():9.1e}{np.median(e):9.1e}{e.max():9.1e}"
+    return e, float(np.median([r.analyses for r in records])), words
+
+
+def objectives(records: Sequence[StartRecord]) -> np.ndarray:
+    """Return e of each start, infinity where it failed."""
+    return np.array([np.inf if r.objective is None else r.objective for r in records])
+
+
+def methods(starts: int = 6, *names: str) -> None:
+    """Compare optimisers (NAMES as in the first column) from the same random feasible starts.
+
+    The published study (DOT's method of feasible directions on Marc, finite differences, boolean
+    constraints): best 0.096, median 0.226, worst 3.2, 36 of 50 below 0.5.
+    """
+    setup = known_setup(known_project())
+    print(f"{'method':13s}{'':26s}{'starts':>7s}{'best':>9s}{'median':>9s}{'worst':>9s}"
+          f"{'<1e-6':>7s}{'<1e-3':>7s}{'<0.5':>6s}{'analyses':>10s}{'wall, s':>9s}")  # fmt: skip
+    for name in names or METHODS:
+        options, how = METHODS[name]
+        begun = time.perf_counter()
+        e, analyses, words = ended(setup, options, setup.project.fit.seed, starts)
+        wall = time.perf_counter() - begun
+        below = [int((e < limit).sum()) for limit in (1e-6, 1e-3, 0.5)]
+        print(f"{name:13s}{how:26s}{len(e):7d}{words}{below[0]:7d}{below[1]:7d}{below[2]:6d}"
+              f"{analyses:10.0f}{wall:9.1f}", flush=True)  # fmt: skip
+
+
+def seeds(count: int = 1, starts: int = 50) -> None:
+    """Count how many of STARTS random starts of each of COUNT seeds find the known solution."""
+    setup = known_setup(known_project())
+    found, tried = 0, 0
+    print(f"seed{'best e':>9s}{'median':>9s}{'worst':>9s}{'analyses':>10s}  below {FOUND:g}")
+    for seed in range(1, count + 1):
+        e, analyses, words = ended(setup, METHODS["lm"][0], seed, starts)
+        below = int((e < FOUND).sum())
+        found, tried = found + below, tried + len(e)
+        print(f"{seed:4d}{words}{analyses:10.0f}  {below} of {len(e)}", flush=True)
+    print(f"{found} of {tried} starts below {FOUND:g}")
+
+
+def places(starts: int = 12, seeds: int = 2) -> None:
+    """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum.
+
+    All analyses over the number of starts whose objective is within 1 % of the least, or below
+    the tolerance; 48 quads. Proposals come from five random starts of another seed: of the same
+    data, and of data of another fabric (the known moduli times 1.3).
+    """
     setup = known_setup(known_project(ELEMENTS))
     problem = setup.problem()
-    ways: dict[str, Starts] = {
+    ways = {
         "random": RandomStarts(),
         "Sobol": SobolStarts(),
         "proposed by the same data": proposals(setup, problem),
         "proposed by another fabric": proposals(setup, another(setup, problem)),
     }
     print("| starts | analyses a start | in the best optimum | analyses until it | ratio |")
-    print("|---|---|---|---|---|")
-    ended = {way: run(setup, problem, own, seeds, starts) for way, own in ways.items()}
-    least = min(r.objective for way in ended.values() for r in way if r.objective is not None)
+    print("|---" * 5 + "|")
+    ends: dict[str, list[StartRecord]] = {}
+    for way, problem.starts in ways.items():
+        ends[way] = [run_start(problem, setup.options, seed, number, lambda _: None)
+                     for seed in range(1, 1 + seeds) for number in range(starts)]  # fmt: skip
+    least = min(objectives(records).min() for records in ends.values())
     limit = max((1 + SAME) * least, setup.project.fit.tolerance)
-    until: dict[str, float] = {}
-    for way, records in ended.items():
-        best = sum(r.objective is not None and r.objective <= limit for r in records)
+    random = None
+    for way, records in ends.items():
+        best = int((objectives(records) <= limit).sum())
         analyses = sum(record.analyses for record in records)
-        until[way] = analyses / best if best else np.inf
-        ratio = until[way] / until["random"]
+        until = analyses / best if best else np.inf
+        random = random or until
         print(f"| {way} | {analyses / len(records):.1f} | {best} of {len(records)} | "
-              f"{until[way]:.1f} | {ratio:.2f} |", flush=True)  # fmt: skip
-
-
-def run(
-    setup: FitSetup, problem: FitProblem, starts: Starts, seeds: Iterable[int], count: int
-) -> list[StartRecord]:
-    """How starts end that begin there."""
-    problem.starts = starts
-    return [run_start(problem, setup.options, seed, number, lambda _: None)
-            for seed in seeds for number in range(count)]  # fmt: skip
+              f"{until:.1f} | {until / random:.2f} |", flush=True)  # fmt: skip
 
 
 def proposals(setup: FitSetup, problem: FitProblem) -> ProposedStarts:
-    """What a few random starts of a problem evaluate."""
+    """Return the starts that evaluations of a few random starts propose."""
     problem.starts = RandomStarts()
-    told: list[EvaluationRecord] = []
+    heard: list = []
     for number in range(EARLIER):
-        run_start(problem, setup.options, EARLIER_SEED, number, told.append)
-    good = [record for record in told if record.objective is not None]
+        run_start(problem, setup.options, EARLIER_SEED, number, heard.append)
+    good = [record for record in heard if record.objective is not None]
     return ProposedStarts(
-        np.array([record.coefficients for record in good]),
-        np.array([record.objective for record in good]),
+        np.array([r.coefficients for r in good]), np.array([r.objective for r in good])
     )
 
 
 def another(setup: FitSetup, problem: FitProblem) -> FitProblem:
-    """The same problem with the data of a fabric of other moduli."""
+    """Return the same problem with the data of a fabric of other moduli."""
     (prepared,), (comparison,) = setup.tests, problem.comparisons
-    known: Any = prepared.known  # type: ignore[attr-defined]
-    stiffer = known.with_beta(OTHER * known.beta)
+    stiffer = prepared.known.with_beta(OTHER * prepared.known.beta)
     history = comparison.solver.run(comparison.model, stiffer)
     pressures = comparison.model.pressures
     data = [FieldTarget(p, u) for p, u in zip(pressures, history.displacement, strict=True)]
@@ -92,5 +138,46 @@ def another(setup: FitSetup, problem: FitProblem) -> FitProblem:
     return FitProblem((changed,), other.law, other.unknowns)
 
 
+def coarse(starts: int = 50, *project: str) -> None:
+    """Compare starts coarse to fine with starts on the full mesh: optima and processor time.
+
+    STARTS of the example, or of PROJECT (and the folder of its measured data). Every distinct
+    optimum of the full mesh is looked for among those of coarse to fine, as a fit does it.
+    """
+    own = read_project(project[0], *map(Path, project[1:])) if project else known_project()
+    setup = known_setup(own.with_fit(starts=starts))
+    fine = replace(setup, project=setup.project.with_fit(coarse_to_fine=True))
+    problem, tolerance = setup.problem(), setup.project.fit.tolerance
+    for one in filter(None, (problem, coarse_problem(setup))):
+        run_start(one, setup.options, 0, 0, lambda _: None)  # compiles, and warms caches up
+    found = []
+    Executor.run_tasks = in_this_process
+    for name, way in (("full mesh", setup), ("coarse to fine", fine)):
+        begun = time.process_time()
+        records = stages.every_start(way, (), lambda _: None, lambda _: None)
+        found.append((records, time.process_time() - begun))
+        e, analyses = objectives(records), sum(r.analyses for r in records)
+        print(f"{name:16s} best e {min(e):.6g}, worst {max(e):.6g}, {analyses} analyses, "
+              f"{found[-1][1]:.1f} s of the processor")  # fmt: skip
+    (full, long), (both, short) = found
+    meshes = CoarseToFine.of(fine, both)
+    print("" if meshes is None else meshes.words)
+    print(f"processor time: {short / long:.2f} of that of the full mesh")
+    ends = [r for r in both if r.objective is not None and r.same_as is None]
+    for group in distinct(problem, full, tolerance):
+        if group[0].objective is not None:
+            apart = min(moduli_apart(problem, group[0], end) for end in ends)
+            said = "found" if apart <= SAME_MODULI else "NOT FOUND"
+            print(f"optimum e {group[0].objective:.6g} of {len(group)} starts: {said} coarse to "
+                  f"fine, moduli within {100 * apart:.2g} %")  # fmt: skip
+
+
+def in_this_process(self, prepare, numbers, *_, **__):
+    """Run starts one after the other where their processor time can be read."""
+    task = prepare()
+    for number in numbers:
+        yield task(number, lambda _: None)
+
+
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    start_on(methods, seeds, places, coarse)

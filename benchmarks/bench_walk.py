@@ -1,4 +1,4 @@
-"""Through which modules a bubble test goes, from its project file to the report.
+"""List the modules that a bubble test passes, from its project file to the report.
 
 Runs the example with a known solution, coarse, one start, in one process, and notes each module of
 bubblefit in which a function is called, in the order in which they are first entered. Compiled
@@ -53,7 +53,7 @@ def entered(modules: list[str]) -> Iterator[None]:
 
 
 def walk() -> dict[str, list[str]]:
-    """Modules by step, each where it is entered first."""
+    """Return modules by step, each where it is entered first."""
     steps: dict[str, list[str]] = {}
     modules: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -86,7 +86,7 @@ def walk() -> dict[str, list[str]]:
 
 
 def main() -> None:
-    """Steps with their numbers of modules; with --list their names."""
+    """Print steps with their numbers of modules; with --list their names."""
     walk()  # imports everything: what they run is no part of the walk
     steps = walk()
     for name, modules in steps.items():

@@ -22,8 +22,6 @@ RANGE = (0.13, 0.13, 0.13)
 class Uneven:
     """What is wrong with the sheet, and with the measurement.
 
-    Parameters
-    ----------
     height : mm, scale of the surface in the reference picture (no symmetry).
     slack : share, of the stress-free length in both directions.
     rim : mm, largest motion of the rim, at the last pressure.
@@ -39,7 +37,7 @@ class Uneven:
 
 
 def law() -> HypoelasticLaw:
-    """The known law: linear in strain, incompressible."""
+    """Return the known law: linear in strain, incompressible."""
     beta = np.zeros(12)
     for block, moduli in enumerate((G12, E2, E1)):
         beta[4 * block + 2 : 4 * block + 4] = moduli
@@ -47,7 +45,7 @@ def law() -> HypoelasticLaw:
 
 
 def model(what: Uneven, pressures: Sequence[float], elements: int) -> BubbleModel:
-    """The sheet as it really was; pressures in MPa."""
+    """Return the sheet as it really was; pressures in MPa."""
     mesh = disk_mesh(RADIUS, elements)
     x, y = mesh.points[:, 0] / RADIUS, mesh.points[:, 1] / RADIUS
     modes = disk_modes(mesh.points, RADIUS, 10)
@@ -74,14 +72,10 @@ def model(what: Uneven, pressures: Sequence[float], elements: int) -> BubbleMode
 def write_test(
     folder: Path, what: Uneven, pressures: Sequence[float], elements: int
 ) -> BubbleModel:
-    """Compute the test and write one file a pressure, t_00.csv and so on, of the mesh's nodes.
+    """Compute the test, write a file of the mesh's nodes a pressure, and return the model.
 
     Between its nodes a mesh is a polyhedron, and its rim a polygon: on another coarse mesh that
     would differ by far more than the noise.
-
-    Returns
-    -------
-    The model behind it.
     """
     truth = model(what, pressures, elements)
     history = MembraneSolver().run(truth, law())
@@ -101,22 +95,14 @@ def write_test(
 
 
 PROJECT = """\
-[fabric]
-name = "computed"
-thickness = {thickness}
-thickness_change = "incompressible"
-
-[units]
-modulus = "MPa"
+fabric = {{ name = "computed", thickness = {thickness}, thickness_change = "incompressible" }}
+units = {{ modulus = "MPa" }}
+fit = {{ starts = 1, seed = 3, jobs = 1, max_analyses = 60 }}
 
 [law]
 form = "linear"
 strain_range = [0.13, 0.13, 0.13]
-
-[law.bounds]
-E1 = [30.0, 2000.0]
-E2 = [30.0, 1500.0]
-G12 = [2.0, 100.0]
+bounds = {{ E1 = [30.0, 2000.0], E2 = [30.0, 1500.0], G12 = [2.0, 100.0] }}
 
 [[bubble]]
 name = "uneven"
@@ -132,29 +118,18 @@ columns = {{ z = "z" }}
 
 [bubble.sheet]
 {sheet}
-
-[fit]
-starts = 1
-seed = 3
-jobs = 1
-max_analyses = 60
 """
 
 
 def project_text(pressures: Sequence[float], elements: int, sheet: str) -> str:
-    """A project that fits it; sheet : lines of [bubble.sheet]."""
-    return PROJECT.format(
-        thickness=THICKNESS,
-        radius=RADIUS,
-        pressures=[round(1e3 * p, 6) for p in pressures],
-        indices=list(range(len(pressures))),
-        elements=elements,
-        sheet=sheet,
-    )
+    """Return a project that fits it; sheet : lines of [bubble.sheet]."""
+    kpa, indices = [round(1e3 * p, 6) for p in pressures], list(range(len(pressures)))
+    return PROJECT.format(thickness=THICKNESS, radius=RADIUS, pressures=kpa, indices=indices,
+                          elements=elements, sheet=sheet)  # fmt: skip
 
 
 def errors(fitted: HypoelasticLaw, ends: Sequence[float]) -> dict[str, float]:
-    """Largest relative error of E1 and E2 between a fifth and all of the strains reached."""
+    """Return the largest relative errors of E1 and E2 from a fifth of the strains reached on."""
     known, found = law(), {}
     for name, end in zip(("E1", "E2"), ends, strict=False):
         strain = np.linspace(0.2 * end, end, 41)

@@ -131,7 +131,7 @@ POINTS = 61
 PRIOR = 10.0
 #: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
 #: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
-#: (benchmarks/bench_bias.py).
+#: (benchmarks/bench_bands.py bias).
 LEFT = 0.1
 
 

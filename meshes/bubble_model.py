@@ -77,7 +77,7 @@ class BubbleModel:
     pressures : MPa, strictly increasing: the frames to report.
     increments : MPa, strictly increasing, containing every pressure: the steps over which the
         hypoelastic law is integrated; the pressures unless given. They hardly matter to the
-        result (benchmarks/bench_increments.py).
+        result (benchmarks/bench_law.py increments).
     supports : degrees of freedom held at zero, by node set; those of the rim where it moves.
     modes : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm.
     slack : how much longer the stress-free sheet is than the reference picture along x (warp) and

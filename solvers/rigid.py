@@ -17,7 +17,7 @@ Numbers = NDArray[np.intp]
 OVER, THICK = 20.0, 10.0
 #: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
 #: top; elements around and across of a support, around and along a collar, and along its fillet:
-#: few where a body is straight, many where it is round (benchmarks/bench_collar.py).
+#: few where a body is straight, many where it is round (benchmarks/bench_calculix.py collar).
 SUPPORT_ARC, COLLAR_ARC = (165.0, 15.0), (60.0, -9.0)
 SUPPORT_COUNTS, COLLAR_COUNTS, FILLET_COUNT = (48, 3), (24, 2), 6
 #: Degrees that the fillet turns, short of a face across the axis.

@@ -1,4 +1,4 @@
-"""What the thesis saw in its bending tests (chapter 6), checked on runs of the example.
+"""Check on runs of the example what the thesis saw in its bending tests (chapter 6).
 
 Usage: bending.py [FOLDER]. FOLDER: what `bubblefit bend examples/bend-valmex7318/project.toml`
 wrote, whole or in part; without one the example is run into out/bend-valmex7318. Prints each
@@ -84,8 +84,7 @@ class Study:
 class Statement:
     """One sentence of the thesis against the runs.
 
-    thesis : what it says and where. runs : what they say. holds : None where they do not
-    allow a check. part : of how many checks how many hold, where there are several.
+    holds : None where they do not allow a check. part : how many of how many checks hold.
     """
 
     thesis: str
@@ -95,27 +94,29 @@ class Statement:
 
     @property
     def verdict(self) -> str:
-        """Whether it holds: "holds", "does not hold", how often, or "not checked"."""
+        """Return "holds", "does not hold", how often it holds, or "not checked"."""
         if self.holds is False and self.part[0]:
             return f"holds in {self.part[0]} of {self.part[1]}"
         return {True: "holds", False: "does not hold", None: "not checked"}[self.holds]
 
 
 def statements(study: Study) -> list[Statement]:
-    """All of them, in the order of the thesis."""
-    checks = (
-        _inflation,
-        _pressure,
-        _spread,
-        _buckling,
-        _diameter,
-        _linear,
-        _gas,
-        _soft,
-        _under,
-        _over,
-    )
-    return [check(study) for check in checks]
+    """Check all of them, in the order of the thesis."""
+    ranks = [[_case(study, d, PRESSURES[d][rank]) for d in sorted(PRESSURES)] for rank in range(3)]
+    by_diameter = [[case for case in row if case is not None] for row in ranks]
+    more = "Stiffer with larger diameter: lowest, middle and highest pressure of each (6.3)"
+    under = "The uniaxial card underestimates the measured loads in all tests (6.5)"
+    over = "The bubble cards overestimate the measured loads (6.5)"
+    return [
+        _inflation(study),
+        _order("Stiffer with more pressure (6.3)", study, _by_pressure(study),
+               "two pressures of one diameter"),
+        _spread(study), _buckling(study),
+        _order(more, study, by_diameter, "two diameters of Table 6.1"),
+        _linear(study), _gas(study), _soft(study),
+        _against(under, study, "uniaxial", lambda mean: mean < 0),
+        _against(over, study, "bubble", lambda mean: mean > 0),
+    ]  # fmt: skip
 
 
 def _inflation(study: Study) -> Statement:
@@ -136,11 +137,6 @@ def _inflation(study: Study) -> Statement:
     return _verdict(text, said, good, "needs a uniaxial card and a case of Table 6.1")
 
 
-def _pressure(study: Study) -> Statement:
-    text = "Stiffer with more pressure (6.3)"
-    return _order(text, study, _by_pressure(study), "two pressures of one diameter")
-
-
 def _spread(study: Study) -> Statement:
     text = "At one deflection the load changes by up to 30 % from lowest to highest pressure (6.3)"
     said, good = [], []
@@ -155,11 +151,6 @@ def _spread(study: Study) -> Statement:
             good.append(SPREAD[0] <= max(changes) <= SPREAD[1])
             said.append(f"{card} {100 * max(changes):.0f} %")
     return _verdict(text, said, good, f"needs two pressures of one diameter to {PLACES[0]:g} mm")
-
-
-def _diameter(study: Study) -> Statement:
-    text = "Stiffer with larger diameter: lowest, middle and highest pressure of each (6.3)"
-    return _order(text, study, _by_diameter(study), "two diameters of Table 6.1")
 
 
 def _buckling(study: Study) -> Statement:
@@ -230,16 +221,6 @@ def _soft(study: Study) -> Statement:
     return _verdict(text, said if good else [], good, "needs a uniaxial and a bubble card")
 
 
-def _under(study: Study) -> Statement:
-    text = "The uniaxial card underestimates the measured loads in all tests (6.5)"
-    return _against(text, study, "uniaxial", lambda mean: mean < 0)
-
-
-def _over(study: Study) -> Statement:
-    text = "The bubble cards overestimate the measured loads (6.5)"
-    return _against(text, study, "bubble", lambda mean: mean > 0)
-
-
 def _against(text: str, study: Study, test: str, good: Callable[[float], bool]) -> Statement:
     errors = [
         run.mean_error
@@ -254,7 +235,7 @@ def _against(text: str, study: Study, test: str, good: Callable[[float], bool]) 
 
 
 def _order(text: str, study: Study, groups: Sequence[Sequence[Cylinder]], need: str) -> Statement:
-    """Whether the stiffness rises along each group, with each card."""
+    """Check that the stiffness rises along each group, with each card."""
     said, good, changes = [], [], []
     for group in groups:
         for card in study.cards:
@@ -282,15 +263,6 @@ def _by_pressure(study: Study) -> list[list[Cylinder]]:
     return list(groups.values())
 
 
-def _by_diameter(study: Study) -> list[list[Cylinder]]:
-    """The lowest, the middle and the highest pressures of Table 6.1."""
-    groups = []
-    for rank in range(len(INFLATION)):
-        row = [_case(study, d, PRESSURES[d][rank]) for d in sorted(PRESSURES)]
-        groups.append([case for case in row if case is not None])
-    return groups
-
-
 def _case(study: Study, diameter: float, pressure: float) -> Cylinder | None:
     fits = (
         c for c in study.cylinders if _same(c.diameter, diameter) and _same(c.pressure, pressure)
@@ -313,7 +285,7 @@ def _verdict(text: str, said: Sequence[str], good: Sequence[bool], need: str) ->
 
 
 def read_study(folder: Path) -> Study:
-    """The runs in an output folder of `bubblefit bend`."""
+    """Read the runs in an output folder of `bubblefit bend`."""
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     cylinders = tuple(
         Cylinder(name, test["diameter_mm"], 1e-3 * test["pressure_kPa"])

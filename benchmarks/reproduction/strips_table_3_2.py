@@ -1,4 +1,4 @@
-"""What the thesis' Table 3.2 gives on its own load polynomials, reading by reading.
+"""Compare the thesis' Table 3.2 with its own load polynomials, reading by reading.
 
 The thesis reports e_uniaxial = 50.1 N for these coefficients. Columns: RMS errors in N of Eqs 3.4
 to 3.6 and their sum; published polynomials from examples/uniaxial-valmex7318/curves.csv.
@@ -31,18 +31,14 @@ def held(gamma: float) -> HypoelasticLaw:
     return replace(LAW, strain_range=np.array([0.153, 0.232, gamma]))
 
 
+THIN = {"thickness_change": "incompressible"}
 READINGS = {
     "constant thickness, nu12 0.24 (the thesis' shells)": LAW,
-    "incompressible thickness": replace(LAW, thickness_change="incompressible"),
+    "incompressible thickness": replace(LAW, **THIN),
     "nu12 = 0: straight strips keep their width": replace(LAW, nu12=0.0),
-    "nu12 = 0, incompressible": replace(LAW, nu12=0.0, thickness_change="incompressible"),
-    "G12 held beyond shear 0.555": held(0.555),
-    "G12 held beyond shear 0.44": held(0.44),
-    "G12 held beyond shear 0.3": held(0.3),
-    "G12 held beyond shear 0.25": held(0.25),
-    "incompressible, G12 held beyond shear 0.555": replace(
-        held(0.555), thickness_change="incompressible"
-    ),
+    "nu12 = 0, incompressible": replace(LAW, nu12=0.0, **THIN),
+    **{f"G12 held beyond shear {gamma:g}": held(gamma) for gamma in (0.555, 0.44, 0.3, 0.25)},
+    "incompressible, G12 held beyond shear 0.555": replace(held(0.555), **THIN),
 }
 
 

@@ -37,7 +37,7 @@ from .test import StripsTest, reach_of
 # of five, whatever the number of readings.
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
-#: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_strips_certainty.py).
+#: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_certainty.py strips).
 PLACES = 1.25
 #: Specimens behind a polynomial of which nobody says it: as many as ISO 1421 asks for.
 SPECIMENS = 5

@@ -1,7 +1,7 @@
 """The tangent matrix and its factorisation, by a library.
 
 Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into
-band storage, which is faster there (benchmarks/bench_growth.py). Large ones: SuperLU. Both are
+band storage, which is faster there (benchmarks/bench_cost.py growth). Large ones: SuperLU. Both are
 unsymmetric, because the hypoelastic tangent is, and exact sensitivities want it whole.
 """
 

@@ -49,7 +49,7 @@ ANALYSES: dict[type, Analysis] = {
 }
 
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
-# each other made an analysis 12 to 290 times slower (two runs of benchmarks/bench_analysis.py).
+# each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
 BLAS = ThreadpoolController()
 
 

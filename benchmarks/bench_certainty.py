@@ -1,31 +1,26 @@
-"""Is the uncertainty that `bubblefit plan` predicts what refits of noisy data scatter by?
-
-Usage: bench_plan.py [SETS] [REPETITIONS] [RANKED]. The example's bubble on 48 quads is there; ten
-designs add one test each. For each, SETS (250 unless given) sets of noise on the computed values of
-both tests are fitted by Gauss-Newton steps from the true law on, and the scatter of G12 (root of
-the mean square along its strain) stands beside the predicted one. Then REPETITIONS (10) with other
-laws and noise, RANKED (30) sets each: is the first in rank first by simulation?
-"""
+"""Check what a plan predicts, what a bootstrap costs and how strips count in the certainty."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution
 from bubblefit.experiments.kinds import Candidate, MakeSolver, Planning, Weighting
 from bubblefit.experiments.registry import kinds
+from bubblefit.inference.assessment import certainty
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.linear import POINTS, PRIOR, Asked, information_of, summary
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.project.project import Project
+from bubblefit.project.project import read_project
+from bubblefit.runs import bootstrap as study
+from bubblefit.runs.fit import fit
 from bubblefit.runs.plan import Present, present_tests
 from bubblefit.runs.setup import prepare_fit
-from known_solution import known_project
+from common import EXAMPLES, SHARED, known_project, start_on
 
 QUADS = 192  # of the whole disk
 NOISE = {"bubble": 0.003, "strips": 4.0}  # mm, N: little, so that refits stay near
@@ -44,11 +39,10 @@ DESIGNS = (
 def case(
     scale: Sequence[float], noise: Mapping[str, float]
 ) -> tuple[Present, MakeSolver, dict[str, Candidate]]:
-    """The bubble with a law of moduli times `scale` (G12, E2, E1), and what could be added."""
-    project: Project = known_project(QUADS)
+    """Return the bubble with moduli times `scale` (G12, E2, E1), and what could be added."""
+    project = known_project(QUADS)
     project = replace(project, law=project.law.model_copy(update={"strain_range": list(RANGE)}))
     (test,) = project.tests.values()
-    assert isinstance(test, BubbleTest) and isinstance(test.data, KnownSolution)
     beta = test.data.beta * np.repeat(scale, 4)
     known = replace(test, data=replace(test.data, beta=beta), noise=noise["bubble"])
     project = replace(project, tests={test.name: known})
@@ -76,6 +70,7 @@ class Simulated:
 
     @classmethod
     def of(cls, comparison: Comparison, specimens: int, present: Present) -> Simulated:
+        """Compute the data of so many specimens."""
         unknowns, objective = present.problem.unknowns, comparison.objective
         history, slope = comparison.differentiate(present.law, unknowns.free, {}, warm=False)
         exact = objective.residual(history, {}) * objective.scale
@@ -84,7 +79,7 @@ class Simulated:
         return cls(comparison, specimens, exact, slopes, objective.least_noise / specimens**0.5)
 
     def residual(self, present: Present, y: np.ndarray) -> np.ndarray:
-        """Model less exact data, (m,), at unknowns y of the law."""
+        """Return model less exact data, (m,), at unknowns y of the law."""
         unknowns, objective = present.problem.unknowns, self.comparison.objective
         law = present.law.with_beta(unknowns.beta(y))
         history = self.comparison.run(law, unknowns.free, {}, warm=True)
@@ -94,7 +89,7 @@ class Simulated:
 def scatter(
     tests: Sequence[Simulated], present: Present, asked: Asked, sets: int, seed: int
 ) -> tuple[float, int]:
-    """Of G12 in refits, root of the mean square along its strain; and how many sets had no fit."""
+    """Return the RMS scatter of G12 in refits along its strain, and how many sets had no fit."""
     size = PRIOR * np.abs(present.point.unknowns)
     whole = sum(t.slopes.T @ t.slopes / t.sigma**2 for t in tests) + np.diag(size**-2)
     true, strain = present.point.unknowns, np.linspace(0.0, asked.ends[2], POINTS)
@@ -125,7 +120,7 @@ def scatter(
 def designs(
     scale: Sequence[float], noise: Mapping[str, float], sets: int, seed: int
 ) -> list[tuple]:
-    """Name, predicted and simulated figure of G12, and sets without a fit, of every design.
+    """Return name, predicted and simulated figure of G12, sets without a fit, of every design.
 
     seed : of the noise, which all designs share; 0: each its own.
     """
@@ -145,11 +140,14 @@ def designs(
     return rows
 
 
-def main() -> None:
-    sets, repetitions, ranked = (
-        int(given) if given is not None else usual
-        for given, usual in zip([*sys.argv[1:4], None, None, None], (250, 10, 30), strict=False)
-    )
+def plan(sets: int = 250, repetitions: int = 10, ranked: int = 30) -> None:
+    """Compare the predicted uncertainty of ten designs with the scatter of refits of noisy data.
+
+    The example's bubble on 48 quads is there; each design adds one test. SETS of noise on the
+    computed values are fitted by Gauss-Newton steps from the true law on; G12's scatter (RMS along
+    its strain) stands beside the predicted one. Then REPETITIONS with other laws and noise, RANKED
+    sets each: is the first in rank first by simulation?
+    """
     print("design: 1 sigma of G12 predicted, simulated, ratio")
     rows = designs((1.0, 1.0, 1.0), NOISE, sets, 0)
     for name, predicted, simulated, failed in rows:
@@ -177,5 +175,60 @@ def main() -> None:
         print(f"the first in rank is first by simulation: {first} of {repetitions}")
 
 
+def bootstrap(
+    samples: int = 100, *, data: str = str(SHARED / "bubble"), elements: int = 108
+) -> None:
+    """Bootstrap the frames of the published test 1; print analyses and whether refits settle.
+
+    20 frames, full disk of ELEMENTS quads, constant moduli, flat sheet. Printed: analyses in all
+    and of one sample, 1 sigma of each modulus beside that of the fit, and by how much, in these, a
+    tenth of the samples moves when it gets ten times as many analyses.
+    """
+    project = read_project(EXAMPLES / "bubble-valmex7318" / "test1-linear.toml", Path(data))
+    (test,) = project.tests.values()
+    project = replace(project, tests={test.name: replace(test, elements=elements)})
+    found = fit(project, starts=1)
+    print(f"fit: {found.objective:.4g} mm, {found.result['analyses']} analyses, 1 start")
+    done = study.bootstrap(project, "frames", samples, found.card)
+    each = [sample.analyses for sample in done.samples]
+    print(f"{len(each)} samples: {done.analyses} analyses in all, {np.mean(each):.2f} a sample, "
+          f"{max(each)} at most; {done.unfinished} used up theirs")  # fmt: skip
+    for name, (own, of_fit) in done.sigma.items():
+        print(f"  1 sigma of {name}: {100 * own:.3g} % (fit, by noise: {100 * of_fit:.3g} %)")
+    study.MOST, study.NEGLIGIBLE = 10 * study.MOST, 1e-9
+    few = max(2, samples // 10)
+    settled = study.bootstrap(project, "frames", few, found.card)
+    for name, moduli in settled.moduli.items():
+        sigma = done.moduli[name].std(axis=0, ddof=1)
+        off = np.abs(moduli - done.moduli[name][:few]) / sigma
+        print(f"  {name} of {few} samples moves by {off.max():.2g} sigma at most when it settles")
+
+
+def strips(*, data: str = str(SHARED / "uniaxial")) -> None:
+    """Compare the certainty of the published strips by specimens with that by every load.
+
+    By the published polynomials (of five specimens) and, where DATA has them, by the measured
+    points; cubics. Printed: independent loads of each direction, median 1 sigma of the moduli.
+    """
+    example = EXAMPLES / "uniaxial-valmex7318"
+    projects = {"published polynomials": read_project(example / "project.toml")}
+    if Path(data).is_dir():
+        projects["points"] = read_project(example / "points.toml", Path(data))
+    for name, project in projects.items():
+        found = fit(project, starts=2)
+        problem, best = found.problem, found.best
+        print(f"{name}: objective {found.objective:.4g}")
+        for comparison in problem.comparisons:
+            own = comparison.objective
+            loads, together = sum(own.sizes), own.alike
+            print(f"  {comparison.name}: {loads} loads count as {loads / together:.3g}")
+        for words in ("as specimens", "every load by itself"):
+            sure = certainty(problem, best.differentiated, best.law, best.valid)
+            sigma = ", ".join(f"{n} {100 * np.median(s):.2g} %" for n, s in sure.sigma.items())
+            print(f"  median 1 sigma, {words}: {sigma}")
+            for comparison in problem.comparisons:
+                comparison.objective.alike = 1.0
+
+
 if __name__ == "__main__":
-    main()
+    start_on(plan, bootstrap, strips)

@@ -1,0 +1,142 @@
+"""Share published laws, projects of the examples and command lines among the benchmarks."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bubblefit.inference.methods.lm import LevenbergMarquardt
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.project.project import Project, read_project
+from bubblefit.runs.best import best_fit, with_certainty
+from bubblefit.runs.setup import FitSetup, prepare_fit
+from bubblefit.runs.starts import EvaluationRecord, StartRecord
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES, SHARED = ROOT / "examples", ROOT.parent / "shared" / "data"
+BENDING = EXAMPLES / "bend-valmex7318" / "project.toml"
+THICKNESS = 0.81
+#: MPa: the published pressures of the bubble.
+PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
+#: Table 4.2 of the thesis, "solution", and Table 3.2, whose beta_0 is garbled in the scan; GPa.
+TABLE_4_2 = [
+    -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
+    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+]  # fmt: skip
+TABLE_3_2 = [
+    -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,
+    -1.13743e1, 1.07160e1, -6.17621e-1, 1.41287e-1,
+    -4.78030e2, 2.11227e2, -2.02600e1, 8.15340e-1,
+]  # fmt: skip
+LAW_4_2 = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
+LAW_3_2 = HypoelasticLaw(1e3 * np.array(TABLE_3_2), strain_range=[0.153, 0.232, 0.7])
+
+
+def known_project(elements: int | None = None, **fit: Any) -> Project:
+    """Return the example with a known solution; `elements`: of data and fit alike."""
+    project = read_project(EXAMPLES / "bubble-known-solution" / "project.toml").with_fit(**fit)
+    if elements is None:
+        return project
+    (test,) = project.tests.values()
+    data = replace(test.data, elements=elements)
+    return replace(project, tests={test.name: replace(test, elements=elements, data=data)})
+
+
+def known_setup(project: Project) -> FitSetup:
+    """Prepare the fit of a project, its data computed."""
+    return prepare_fit(project, project.chosen(None, fitted=True))
+
+
+def known_model_and_law() -> tuple[BubbleModel, HypoelasticLaw]:
+    """Return the example's model and the law behind its data."""
+    (prepared,) = known_setup(known_project()).tests
+    return prepared.test.models()["bubble"], prepared.known
+
+
+def known_law() -> HypoelasticLaw:
+    """Return the law behind the example's data."""
+    return known_model_and_law()[1]
+
+
+def objectives_of(solver: str, heard: list[float]) -> Callable[[EvaluationRecord], None]:
+    """Return a listener of a fit that appends e of each run of the solver to `heard`."""
+
+    def hear(record: EvaluationRecord) -> None:
+        if record.solver == solver:
+            heard.append(np.inf if record.objective is None else record.objective)
+
+    return hear
+
+
+def settled(setup: FitSetup, beta: np.ndarray, number: int) -> tuple[Any, Any] | None:
+    """Fit from a law on; return the problem and its best with certainty, None without a fit."""
+    problem = setup.problem()
+    start = problem.unknowns.at(np.asarray(beta, dtype=float))
+    optimum = LevenbergMarquardt().minimise(problem, start, setup.options)
+    if optimum is None:
+        return None
+    y, b = (tuple(v.tolist()) for v in (optimum.best.unknowns, optimum.coefficients))
+    record = StartRecord(number, (0, 0), optimum.value, optimum.status, 0, y, b, 0.0)
+    return problem, with_certainty(setup, problem, best_fit(problem, [record], 1e-7))
+
+
+def seconds(run: Callable[[], object]) -> float:
+    """Return the wall-clock seconds of a call."""
+    begun = time.perf_counter()
+    run()
+    return time.perf_counter() - begun
+
+
+def start_on(*parts: Callable[..., Any]) -> None:
+    """Run the part that the command line names, with its arguments; without a name all of them.
+
+    Parameters of a part are optional arguments in their order, keyword-only ones and flags are
+    options; their defaults give the types. A script of one part has no names.
+    """
+    parser = argparse.ArgumentParser(
+        description=parts[0].__globals__["__doc__"],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    several = parser.add_subparsers(metavar="PART") if len(parts) > 1 else None
+    for part in parts:
+        own, words = parser, (inspect.getdoc(part) or "").replace("%", "%%")
+        if several:
+            name = part.__name__.replace("_", "-")
+            own = several.add_parser(name, help=words.partition("\n")[0], description=words)
+        for name, given in inspect.signature(part).parameters.items():
+            kind, default = type(given.default), given.default
+            option = "--" + name.replace("_", "-")
+            if given.kind is given.VAR_POSITIONAL:
+                own.add_argument(name, nargs="*")
+            elif kind is bool:
+                own.add_argument(option, action="store_true")
+            elif kind is tuple:
+                own.add_argument(option, nargs="+", type=type(default[0]), default=default)
+            elif given.kind is given.KEYWORD_ONLY:
+                own.add_argument(option, type=kind, default=default)
+            else:
+                own.add_argument(name, nargs="?", type=kind, default=default)
+        own.set_defaults(part=part)
+    given = vars(parser.parse_args())
+    chosen = given.pop("part", None)
+    for part in [chosen] if chosen else parts:
+        if not chosen:
+            print(f"\n## {part.__name__}", flush=True)
+        values: list[Any] = []
+        named = {}
+        for name, own in inspect.signature(part).parameters.items() if chosen else ():
+            if own.kind is own.VAR_POSITIONAL:
+                values += given[name]
+            elif own.kind is own.KEYWORD_ONLY:
+                named[name] = given[name]
+            else:
+                values.append(given[name])
+        part(*values, **named)
