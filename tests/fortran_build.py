@@ -8,7 +8,7 @@ from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 
 from . import needs
-from .marc_stand_in.piecewise import piecewise_law
+from .marc_stand_in.laws import piecewise_law
 from .published_laws import TABLE_4_2
 
 # MPa.

@@ -56,12 +56,13 @@ def run(root: Path, tests: Sequence[str], keep: str = "1") -> tuple[int, dict[st
 
 def caught(root: Path, fault: Fault) -> bool:
     """Whether every test of a fault fails with it."""
-    before = (root / fault.file).read_bytes()
+    path = fault.found(root)
+    before = path.read_bytes()
     fault.put_in(root)
     try:
         ended = run(root, fault.tests)[1]
     finally:
-        (root / fault.file).write_bytes(before)
+        path.write_bytes(before)
     failed = [name for name, word in ended.items() if word == "FAILED"]
     return all(any(name.startswith(test) for name in failed) for test in fault.tests)
 

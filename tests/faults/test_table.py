@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 
 import pytest
 
@@ -14,8 +15,8 @@ every = pytest.mark.parametrize("fault", faults(), ids=lambda fault: fault.name)
 
 @every
 def test_a_fault_can_be_put_in(fault: Fault) -> None:
-    """Its text stands exactly once in its file, and Python reads what becomes of it."""
-    text = (ROOT / fault.file).read_text(encoding="utf-8")
+    """Its text stands exactly once in its module, and Python reads what becomes of it."""
+    text = fault.found(ROOT).read_text(encoding="utf-8")
     assert text.count(fault.before) == 1
     assert fault.before != fault.after
     ast.parse(text.replace(fault.before, fault.after))
@@ -33,3 +34,20 @@ def test_its_tests_are_there(fault: Fault) -> None:
 def test_names_are_each_one_s_own() -> None:
     names = [fault.name for fault in faults()]
     assert len(set(names)) == len(names) > 20
+
+
+def test_a_fault_follows_its_module_and_no_other(tmp_path: Path) -> None:
+    """A module that moved is found by the text; two with the text, or none, are refused."""
+    fault = Fault("one", "old/a.py", "x = 1\n", "x = 2\n", ("tests/test_a.py::test_a",))
+    for folder in ("new", "tests", ".venv"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "b.py").write_text("x = 1\n")
+    fault.put_in(tmp_path)
+    assert (tmp_path / "new" / "b.py").read_text() == "x = 2\n"
+    assert (tmp_path / "tests" / "b.py").read_text() == "x = 1\n"
+    with pytest.raises(ValueError, match="nowhere"):
+        fault.found(tmp_path)
+    for name in ("c.py", "d.py"):
+        (tmp_path / "new" / name).write_text("x = 1\n")
+    with pytest.raises(ValueError, match=r"new/c.py.*new/d.py"):
+        fault.found(tmp_path)

@@ -15,10 +15,8 @@ from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...fortran_build import BETA
-from ...marc_stand_in.content import Control
 from ...marc_stand_in.convergence import control_of, converging
-from ...marc_stand_in.fields import DeckError
-from ...marc_stand_in.reading import read_deck
+from ...marc_stand_in.deck import Control, DeckError, read_deck
 from ...marc_stand_in_runs import marc
 from .test_marc_stand_in_results import bubble
 
