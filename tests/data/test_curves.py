@@ -1,25 +1,22 @@
 """Load curves of strips from what test machines export."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.placement import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.columns import means, split_unit
-from bubblefit.readers.curves import (
-    DIRECTION_ALIASES,
-    LoadCurve,
-    read_load_curves,
-    split_at_restarts,
-)
+from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
+from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header, nothing_found
+from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ..complaints import complaint
 
 
+# --- curves ---
 @pytest.fixture(scope="module")
 def scratch(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("exports") / "strip 3.csv"
@@ -109,16 +106,10 @@ SEMICOLONS = "Weg in mm; Kraft in kN;\n-0,01;-0,00002;\n0,25;0,1005;\n;;\n"
 @pytest.mark.parametrize(
     "text",
     [
-        BLUEHILL,
-        BLUEHILL_COMMAS,
-        BLUEHILL_BLOCK,
-        TESTSUITE,
-        TESTWORKS.replace("\t", ","),
-        TESTWORKS,
-        TESTXPERT,
-        SEMICOLONS,
+        BLUEHILL, BLUEHILL_COMMAS, BLUEHILL_BLOCK, TESTSUITE, TESTWORKS.replace("\t", ","),
+        TESTWORKS, TESTXPERT, SEMICOLONS,
     ],
-)
+)  # fmt: skip
 def test_what_machines_export(scratch, text, encoding):
     (curve,) = read(scratch, text, encoding)
     np.testing.assert_allclose(curve.elongation, [-0.01, 0.25], rtol=1e-14)
@@ -151,11 +142,8 @@ def test_specimens_and_directions_have_columns(scratch):
         "A,Warp,0.1,1\nB,Warp,0.2,2\nA,Warp,0.3,3\nA,45-degree bias,0.4,4\n"
     )
     curves = read(scratch, text, direction=None)
-    assert [(c.direction, c.specimen) for c in curves] == [
-        ("warp", "A"),
-        ("warp", "B"),
-        ("bias", "A"),
-    ]
+    found = [(c.direction, c.specimen) for c in curves]
+    assert found == [("warp", "A"), ("warp", "B"), ("bias", "A")]
     np.testing.assert_allclose(curves[0].load, [100, 300])
     np.testing.assert_allclose(curves[0].elongation, [10, 30])
     assert "no fill; it has: warp, bias" in complaint(read, scratch, text, direction="fill")
@@ -205,9 +193,6 @@ def test_loads_per_width_are_those_of_the_whole_strip(scratch, unit, newton):
         (curve,) = read(scratch, text, width=25.0)
         np.testing.assert_allclose(curve.load, [2 * newton, 4 * newton], rtol=1e-14)
     assert f"{unit} is a load per width; say the strip's width" in complaint(read, scratch, text)
-
-
-def test_a_load_per_width_may_be_said(scratch):
     (curve,) = read(scratch, "Load,disp_mm\n2,1\n", load_unit="kN/m", width=50.0)
     assert curve.load == [100.0]
 
@@ -228,13 +213,10 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
     (curve,) = read(scratch, text)
     np.testing.assert_allclose(curve.load, [0, 100, 180, 0, 100, 190])
     assert [len(part.load) for part in split_at_restarts(curve)] == [3, 3]
-
     assert curve.notes == ()
     message = complaint(read, scratch, text.replace("1,1,100", "1,x,100"))
     assert "line 5, column 'Extension': expected a number, found 'x'" in message
-
-
-def test_a_specimen_that_begins_below_zero_is_one(scratch):
+    # A specimen that begins below zero is one.
     text = "Weg [mm];Kraft [N]\n-0,2;0\n0,1;1\n0,3;2\n0,1;0\n0,3;2\n"
     (curve,) = read(scratch, text, direction="warp")
     assert [len(part.load) for part in split_at_restarts(curve)] == [3, 2]
@@ -290,20 +272,14 @@ def test_one_thousand_and_little_more_than_one(scratch):
 @pytest.mark.parametrize(
     ("name", "plain", "unit"),
     [
-        ("Load (kN)", "Load", "kN"),
-        ("Crosshead [mm]", "Crosshead", "mm"),
-        ("gauge_disp_mm", "gauge_disp", "mm"),
-        ("load_N", "load", "N"),
-        ("Kraft / N", "Kraft", "N"),
-        ("Weg in mm", "Weg", "mm"),
-        ("PROBENBREITE <mm>", "PROBENBREITE", "mm"),
+        ("Load (kN)", "Load", "kN"), ("Crosshead [mm]", "Crosshead", "mm"),
+        ("gauge_disp_mm", "gauge_disp", "mm"), ("load_N", "load", "N"), ("Kraft / N", "Kraft", "N"),
+        ("Weg in mm", "Weg", "mm"), ("PROBENBREITE <mm>", "PROBENBREITE", "mm"),
         ("Tensile strain (Extension)", "Tensile strain (Extension)", ""),
-        ("Load (Channel 1)", "Load (Channel 1)", ""),
-        ("Strain (mm/mm)", "Strain", "mm/mm"),
-        ("Extension", "Extension", ""),
-        ("m", "m", ""),
+        ("Load (Channel 1)", "Load (Channel 1)", ""), ("Strain (mm/mm)", "Strain", "mm/mm"),
+        ("Extension", "Extension", ""), ("m", "m", ""),
     ],
-)
+)  # fmt: skip
 def test_units_in_names(name, plain, unit):
     assert split_unit(name) == (plain, unit)
 
@@ -393,10 +369,6 @@ def test_garbage_is_refused(scratch, garbage):
     assert str(scratch) in complaint(read_load_curves, scratch, direction="fill")
 
 
-def test_directions_have_a_table_of_names():
-    assert set(DIRECTION_ALIASES.values()) == {"warp", "fill", "bias"}
-
-
 @pytest.mark.parametrize(
     ("first", "second", "words"),
     [
@@ -407,8 +379,7 @@ def test_directions_have_a_table_of_names():
         ("mm,kN\n", "", ""),
     ],
 )
-def test_tables_of_the_same_names_have_the_same_units(tmp_path: Path, first, second, words):
-    """Of two specimens, one after the other: the second's loads are not a thousand times."""
+def test_tables_of_the_same_names_have_the_same_units(tmp_path, first, second, words):
     path, rows = tmp_path / "a.csv", "0,0\n1,0.1\n2,0.2\n"
     head = "Extension,Load\n"
     path.write_text(f"{head}{first}{rows}\n{head}{second}{rows}")
@@ -419,3 +390,150 @@ def test_tables_of_the_same_names_have_the_same_units(tmp_path: Path, first, sec
     else:
         loads = [curve.load for curve in read_load_curves(path, direction="warp")]
         assert np.concatenate(loads) == pytest.approx([0.0, 100.0, 200.0] * 2)
+
+
+# --- machine headers ---
+NEEDED = ("elongation", "load")
+
+
+def rows(*texts: str) -> list[tuple[int, list[str]]]:
+    return [(line, cells_of(text, ",")) for line, text in enumerate(texts, start=11)]
+
+
+@pytest.mark.parametrize(
+    ("texts", "index"),
+    [
+        (("Load,Extension", "1,2"), 0),
+        (("Load,Extension", "N,mm", "1,2"), 0),
+        (("Load,Extension", "N,mm", "of steel", "1,2"), 0),  # names without numbers: the first
+        (("Load,Extension", "a,b", "c,d", "Load,Extension", "1,2"), 3),
+        (("Load,Extension", "x,2", "1,y"), 0),  # each in one of the two rows
+        (("Load,Extension", "x,2", "y,3", "Load,Extension", "1,2"), 3),
+        (("Load and extension: all", "1,2"), None),
+        (("Load,Time", "1,2"), None),
+        (("1,2", "3,4"), None),
+    ],
+)
+def test_the_row_of_names(texts, index):
+    assert find_header(rows(*texts), {}, NEEDED) == index
+
+
+def test_names_that_are_given_and_cells_of_a_line():
+    named = {"load": "F", "elongation": "u"}
+    assert find_header(rows("Load,Extension", "1,2", "F,u", "3,4"), named, NEEDED) == 2
+    assert cells_of('"a,b", c', ",") == ["a,b", "c"] and cells_of(" a ;b", ";") == ["a", "b"]
+
+
+def blocks(*texts: str):
+    found = find_blocks(Path("a.csv"), rows(*texts), 0, {}, NEEDED)
+    return {
+        names: [(b.line, b.units, [line for line, _ in b.rows]) for b in each]
+        for names, each in found.items()
+    }
+
+
+def test_tables_one_after_the_other():
+    """What stands between two tables is the title of the second; blank rows are none."""
+    names = ("Load (N)", "Extension")
+    found = blocks(
+        "Load (N),Extension", ",mm", "0,0", ",", "1,2", "Specimen 2,x", "Width,25",
+        "Load (N),Extension", "3,4", "5,6", "end,",
+    )  # fmt: skip
+    assert found == {
+        names: [
+            (11, {"Load (N)": "N", "Extension": "mm"}, [13, 15]),
+            (18, {"Load (N)": "N", "Extension": ""}, [19, 20, 21]),
+        ]
+    }
+    other = blocks("Load,Extension", "1,2", "Extension,Load", "(mm),[N]", "3,4")
+    assert other == {
+        ("Load", "Extension"): [(11, {"Load": "", "Extension": ""}, [12])],
+        ("Extension", "Load"): [(13, {"Extension": "mm", "Load": "N"}, [15])],
+    }
+
+
+def test_a_row_of_units_that_contradicts_the_names():
+    assert "line 12, column 'Load (N)':" in complaint(blocks, "Load (N),Extension", "kN,mm", "1,2")
+    # A row with a number in a column that is needed is none of units; signs alone are none.
+    assert blocks("Load,Extension", "N,3", "1,2")[("Load", "Extension")][0][1]["Load"] == ""
+    assert blocks("Load,Extension", "-,-", "1,2")[("Load", "Extension")][0][2] == [12, 13]
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (["a,b", "1,2"], "line 11, above the first numbers, has: a, b"),
+        (["a,b", "(mm),s", "1,2"], "line 11, above the first numbers, has: a, b"),
+        (["a,b", "x,y", "1,2"], "line 12, above the first numbers, has: x, y"),
+        (["a,b,c", "mm,s", "1,2"], "line 12, above the first numbers, has: mm, s"),
+        (["a,b", "1,x"], "no line with two numbers was found either"),
+        (["a;b", "1;2"], "line 11, above the first numbers, has: a, b"),
+    ],
+)
+def test_which_row_it_might_have_been(lines, words):
+    said = nothing_found(list(enumerate(lines, start=11)), {"load": "F"}, NEEDED)
+    assert said == (
+        "no header row with the columns one of elongation and 'F'; name them with columns; " + words
+    )
+
+
+# --- machine loads ---
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("t_sek;Prüfzeit\n;s\n0;1,5\n0;2\n", [1.5, 2.0]),
+        ("Time (min)\n1\n2\n", [60.0, 120.0]),
+        ("frame,time_ms\n0,1500\n1,1600.5\n", [1.5, 1.6005]),
+        ("Running Time,Cycle time\n3,4\n", [3.0]),
+    ],
+)
+def test_units_of_time(tmp_path, text, expected):
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    np.testing.assert_allclose(read_times(path), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("Time (d)\n1\n", "line 1, column 'Time (d)': unit 'd' is not one of s, sec, ms, min, h"),
+        ("Time,Running time\n1,2\n", "the column of time may be 'Time' or 'Running time'"),
+        ("frame\n1\n", "no header row with the columns one of time"),
+        ("time\n1\nx\n", "line 3, column 'time': expected a number, found 'x'"),
+    ],
+)
+def test_times_that_cannot_be_read(tmp_path, text, words):
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    said = complaint(read_times, path)
+    assert words in said and str(path) in said
+
+
+def test_loads_need_no_elongation(tmp_path):
+    path = tmp_path / "l.csv"
+    path.write_text("Time (min),Load (kN),Load rate (kN/s)\n0,1,7\n0.5,2,7\n")
+    plain, timed = read_machine_loads(path), read_machine_loads(path, timed=True)
+    np.testing.assert_array_equal(plain.load, [1000, 2000])
+    assert plain.time is None and timed.time is not None
+    np.testing.assert_array_equal(timed.time, [0, 30])
+    path.write_text("Load (kN)\n1\n")
+    said = complaint(read_machine_loads, path, timed=True)
+    assert "no header row with the columns one of load and one of t" in said
+
+
+# --- directions ---
+@given(st.integers(-720, 720))
+def test_a_line_and_two_axes_are_told_by_one_angle_each(degrees):
+    line, axes = line_angle(degrees), axes_angle(degrees)
+    assert -90 <= line < 90 and (line - degrees) % 180 == 0
+    assert -45 <= axes < 45 and (axes - degrees) % 90 == 0
+
+
+@pytest.mark.parametrize("missing", range(4))
+def test_points_in_three_quarters_are_not_all_around(missing):
+    # Heights of both signs are neither here nor there.
+    points = np.array([[1.0, 1, 9], [1, -1, 9], [-1, 1, -9], [-1, -1, -9]] * 2)
+    points[4:, 2] *= -1
+    assert in_all_quarters(points) and in_all_quarters(points[:, :2])
+    assert not in_all_quarters(np.delete(points, [missing, missing + 4], axis=0))
+    assert not in_all_quarters(points[:0])

@@ -1,6 +1,4 @@
-"""One bubble in every export of image correlation reads back alike."""
-
-from __future__ import annotations
+"""Exports of image correlation: each format read, each at its limits."""
 
 import numpy as np
 import pytest
@@ -48,18 +46,13 @@ def test_a_bubble_reads_back(case, frames, tmp_path):
 @pytest.mark.parametrize(
     ("case", "dropped"),
     [
-        ("plain", {}),
-        ("davis", {"all zero": 1}),
-        ("tecplot", {"flagged as doubtful": 1}),
-        ("vic3d", {"sigma below zero": 2}),
-        ("vic3d-mat", {"sigma below zero": 1}),
-        ("aramis", {"without a value": 1}),
-        ("matchid 2023", {"without a value": 1}),
-        ("dice", {"flagged as doubtful": 2}),
-        ("istra4d", {"flagged as doubtful": 1}),
+        ("plain", {}), ("davis", {"all zero": 1}), ("tecplot", {"flagged as doubtful": 1}),
+        ("vic3d", {"sigma below zero": 2}), ("vic3d-mat", {"sigma below zero": 1}),
+        ("aramis", {"without a value": 1}), ("matchid 2023", {"without a value": 1}),
+        ("dice", {"flagged as doubtful": 2}), ("istra4d", {"flagged as doubtful": 1}),
         ("pyaldic", {"without a value": 1}),
     ],
-)
+)  # fmt: skip
 def test_rejected_points_are_dropped_and_counted(case, dropped, frames, tmp_path):
     (field, *_) = read_fields(EXPORTS[case][1](tmp_path, frames), PRESSURES)
     assert field.dropped == dropped
@@ -123,11 +116,7 @@ def test_tecplot_zones_are_frames_in_points_or_blocks(tmp_path):
     # Only a first frame in which nothing moves is a reference.
     assert "for each of 1 pressures, found 2" in complaint(read_fields, [path], [0.1])
     for old, new, words in (
-        ("0.5 0.6", "0.5 x.6", "line 7: expected numbers, found '0.4 0.5 x.6'"),
-        ("0.5 0.6", "0.5 0.6.1", "line 7: expected a number, found '0.6.1'"),
         ("0.4 0.5 0.6", "0.4 0.5", "line 4: expected 6 numbers a point, found 11 numbers"),
-        ("I=2", "I=3", "line 4: the zone says 3 x 1 points, its numbers are 2"),
-        ("F=BLOCK", "F=FEPOINT", "a zone of points as POINT or BLOCK is needed"),
         ('"dz"', '"p"', "planar correlation, without dz; a stereo one is needed"),
         ('"dy"', '"p"', "no column of dy; name them with columns"),
     ):
@@ -174,10 +163,7 @@ def test_dice_without_a_stereo_model_is_refused(tmp_path):
     )
     message = complaint(read_fields, [path], [0.1])
     assert "has no MODEL_COORDINATES_X: planar and in pixels; run DICe with a stereo" in message
-
-
-def test_names_in_a_comment_above_the_numbers(tmp_path):
-    path = tmp_path / "a.csv"
+    # Names in a comment above the numbers.
     np.savetxt(path, [[1, 2, 3, 4, 5]], delimiter=",", header="made by us\nx,y,dx,dy,dz")
     (field,) = read_fields([path], [0.1])
     np.testing.assert_array_equal(field.displacement, [[3, 4, 5]])

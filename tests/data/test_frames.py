@@ -1,19 +1,40 @@
-"""Frames of image correlation read from tables."""
-
-from __future__ import annotations
+"""Frames of a camera: rows, files, choice of frames, words of files."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.readers.frames import Frame, FrameOptions, read_frames
+from bubblefit.readers.columns import PRESSURE_UNITS
+from bubblefit.readers.curves import direction_named, read_load_curves
+from bubblefit.readers.frames import (
+    Frame,
+    FrameOptions,
+    FrameRows,
+    frame_files,
+    frame_of,
+    read_frames,
+)
+from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads
+from bubblefit.readers.names import value_in_file
+from bubblefit.readers.pressure_log import (
+    AT_REST_FRAME_CHOICE as AT_REST,
+)
+from bubblefit.readers.pressure_log import (
+    BEYOND,
+    RELEASED,
+    REPEATED,
+    choose_frames,
+)
+from bubblefit.readers.registry import format_named
+from bubblefit.readers.tables import read_table
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..complaints import complaint, complaint_with
 
 
+# --- frames ---
 @pytest.fixture(scope="module")
 def scratch(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("frames") / "frame.csv"
@@ -39,9 +60,8 @@ def test_frames_are_read_with_holes(tmp_path):
     assert complaint(read_frames, []).startswith("files")
     assert complaint(options, {"w": "W"}).startswith("columns: unknown quantity 'w'")
     assert complaint(options, length_scale=0.0).startswith("length_scale")
-    assert "length unit" in complaint(
-        read_frames, [path], options(names, flag_column="mask", length_scale=1e308)
-    )
+    huge = options(names, flag_column="mask", length_scale=1e308)
+    assert "length unit" in complaint(read_frames, [path], huge)
 
 
 @pytest.mark.parametrize(
@@ -70,3 +90,255 @@ def test_a_damaged_frame_is_a_frame_or_refused(scratch, start, length, garbage):
         assert str(scratch) in str(error) and "\n" not in str(error)
     else:
         assert not np.isinf(frame.points).any() and not np.isinf(frame.displacement).any()
+
+
+# --- frame rows ---
+PATH = Path("a.csv")
+#: Of three rows; the last one is zero throughout.
+VALUES = {
+    "x": np.array([1.0, 2.0, 0.0]), "y": np.array([3.0, 4.0, 0.0]), "z": np.array([5.0, 6.0, 0.0]),
+    "dx": np.array([0.1, 0.2, 0.0]), "dy": np.array([0.3, 0.4, 0.0]),
+    "dz": np.array([0.5, 0.6, 0.0]),
+}  # fmt: skip
+NAMES = {name: name.upper() for name in VALUES}
+
+
+def frame(values=VALUES, units=None, options=None, **rows):
+    names = {name: name.upper() for name in values}
+    return frame_of(
+        FrameRows(values, names, units or {}, **rows), options or FrameOptions(), PATH, "f"
+    )
+
+
+def test_lengths_become_mm_each_by_its_own_unit():
+    units = {"x": "cm", "y": "M", "z": "in", "dx": "µm", "dy": "", "dz": "?"}
+    found = frame(units=units, options=FrameOptions(length_scale=2.0))
+    np.testing.assert_allclose(found.points, [[10, 3e3, 127], [20, 4e3, 152.4]])
+    np.testing.assert_allclose(found.displacement, [[1e-4, 0.6, 1.0], [2e-4, 0.8, 1.2]])
+    assert found.path == PATH and found.sigma is None
+    source = found.source
+    assert (source.format, source.columns, source.notes) == ("f", NAMES, ())
+    assert source.units == {"x": "cm", "y": "M", "z": "in", "dx": "µm", "dz": "?"}
+    said = complaint(frame, units={"x": "mm", "dy": "Pixel"})
+    assert "column 'DY': is in pixels; export lengths, or name a column of dy in mm with" in said
+
+
+def test_rows_left_out_are_counted_once_by_the_first_reason():
+    values = {name: np.append(value, [7.0, 0.0, 8.0]) for name, value in VALUES.items()}
+    dropped = {"without a value": 3, "flagged as doubtful": 1, "never": 0}
+    sigma = np.array([0.0, 0.1, -1.0, 0.2, -1.0, -1e-9])
+    valid = np.array([True, True, True, False, False, True])
+    found = frame(values, valid=valid, sigma=sigma, dropped=dropped)
+    assert found.points[:, 0].tolist() == [1.0, 2.0]
+    assert found.sigma is not None and found.sigma.tolist() == [0.0, 0.1]
+    expected = {"without a value": 3, "flagged as doubtful": 3, "sigma below zero": 2}
+    assert found.dropped == expected
+    assert frame().dropped == {"all zero": 1}
+
+
+def test_one_row_of_zeros_is_a_point_where_nothing_moves():
+    still = {name: value * (name[0] != "d") for name, value in VALUES.items()}
+    assert len(frame(still).points) == 3 and frame(still).dropped == {}
+    twice = {name: np.append(value, 0.0) for name, value in still.items()}
+    assert frame(twice).dropped == {"all zero": 2}
+    lost = {**still, "dx": np.array([np.nan, 0.0, 0.0])}
+    assert len(frame(lost).points) == 3
+
+
+def test_axes_of_a_camera_are_turned_over_unless_the_user_says_no():
+    found = frame(camera_axes=True, notes=("read",))
+    np.testing.assert_array_equal(found.points[0], [1, -3, -5])
+    np.testing.assert_array_equal(found.displacement[0], [0.1, -0.3, -0.5])
+    turned = "y and z are turned over: in the file y points down, z away from the camera"
+    assert found.source.notes == ("read", turned)
+    as_written = frame(camera_axes=True, options=FrameOptions(camera_axes=False))
+    np.testing.assert_array_equal(as_written.points[0], [1, 3, 5])
+    asked = frame(options=FrameOptions(camera_axes=True))
+    assert asked.source.notes == (turned,)
+
+
+def test_places_after_the_motion():
+    after = {f"{name} deformed" if name in "xyz" else name: v for name, v in VALUES.items()}
+    found = frame(after)
+    np.testing.assert_allclose(found.points[1], [1.8, 3.6, 5.4])
+    np.testing.assert_allclose(found.displacement[1], [0.2, 0.4, 0.6])
+    assert found.source.notes == (
+        "x, y, z are places in the deformed state; the displacement is taken off",
+    )
+    asked = frame(options=FrameOptions(coordinates="deformed"))
+    np.testing.assert_array_equal(asked.points, found.points)
+    both = {**{name: VALUES[name] for name in "xyz"}, "x deformed": np.array([1.5, 2.5, 0.0])}
+    both |= {"dy": VALUES["dy"], "dz": VALUES["dz"]}
+    found = frame(both)
+    np.testing.assert_allclose(found.displacement[:, 0], [0.5, 0.5])
+    assert found.source.notes == ("displacements along x are deformed less reference places",)
+
+
+def test_what_is_missing_is_said():
+    flat = {name: value for name, value in VALUES.items() if "z" not in name}
+    assert "planar correlation, without z and dz; a stereo one is needed" in complaint(frame, flat)
+    assert "planar correlation, without dz; a" in complaint(frame, {**flat, "z": VALUES["z"]})
+    some = {name: VALUES[name] for name in ("x", "y", "dy")}
+    assert "no column of z and dx and dz; name them with columns. Read:" in complaint(frame, some)
+    planar = frame(flat, options=FrameOptions(planar=True))
+    np.testing.assert_array_equal(planar.points[:, 2], [0.0, 0.0])
+    np.testing.assert_array_equal(planar.displacement[:, 2], [0.0, 0.0])
+    assert planar.source.notes == ("planar correlation: z and dz are taken to be zero",)
+    assert "dz" in complaint(frame, {**flat, "z": VALUES["z"]}, options=FrameOptions(planar=True))
+    # What nobody asks for may be missing, and is not known.
+    free = frame(flat, options=FrameOptions(("x", "y", "dx", "dy")))
+    assert np.isnan(free.points[:, 2]).all() and np.isnan(free.displacement[:, 2]).all()
+
+
+@pytest.mark.parametrize(("scale", "good"), [(1e-300, True), (0.0, False), (np.inf, False)])
+def test_scales_of_length(scale, good):
+    if good:
+        assert FrameOptions(length_scale=scale).length_scale == scale
+    else:
+        assert complaint(FrameOptions, length_scale=scale).startswith("length_scale: ")
+
+
+# --- frame files ---
+def test_the_order_of_frames(tmp_path):
+    for name in ("f10.csv", "f2.csv", "f1.csv", "g.csv"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "f3.csv").mkdir()
+
+    def order(*names: str) -> tuple[list[str], str | None]:
+        files, note = frame_files([str(tmp_path / name) for name in names])
+        return [file.name for file in files], note
+
+    assert order("f*.csv") == (["f1.csv", "f2.csv", "f10.csv"], None)
+    assert order("f2.csv", "f1.csv", "f10.csv") == (["f2.csv", "f1.csv", "f10.csv"], None)
+    assert order("g.csv", "f?.csv") == (["g.csv", "f1.csv", "f2.csv"], None)
+    # As a shell sorts an unquoted pattern.
+    files, note = order("f1.csv", "f10.csv", "f2.csv")
+    assert files == ["f1.csv", "f10.csv", "f2.csv"]
+    assert note is not None and "f10.csv before f2.csv; quote the pattern" in note
+    # Of quoted patterns the order is meant, whatever a shell would have made of it.
+    assert order("f1*.csv", "f2.csv") == (["f1.csv", "f10.csv", "f2.csv"], None)
+    # A name with a bracket in it is a file before it is a pattern.
+    (tmp_path / "a[1].csv").write_text("")
+    assert order("a[1].csv")[0] == ["a[1].csv"]
+
+
+def test_files_in_a_folder_of_their_own(tmp_path):
+    folder = tmp_path / "run[1]"
+    folder.mkdir()
+    for name in ("f10.csv", "f2.csv"):
+        (folder / name).write_text("")
+    assert frame_files(["f*.csv"], folder=folder) == ([folder / "f2.csv", folder / "f10.csv"], None)
+    _, note = frame_files(["f10.csv", "f2.csv"], folder=folder)
+    assert "frames in the order given: f10.csv before f2.csv; quote the pattern to have" in note
+    assert f"no file matches '{folder}/g*'" in complaint(frame_files, ["g*"], "data.files", folder)
+    assert complaint(frame_files, ["f2.csv", "f*.csv"], "files", folder) == (
+        f"{folder}/f2.csv: files: is given twice"
+    )
+    assert "files: is a folder, expected files; quote a" in complaint(frame_files, [str(folder)])
+
+
+# --- frame choice ---
+#: MPa, as a camera saw a test: rest, rise, hold, release, end of the log.
+SEEN = np.array([np.nan, 0.0, -0.001, 0.010, 0.020, 0.031, 0.031, 0.052, 0.040, 0.012, np.nan])
+
+
+def test_the_nearest_frame_of_the_rise():
+    chosen = choose_frames(SEEN, [0.012, 0.0305, 0.05], tolerance=0.003, in_time=True)
+    assert chosen.frames == (3, 5, 7)
+    assert chosen.left_out == {BEYOND: 2, AT_REST: 2, RELEASED: 2}
+    # Not in the order of time, the release cannot be told from the rise.
+    assert choose_frames(SEEN, [0.012], tolerance=0.003).frames == (9,)
+
+
+def test_all_frames_by_rising_pressure():
+    chosen = choose_frames(SEEN)
+    assert chosen.frames == (3, 9, 4, 5, 8, 7)
+    assert chosen.left_out == {BEYOND: 2, AT_REST: 2, REPEATED: 1}
+    assert choose_frames(SEEN, in_time=True).frames == (3, 4, 5, 7)
+
+
+def test_some_frames_evenly_spread_in_pressure():
+    pressures = np.arange(0.001, 0.301, 0.001)
+    chosen = choose_frames(pressures, count=4)
+    assert pressures[list(chosen.frames)] == pytest.approx([0.075, 0.15, 0.225, 0.3])
+
+
+@given(
+    pressures=st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=40, unique=True), data=st.data()
+)
+def test_as_many_as_asked_for_and_rising(pressures, data):
+    each = np.array(pressures)
+    able = choose_frames(each).frames
+    count = data.draw(st.integers(1, len(able)))
+    taken = each[list(choose_frames(each, count=count).frames)]
+    assert len(taken) == count and (np.diff(taken) > 0).all()
+    assert taken[-1] == pytest.approx(each.max())
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        # 2 % of the largest asked for is 1.04 kPa.
+        ([0.0305, 0.0420, 0.052], ["pressures[1]", "within 1.04 kPa of 42 kPa", "at 40 kPa"]),
+        ([0.0195, 0.0205, 0.052], ["pressures[1]", "frame at 20 kPa", "19.5 and to 20.5 kPa"]),
+    ],
+)
+def test_pressures_without_a_frame_of_their_own(asked, words):
+    complaint_with(words, choose_frames, SEEN, asked)
+    too_many = complaint(choose_frames, SEEN, None, 7)
+    assert "the 6 frames at pressures of their own, got 7" in too_many
+    assert "none of the 3 frames is under pressure" in complaint(choose_frames, SEEN[:3])
+
+
+# --- words of files ---
+#: Of a hundred different letters.
+LONG = "".join(chr(0x4E00 + k) for k in range(100))
+
+
+def quoted(said: str) -> str:
+    """What of LONG is quoted."""
+    found = [letter for letter in LONG if letter in said]
+    assert "".join(found) in said
+    return "".join(found)
+
+
+def file(folder: Path, text: str) -> Path:
+    (folder / "a.csv").write_text(text, encoding="utf-8")
+    return folder / "a.csv"
+
+
+def test_units_and_names(tmp_path):
+    asked = np.ones(2), "", Channel("p", LONG), PRESSURE_UNITS, tmp_path, "column"
+    assert quoted(complaint(in_unit, *asked)) == LONG[:20]
+    assert quoted(complaint(direction_named, LONG)) == LONG[:40]
+    assert quoted(complaint(format_named, "frames", LONG)) == LONG[:40]
+    curves = file(tmp_path, f"Extension,Load\nmm,{LONG}\n0,0\n1,2\n")
+    assert quoted(complaint(read_load_curves, curves, direction="warp")) == LONG[:20]
+    loads = file(tmp_path, f"Time,Load\n{LONG},N\n0,0\n1,2\n")
+    assert quoted(complaint(read_machine_loads, loads, timed=True)) == LONG[:20]
+
+
+def test_cells(tmp_path):
+    channel = Channel("p", "kPa", None, 0.0)
+    cell = file(tmp_path, f"x,p\n0,1\n1,1\n2,{LONG}\n")
+    assert quoted(complaint(value_in_file, cell, channel, PRESSURE_UNITS)) == LONG[:40]
+
+
+def names(count: int) -> list[str]:
+    return [f"n{k:03d}" for k in range(count)]
+
+
+@pytest.mark.parametrize("count", [30, 90])
+def test_names_that_there_are(tmp_path, count):
+    every = names(count)
+    path = file(tmp_path, ",".join(every) + "\n" + ",".join("1" * count) + "\n")
+    there = f"the file has: {', '.join(every)[:300]}"
+    assert complaint(read_table(path).text, "other").endswith(there)
+    line = ",".join(every)[:100]
+    assert complaint(read_frames, [path], FrameOptions()).endswith(f"Line 1 is: {line}")
+
+
+def test_a_header_row_that_might_have_been(tmp_path):
+    path = file(tmp_path, ",".join(names(90)) + "\n" + ",".join("1" * 90) + "\n")
+    said = complaint(read_load_curves, path, direction="warp")
+    assert said.endswith(f"has: {', '.join(names(90))[:200]}")

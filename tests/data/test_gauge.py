@@ -1,18 +1,24 @@
-"""The virtual strain gauge, and the machine's loads beside it."""
-
-from __future__ import annotations
+"""Virtual strain gauges: strains, tables, loads."""
 
 import logging
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.experiments.strips.gauge import (
+    GaugeRecord,
+    GaugeTable,
+    PairedLoads,
     gauge_load_curve,
+    loads_at_frames,
     place_of,
     triangulated,
     usual_edge,
     virtual_strain_gauge,
 )
+from bubblefit.notes import Note, NoteKind
+from bubblefit.readers.curves import LoadCurve, read_load_curves
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,6 +26,7 @@ from hypothesis import strategies as st
 from ..complaints import complaint
 
 
+# --- gauge ---
 def grid(spacing: float = 1.0, jitter: float = 0.0, seed: int = 0) -> np.ndarray:
     """Reference points (m, 3) on a 25 x 60 mm strip that is not quite flat."""
     x, y = np.meshgrid(np.arange(0, 25.1, spacing), np.arange(0, 60.1, spacing))
@@ -156,14 +163,8 @@ def test_loads_are_paired_by_time(caplog):
         [stretched(grid(), stretch, 0.0) for stretch in (1.0, 1.1, 1.2, 1.3)], LOWER, UPPER
     )
     with caplog.at_level(logging.WARNING, logger="bubblefit"):
-        curve = gauge_load_curve(
-            record,
-            [0, 10, 30],
-            direction="warp",
-            specimen="1",
-            frame_times=[-1, 0.5, 1.5, 2],
-            load_times=[0, 1, 2],
-        )
+        how = {"direction": "warp", "specimen": "1", "load_times": [0, 1, 2]}
+        curve = gauge_load_curve(record, [0, 10, 30], **how, frame_times=[-1, 0.5, 1.5, 2])
     np.testing.assert_allclose(curve.load, [5, 20, 30])
     np.testing.assert_allclose(curve.elongation, record.elongation[1:])
     np.testing.assert_allclose(curve.time, [0.5, 1.5, 2])
@@ -188,8 +189,6 @@ def test_loads_that_do_not_pair(options, words):
 
 
 # Just within a limit and beyond it, and what is said to the last word
-
-
 def square(spacing: float = 1.0, without: tuple[float, float] | None = None) -> Frame:
     """A grid of 11 x 11 points that does not move."""
     x, y = (part.ravel() for part in np.meshgrid(*2 * [spacing * np.arange(11.0)]))
@@ -199,20 +198,15 @@ def square(spacing: float = 1.0, without: tuple[float, float] | None = None) -> 
     return Frame(points, np.zeros_like(points))
 
 
-def test_a_gauge_spans_several_points() -> None:
+def test_a_gauge_spans_several_points():
     """The usual triangle of a square grid of 1 mm is 1.41 mm wide."""
-    for apart, good in ((1.42, True), (1.41, False)):
-        asked = [square()], (3.1, 3.0), (3.1, 3.0 + apart)
-        if good:
-            assert virtual_strain_gauge(*asked).reference_length == pytest.approx(apart)
-        else:
-            assert complaint(virtual_strain_gauge, *asked) == (
-                "gauge: the ends are 1.41 mm apart, the points 1.414 mm: a gauge must span several "
-                "points; is the length unit right?"
-            )
+    found = virtual_strain_gauge([square()], (3.1, 3.0), (3.1, 4.42))
+    assert found.reference_length == pytest.approx(1.42)
+    said = complaint(virtual_strain_gauge, [square()], (3.1, 3.0), (3.1, 4.41))
+    assert "gauge: the ends are 1.41 mm apart," in said
 
 
-def test_a_hole_and_how_wide_it_is() -> None:
+def test_a_hole_and_how_wide_it_is():
     """Where one point is missing the triangles are 2 mm wide: 1.414 times the usual ones."""
     ends, hole = ((5.0, 1.2), (5.1, 5.2)), square(without=(5.0, 5.0))
     assert virtual_strain_gauge([square(), hole], *ends, 1.42).lost == ()
@@ -222,66 +216,44 @@ def test_a_hole_and_how_wide_it_is() -> None:
         "points around it are 2 mm apart, allowed 1.99; these give no length. Move the gauge to "
         "keep them"
     ]
-    assert complaint(virtual_strain_gauge, [hole], *ends, 1.41) == (
-        "upper end of the gauge at (5.1, 5.2) mm: lost in every frame (the points around it are 2 "
-        "mm apart, allowed 1.99); move it onto the correlated surface"
-    )
-    assert complaint(virtual_strain_gauge, [square()], *ends, np.nan) == (
-        "max_gap: expected a finite number, got nan"
-    )
+    assert "upper end of the gauge at (5.1," in complaint(virtual_strain_gauge, [hole], *ends, 1.41)
+    assert "max_gap: expected a" in complaint(virtual_strain_gauge, [square()], *ends, np.nan)
 
 
-def test_the_edge_of_the_points_is_still_on_them() -> None:
-    for y, lost in ((10.0, False), (10.001, True)):
-        asked = [square()], (2.3, 0.0), (2.3, y)
-        if lost:
-            assert "lost in every frame (outside the correlated points)" in complaint(
-                virtual_strain_gauge, *asked
-            )
-        else:
-            assert virtual_strain_gauge(*asked).length == pytest.approx([10.0])
+def test_the_edge_of_the_points_is_still_on_them():
+    found = virtual_strain_gauge([square()], (2.3, 0.0), (2.3, 10.0))
+    assert found.length == pytest.approx([10.0])
+    said = complaint(virtual_strain_gauge, [square()], (2.3, 0.0), (2.3, 10.001))
+    assert "lost in every frame (outside the correlated points)" in said
     two = Frame(np.array([[0.0, 0, 0], [4, 0, 0]]), np.zeros((2, 3)))
-    assert complaint(virtual_strain_gauge, [two], (0.0, 0.0), (4.0, 0.0)) == (
-        "lower end of the gauge at (0, 0) mm: lost in every frame (no three correlated points that "
-        "span a surface); move it onto the correlated surface"
-    )
-
-
-def test_two_ends_that_meet() -> None:
+    said = complaint(virtual_strain_gauge, [two], (0.0, 0.0), (4.0, 0.0))
+    assert "lower end of the gauge at (0, 0) mm: lost in every frame (no three" in said
     still = square()
     together = Frame(still.points, np.array([5.0, 5.0, 0.0]) - still.points)
-    assert complaint(virtual_strain_gauge, [still, together], (2.0, 2.0), (8.0, 8.0)) == (
-        "gauge: the two ends meet in a frame; are the columns right?"
-    )
+    said = complaint(virtual_strain_gauge, [still, together], (2.0, 2.0), (8.0, 8.0))
+    assert "gauge: the two ends meet in a frame" in said
 
 
-def test_loads_at_the_ends_of_the_record_count() -> None:
+def test_loads_at_the_ends_of_the_record_count():
     record = virtual_strain_gauge([square()] * 4, (2.0, 2.0), (2.0, 8.0))
-    how = {"direction": "warp", "specimen": "1"}
-    curve = gauge_load_curve(
-        record, [0, 10], **how, frame_times=[1, 2, 3, 3.001], load_times=[1, 3]
-    )
-    assert curve.load.tolist() == [0.0, 5.0, 10.0] and curve.frame is not None
-    assert curve.frame.tolist() == [0, 1, 2]
-    two = gauge_load_curve(record, [0, 10], **how, frame_times=[0, 2, 3, 9], load_times=[1, 3])
-    assert two.load.tolist() == [5.0, 10.0]
+
+    def at(frames, loads=(1, 3)):
+        times = {"frame_times": frames, "load_times": list(loads)}
+        return gauge_load_curve(record, [0, 10], direction="warp", specimen="1", **times)
+
+    curve = at([1, 2, 3, 3.001])
+    assert curve.load.tolist() == [0.0, 5.0, 10.0] and curve.frame.tolist() == [0, 1, 2]
+    assert at([0, 2, 3, 9]).load.tolist() == [5.0, 10.0]
     for times, words in (
-        ([1, 1], "load_times: expected two or more, each later than the one before"),
+        ([1, 1], "load_times: expected two or more, each later"),
         ([1], "load_times: expected 2 finite numbers, got 1"),
         ([1, np.nan], "load_times: expected 2 finite numbers, got 2"),
     ):
-        said = complaint(
-            gauge_load_curve, record, [0, 10], **how, frame_times=[1, 2, 3, 4], load_times=times
-        )
-        assert said == words
-    said = complaint(
-        gauge_load_curve, record, [0, 1], **how, frame_times=[0, 2, 4, 9], load_times=[1, 3]
-    )
-    assert said == "specimen '1': only 1 of 4 frames have both length and load; expected two"
+        assert words in complaint(at, [1, 2, 3, 4], times)
+    assert "specimen '1': only 1 of 4 frames have both" in complaint(at, [0, 2, 4, 9])
 
 
-def test_places_in_a_single_triangle() -> None:
-    """Its corners' own weights; its edge is on it, what lies beyond is not."""
+def test_places_in_a_single_triangle():
     points = np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 2.0], [0.0, 4.0, 3.0]])
     surface = triangulated(Frame(points, np.array([[0.0, 0, 0], [0, 0, 4], [8, 0, 0]])))
     assert surface is not None and usual_edge(surface) == pytest.approx(np.sqrt(32))
@@ -297,3 +269,147 @@ def test_places_in_a_single_triangle() -> None:
     # The same places are triangulated once.
     again = triangulated(Frame(points + np.array([0, 0, 5.0]), 0 * points), surface)
     assert again is not None and again.mesh is surface.mesh
+
+
+# --- gauge table ---
+FILES = ("a.csv", "b.csv", "c.csv", "d.csv")
+#: Of 20 mm at rest; lost in the third frame, longest in the second.
+LENGTH = np.array([20.0, 23.0, np.nan, 22.0])
+ELONGATION = LENGTH - 20.0
+RECORD = GaugeRecord(
+    20.0, LENGTH, ELONGATION, ELONGATION / 20, np.log(LENGTH / 20), (2,),
+    (Note(NoteKind.LOST, "the lower end is lost in c.csv"),),
+)  # fmt: skip
+ENDS = (1.5, -10.0), (1.5, 10.0)
+ALONE = GaugeTable(FILES, *ENDS, RECORD)
+LOADED = GaugeTable(
+    FILES, *ENDS, RECORD,
+    LoadCurve("warp", "w1", ELONGATION[:2], np.array([5.0, 410.0]), None, None, np.array([0, 1])),
+    "the frames are out\nof order",
+)  # fmt: skip
+WITHOUT = "1 of 4 frames have a length and no load; they are left out: d.csv"
+
+
+def test_a_gauge_alone(tmp_path):
+    assert ALONE.numbers() == {
+        "gauge_length_mm": 20.0,
+        "longest": {
+            "file": "b.csv", "length_mm": 23.0, "elongation_mm": 3.0,
+            "strain": pytest.approx(0.15), "log_strain": pytest.approx(np.log(1.15)),
+        },
+        "frames": 4,
+        "lost": ["c.csv"],
+        "warnings": ["the lower end is lost in c.csv"],
+        "notes": [
+            {"of": "", "kind": "correlation lost", "note": "the lower end is lost in c.csv"}
+        ],
+    }  # fmt: skip
+    table = ALONE.frame()
+    assert list(table.columns) == [
+        "frame", "file", "length_mm", "elongation_mm", "strain", "log_strain"
+    ]  # fmt: skip
+    assert table["frame"].tolist() == [0, 1, 2, 3] and table["file"].tolist() == list(FILES)
+    for name, values in (
+        ("length_mm", LENGTH), ("elongation_mm", ELONGATION), ("strain", ELONGATION / 20),
+        ("log_strain", np.log(LENGTH / 20)),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(table[name], values)
+    assert ALONE.without_load == []
+
+
+def test_with_the_loads_of_a_machine(tmp_path):
+    numbers = LOADED.numbers()
+    loads = {key: numbers[key] for key in list(numbers)[-5:]}
+    assert loads == {
+        "direction": "warp", "specimen": "w1", "points": 2, "largest_load_N": 410.0,
+        "without_load": ["d.csv"],
+    }  # fmt: skip
+    assert numbers["warnings"] == [
+        "the lower end is lost in c.csv", "the frames are out\nof order", WITHOUT
+    ]  # fmt: skip
+    assert [note["kind"] for note in numbers["notes"]][::2] == [
+        "correlation lost", "frames without load"
+    ]  # fmt: skip
+    LOADED.write(tmp_path / "g.csv")
+    assert (tmp_path / "g.csv").read_text().splitlines()[:4] == [
+        "# virtual strain gauge between (1.5, -10) and (1.5, 10) mm, 20 mm long in the reference "
+        "state",
+        "# note: the lower end is lost in c.csv",
+        "# note: the frames are out of order",
+        f"# note: {WITHOUT}",
+    ]
+    table = pd.read_csv(tmp_path / "g.csv", comment="#")
+    assert table["file"].tolist() == ["a.csv", "b.csv"]
+    assert table["load_N"].tolist() == [5.0, 410.0]
+    assert set(table["specimen"]) == {"w1"} and set(table["direction"]) == {"warp"}
+
+
+# --- gauge loads ---
+LOADS = "time_s,load_N\n0,0\n1,10\n2,30\n"
+LOW, HIGH = (1.0, 1.0), (1.0, 9.0)
+
+
+@pytest.fixture
+def record():
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(3.0), np.arange(11.0)))
+    points = np.stack([x, y, 0 * x], axis=1)
+    frames = [Frame(points, points * [0, stretch, 0]) for stretch in (0.0, 0.1, 0.2)]
+    frames[1] = Frame(points[:20], frames[1].displacement[:20])
+    return virtual_strain_gauge(frames, LOW, HIGH)
+
+
+def test_the_table_of_a_gauge_reads_back_as_a_load_curve(record, tmp_path):
+    path = tmp_path / "machine.csv"
+    path.write_text(LOADS)
+    curve = loads_at_frames(record, PairedLoads(path, "weft", " 3 "))
+    np.testing.assert_array_equal(curve.load, [0, 30])
+    table = GaugeTable(["a", "b", "c"], LOW, HIGH, record, curve, "a note")
+    table.write(tmp_path / "gauge.csv")
+    (back,) = read_load_curves(tmp_path / "gauge.csv")
+    assert (back.direction, back.specimen) == ("fill", "3")
+    np.testing.assert_array_equal(back.elongation, curve.elongation)
+    np.testing.assert_array_equal(back.load, curve.load)
+    numbers = table.numbers()
+    assert numbers["lost"] == ["b"] and numbers["points"] == 2 and "a note" in table.notes
+    assert numbers["without_load"] == []
+
+
+def test_without_loads_every_frame_has_its_row(record):
+    table = GaugeTable(["a", "b", "c"], LOW, HIGH, record).frame()
+    assert table.frame.tolist() == [0, 1, 2] and table.file.tolist() == ["a", "b", "c"]
+    assert table.length_mm.isna().tolist() == [False, True, False]
+    assert isinstance(table, pd.DataFrame) and "load_N" not in table
+
+
+def test_loads_by_time(record, tmp_path):
+    path = tmp_path / "machine.csv"
+    path.write_text(LOADS)
+    by_interval = PairedLoads(path, "warp", "1", frame_interval=0.5, time_offset=0.5)
+    np.testing.assert_allclose(loads_at_frames(record, by_interval).load, [5, 20])
+    times = tmp_path / "times.csv"
+    times.write_text("time_s\n0.5\n1\n1.5\n")
+    by_table = PairedLoads(path, "warp", "1", frame_times=times)
+    np.testing.assert_allclose(loads_at_frames(record, by_table).load, [5, 20])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"direction": "90"}, "direction: unknown direction '90'"),
+        ({"specimen": " "}, "specimen: expected a name on one line"),
+        ({"time_offset": 1.0}, "time_offset: means nothing without frame_times or frame_interval"),
+        ({"frame_time_column": "t"}, "frame_time_column: means nothing without frame_times"),
+        ({"frame_times": Path("t"), "frame_interval": 1.0}, "frame_times, frame_interval: give"),
+        ({"frame_interval": np.inf}, "frame_interval: expected a finite number"),
+    ],
+)
+def test_what_contradicts_itself(options, words):
+    asked = {"path": Path("m.csv"), "direction": "warp", "specimen": "1"} | options
+    assert words in complaint(PairedLoads, **asked)
+
+
+def test_columns_are_asked_for_by_their_own_name(record, tmp_path):
+    path = tmp_path / "machine.csv"
+    path.write_text("F1 (N),F2 (N)\n1,2\n1,2\n1,2\n")
+    message = complaint(loads_at_frames, record, PairedLoads(path, "warp", "1"))
+    assert "with load_column" in message

@@ -1,9 +1,9 @@
-"""Formats of data files: how they are told apart, named, and added by one file or one plug-in."""
-
-from __future__ import annotations
+"""The registry of readers, and what importing them costs."""
 
 import json
 import logging
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ from bubblefit.readers.registry import (
 from ..complaints import complaint
 from ..plug_ins import install
 
+# --- registry ---
 STARRED = "*** a camera\n1 2 0 0.1 0.2 0.3\n4 5 0 0.4 0.5 0.6\n7 8 0 nan nan nan\n"
 
 
@@ -92,8 +93,7 @@ def test_names_that_are_not_there_and_files_that_are_not_there(tmp_path):
         assert "no such file" in complaint(read, tmp_path / "a.csv")
 
 
-# --- plug-ins ------------------------------------------------------------------------------------
-
+# --- plug-ins ---
 READER = """
 import json
 import numpy as np
@@ -161,3 +161,21 @@ def test_a_broken_reader_breaks_nothing_else(packages, tmp_path, caplog, text, w
     assert f"the plug-in 'json' of acme-things 2.5 {words}" in caplog.text
     with pytest.raises((PlugInFailure, InputError)):
         read_frames([path], format="json")
+
+
+# --- data imports ---
+def test_the_library_loads_without_pandas_and_scipy_spatial():
+    code = (
+        "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.polynomials;"
+        "assert not {'pandas', 'scipy.spatial'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_readers_are_where_the_package_says():
+    from bubblefit import readers as data
+
+    for name in data.__all__:
+        assert callable(getattr(data, name)), name
+    with pytest.raises(AttributeError, match="no attribute 'read_everything'"):
+        _ = data.read_everything

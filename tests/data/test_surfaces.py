@@ -1,12 +1,16 @@
-"""Polynomial surfaces fitted to displacement fields."""
-
-from __future__ import annotations
+"""Surfaces, spheres, outlines and regions of measured points."""
 
 import csv
 
 import numpy as np
 import pytest
+from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.equilibrium import apex_of, apex_shape
+from bubblefit.experiments.strips.polynomials import strain_regions
+from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField, read_fields
+from bubblefit.readers.frames import Frame
+from bubblefit.readers.spheres import _linear, fit_sphere, points_of
 from bubblefit.readers.surfaces import (
     AXES,
     DisplacementSurface,
@@ -20,19 +24,11 @@ from hypothesis import strategies as st
 from ..complaints import complaint
 
 
+# --- surfaces ---
 def equation_4_4(c: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Eq. 4.4, written out."""
-    return (
-        c[0] * x**4 * y**4 + c[1] * x**3 * y**4 + c[2] * x**2 * y**4 + c[3] * x * y**4
-        + c[4] * y**4
-        + c[5] * x**4 * y**3 + c[6] * x**3 * y**3 + c[7] * x**2 * y**3 + c[8] * x * y**3
-        + c[9] * y**3
-        + c[10] * x**4 * y**2 + c[11] * x**3 * y**2 + c[12] * x**2 * y**2 + c[13] * x * y**2
-        + c[14] * y**2
-        + c[15] * x**4 * y + c[16] * x**3 * y + c[17] * x**2 * y + c[18] * x * y
-        + c[19] * y
-        + c[20] * x**4 + c[21] * x**3 + c[22] * x**2 + c[23] * x + c[24]
-    )  # fmt: skip
+    """Eq. 4.4: C0 x^4 y^4 + C1 x^3 y^4 + ... + C24, by falling powers of y, then of x."""
+    powers = [(i, j) for j in (4, 3, 2, 1, 0) for i in (4, 3, 2, 1, 0)]
+    return sum(own * x**i * y**j for own, (i, j) in zip(c, powers, strict=True))
 
 
 def on_a_disk(count: int, seed: int, radius: float = 100.0) -> np.ndarray:
@@ -186,3 +182,231 @@ def test_real_fields_are_followed_better_by_higher_degrees(shared_data):
     assert (np.diff(r_squared, axis=0) > 0).all()
     # The thesis has 0.92 to 0.997 on its own DIC fields with degree 4 (Table 5.3).
     assert (r_squared[1] > 0.99).all()
+
+
+# --- spheres ---
+CENTRE = np.array([12.0, -7.0, 610.0])
+
+
+def cap(radius: float = 40.0, half: float = 45.0, count: int = 400, seed: int = 0):
+    """Points of a ball as a camera sees it, up to `half` degrees from the line of sight."""
+    draw = np.random.default_rng(seed)
+    height = draw.uniform(np.cos(np.radians(half)), 1.0, count)
+    turn = draw.uniform(0, 2 * np.pi, count)
+    across = np.sqrt(1 - height**2)
+    ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), -height])
+    return CENTRE + radius * ways, ways, draw
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(st.floats(0.01, 1e4), st.floats(10, 170), st.integers(0, 10**6))
+def test_a_perfect_ball_is_found_exactly(radius, half, seed):
+    points, _, _ = cap(radius, half, 60, seed)
+    found = fit_sphere(points)
+    # Places have 16 digits of 610 mm, and a small cap magnifies them.
+    rounding = 1e-13 * (1e3 + radius) / np.radians(half) ** 4 * 100
+    assert found.radius == pytest.approx(radius, rel=1e-9, abs=rounding)
+    np.testing.assert_allclose(found.centre, CENTRE, atol=rounding + 1e-9 * radius)
+    assert found.left_out == 0 and found.rms < rounding + 1e-9 * radius
+
+
+def test_the_first_guess_is_exact_without_noise():
+    centre, radius = _linear(cap(count=12)[0])
+    np.testing.assert_allclose([*centre, radius], [*CENTRE, 40.0], rtol=1e-9)
+
+
+def test_noise_moves_it_as_far_as_is_said():
+    sigma, radii, centres, errors = 0.05, [], [], []
+    for seed in range(60):
+        points, ways, draw = cap(seed=seed)
+        found = fit_sphere(points + sigma * draw.normal(size=(len(ways), 1)) * ways)
+        radii.append(found.radius)
+        centres.append(found.centre)
+        errors.append([found.radius_error, *found.centre_error])
+        assert found.rms == pytest.approx(sigma, rel=0.2)
+    mean = np.mean(errors, axis=0)
+    scatter = [np.std(radii), *np.std(centres, axis=0)]
+    # 60 repetitions know a standard deviation to 9 %.
+    np.testing.assert_allclose(scatter, mean, rtol=0.3)
+    assert abs(np.mean(radii) - 40.0) < 4 * mean[0] / np.sqrt(60)
+
+
+def test_the_linear_fit_is_too_small_by_noise():
+    """By 0.61 mm of 40 in the mean of repetitions, four of whose errors are 0.15 mm."""
+    linear, least = [], []
+    for seed in range(60):
+        points, ways, draw = cap(seed=seed)
+        noisy = points + 0.5 * draw.normal(size=(len(ways), 1)) * ways
+        near = noisy - CENTRE
+        matrix = np.column_stack([2 * near, np.ones(len(near))])
+        *centre, rest = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
+        linear.append(np.sqrt(rest + np.dot(centre, centre)))
+        least.append(fit_sphere(noisy).radius)
+    assert np.mean(linear) == pytest.approx(40 * (1 - 0.015), abs=0.15)
+    assert np.mean(least) == pytest.approx(40.0, abs=0.15)
+
+
+def test_outliers_are_left_out():
+    points, ways, draw = cap(count=1000)
+    points += 0.02 * draw.normal(size=(1000, 1)) * ways
+    points[:30] += 3.0 * ways[:30]
+    points[30] = [0.0, 0.0, 0.0]
+    found = fit_sphere(points)
+    assert not found.kept[:31].any() and found.left_out < 36
+    assert found.radius == pytest.approx(40.0, abs=4 * found.radius_error)
+    assert found.deviation[5] == pytest.approx(3.0, abs=0.1)
+
+
+def test_the_surface_of_a_frame_is_where_its_points_have_moved():
+    points, _, _ = cap(count=20)
+    still, moved = np.full_like(points, np.nan), np.tile([1.0, 2.0, 3.0], (20, 1))
+    np.testing.assert_array_equal(points_of(Frame(points, still)), points)
+    moved[4] = np.nan
+    expected = np.delete(points, 4, 0) + np.array([1, 2, 3])
+    np.testing.assert_allclose(points_of(Frame(points, moved)), expected)
+
+
+def test_points_that_tell_no_sphere():
+    points, _, _ = cap(count=9)
+    assert "10 points or more, got 9" in complaint(fit_sphere, points)
+    flat = np.random.default_rng(0).normal(size=(50, 3)) * [1, 1, 0] + 5.0
+    assert "in a plane" in complaint(fit_sphere, flat)
+    for noise in (1e-2, 1e-4, 1e-7):
+        nearly = flat + np.random.default_rng(1).normal(size=(50, 1)) * [0, 0, noise]
+        assert "in a plane" in complaint(fit_sphere, nearly)
+
+
+def test_points_that_are_kept_are_those_near_the_sphere_through_them():
+    """Within four robust standard deviations, of noise with long tails: it takes some rounds."""
+    for seed in range(1, 6):
+        points, ways, draw = cap(count=300, seed=seed)
+        points += 0.05 * draw.standard_t(2, size=(300, 1)) * ways
+        found = fit_sphere(points)
+        off = np.abs(found.deviation)
+        np.testing.assert_array_equal(found.kept, off <= 4 * np.median(off) / 0.6744897501960817)
+        assert 3 < found.left_out < 20
+        np.testing.assert_allclose(
+            found.deviation, np.linalg.norm(points - found.centre, axis=1) - found.radius
+        )
+        # Least squares: the deviations of what is kept have no mean, and no way to lean.
+        kept = points[found.kept] - found.centre
+        arms = kept / np.linalg.norm(kept, axis=1)[:, None]
+        assert found.deviation[found.kept].sum() == pytest.approx(0.0, abs=1e-8)
+        np.testing.assert_allclose(arms.T @ found.deviation[found.kept], 0.0, atol=1e-8)
+        assert found.rms == pytest.approx(np.sqrt(np.mean(off[found.kept] ** 2)))
+
+
+# --- outline ---
+@settings(max_examples=20)
+@given(major=st.floats(1.0, 500.0), ratio=st.floats(0.25, 1.0), angle=st.floats(-90, 90))
+def test_places_and_points_of_the_unit_disk_belong_together(major, ratio, angle):
+    outline = Outline(major, major * ratio, angle)
+    points = np.random.default_rng(1).uniform(-1, 1, (20, 2))
+    np.testing.assert_allclose(outline.unit(outline.places(points)), points, atol=1e-12)
+    np.testing.assert_allclose(outline.share(outline.places(points)), np.hypot(*points.T))
+    np.testing.assert_allclose(outline.share(outline.edge(9)), 1.0)
+
+
+def test_the_major_axis_lies_at_its_angle_from_the_warp():
+    outline = Outline(120.0, 80.0, 30.0)
+    along = np.array([np.cos(np.pi / 6), 0.5])
+    ends = np.array([120.0 * along, 80.0 * np.array([-along[1], along[0]])])
+    np.testing.assert_allclose(outline.share(ends), 1.0)
+    assert (np.hypot(*outline.edge(721).T).max(), outline.radius) == pytest.approx((120.0, 100.0))
+    assert not outline.round and not outline.doubly_symmetric
+    assert Outline(120.0, 80.0, -90.0).doubly_symmetric
+    assert outline.words == "semi-axes 120 and 80 mm"
+
+
+def test_equal_semi_axes_are_a_circle_whatever_the_angle():
+    points = np.random.default_rng(2).uniform(-1, 1, (20, 2))
+    for outline in (Outline.circle(80.0), Outline(80.0, 80.0, 33.0)):
+        np.testing.assert_array_equal(outline.places(points), 80.0 * points)
+        np.testing.assert_array_equal(outline.unit(points), points / 80.0)
+        assert outline.round and outline.doubly_symmetric and outline.words == "radius 80 mm"
+
+
+# --- regions ---
+def test_a_broken_line_gives_its_own_breaks_back():
+    strain = np.linspace(0.0, 0.41, 300)[1:]
+    load = 900 * strain - 700 * np.maximum(strain - 0.05, 0) + 400 * np.maximum(strain - 0.3, 0)
+    # The places of the grid are a hundredth apart.
+    assert strain_regions(strain, load) == pytest.approx((0.05, 0.3), abs=0.005)
+    # 40 places between zero and the last strain: the first and the last may be breaks, too.
+    strain = np.linspace(0.0, 0.41, 83)[1:]
+    load = 900 * strain - 700 * np.maximum(strain - 0.01, 0) + 400 * np.maximum(strain - 0.4, 0)
+    assert strain_regions(strain, load) == pytest.approx((0.01, 0.40), abs=1e-9)
+
+
+def test_points_that_tell_no_regions():
+    strain = np.linspace(0.0, 0.4, 5)
+    assert len(strain_regions(strain, strain)) == 2
+    for few in (strain[:4], 0 * strain):
+        with pytest.raises(InputError, match=f"five points are needed for regions, got {len(few)}"):
+            strain_regions(few, few)
+
+
+# --- equilibrium ---
+RADIUS, PRESSURE = 80.0, 0.05
+#: 1/mm, of the paraboloid along x and y; mm, its top; stretch of the sheet along x and y.
+CURVED, TOP, STRETCH = (0.004, 0.006), 12.0, (1.02, 1.05)
+
+
+def dome(
+    noise: float = 0.0, seed: int = 0, count: int = 400, stretch: tuple[float, float] = STRETCH
+) -> DisplacementField:
+    draw = np.random.default_rng(seed)
+    places = RADIUS * draw.uniform(-0.35, 0.35, (count, 2))
+    after = places * stretch
+    height = TOP - 0.5 * after**2 @ CURVED + noise * draw.standard_normal(count)
+    moved = np.column_stack([after - places, height - 3.0])
+    return DisplacementField(PRESSURE, places, moved, z=np.full(count, 3.0))
+
+
+def test_the_apex_of_a_paraboloid():
+    found = apex_of(dome(), RADIUS)
+    assert (found.pressure, found.height) == (PRESSURE, pytest.approx(TOP - 3.0))
+    assert found.curvature == pytest.approx(sum(CURVED))
+    assert found.force == pytest.approx(PRESSURE / sum(CURVED))  # 5 N/mm
+    assert found.strain == pytest.approx(np.log(STRETCH))
+    assert found.stiffness == pytest.approx(5.0 / np.mean(np.log(STRETCH)))
+    assert found.error == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_hollow_and_a_sheet_at_rest_have_no_force():
+    good = dome()
+    hollow = DisplacementField(PRESSURE, good.points, good.displacement * [1, 1, -1], z=None)
+    found = apex_of(hollow, RADIUS)
+    assert found.curvature == pytest.approx(-sum(CURVED))
+    assert found.force == found.error == np.inf
+    still = apex_of(DisplacementField(PRESSURE, good.points, good.displacement * [0, 0, 1]), RADIUS)
+    assert still.strain == pytest.approx((0.0, 0.0), abs=1e-12)
+    squeezed = DisplacementField(PRESSURE, good.points, good.displacement * [-1, -1, 1])
+    assert apex_of(squeezed, RADIUS).stiffness == np.inf
+
+
+def test_the_standard_error_is_that_of_repetitions():
+    """Of a sheet that is hardly stretched: what the stretch takes from it is not reckoned."""
+    found = [apex_of(dome(0.02, seed, stretch=(1.0, 1.001)), RADIUS) for seed in range(200)]
+    scatter = np.std([apex.force for apex in found])
+    # 200 repetitions know a standard deviation to 5 %.
+    assert np.mean([apex.error for apex in found]) == pytest.approx(scatter, rel=0.15)
+
+
+def test_points_about_the_centre():
+    """Thirty: twice as many as a surface of degree four has coefficients; none beyond half way."""
+    good = dome(count=30)
+    apex_of(good, RADIUS)
+    for points in (good.points[1:], np.vstack([good.points[1:], [[0.5 * RADIUS, 0.0]]])):
+        moved = np.zeros((len(points), 3))
+        few = complaint(apex_of, DisplacementField(PRESSURE, points, moved), RADIUS)
+        assert few == "expected 30 points about the centre, got 29"
+    values = np.full((31, 1), 2.0)
+    values[30] = np.nan
+    shape = apex_shape(np.vstack([good.points, [[0.0, 0.0]]]), values, RADIUS)
+    assert shape.near.tolist() == [True] * 30 + [False]
+    # x^3 y / 7: its one derivative that is not zero at the centre is 6 / 7.
+    x, y = good.points.T
+    cubic = apex_shape(good.points, (x**3 * y / 7)[:, None], RADIUS)
+    assert cubic.at_centre(3, 1) == pytest.approx([6 / 7])
+    assert cubic.at_centre(1, 1) == pytest.approx([0.0], abs=1e-6)

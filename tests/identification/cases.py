@@ -1,7 +1,5 @@
 """A quarter bubble of 45 quads with a known solution, for the tests of this room."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

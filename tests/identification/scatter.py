@@ -1,7 +1,5 @@
 """What fits to noisy data scatter by, for the tests of what is said of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,6 +1,4 @@
-"""How good a fit is, and how sure."""
-
-from __future__ import annotations
+"""Uncertainty of a fit: covariance, information, correlation, chi square."""
 
 from dataclasses import replace
 
@@ -10,8 +8,10 @@ from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import Certainty, _on_bounds, certainty, moduli_error, pinned_by
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
 from bubblefit.inference.discretisation import Limit
+from bubblefit.inference.linear import Asked, information, summary
 from bubblefit.inference.methods.descent import descend
-from bubblefit.inference.noise import Noise
+from bubblefit.inference.misfit import CHANCE, NoiseTest, noise_tests, notes_of_noise
+from bubblefit.inference.noise import Misfit, Noise, alike, alike_in
 from bubblefit.inference.problem import Evaluation, FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.registry import form_named
@@ -19,24 +19,20 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.ndimage import gaussian_filter
 
-from .cases import CONSTANT, CUBIC, LAW, MODEL, PRESSURES, problem, single, targets
+from . import cases
+from .cases import CONSTANT, CUBIC, LAW, MODEL, PRESSURES, problem, reference, single, targets
 from .scatter import follows, scatter_of
 
+# --- assessment ---
 REACHED = np.array([0.08, 0.08, 0.08])
 FLAT_LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 PRESSURE = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
 PRESSED = replace(CONSTANT, nuisance=NuisanceOf({"bubble": (PRESSURE,)}))
 
 
-def test_moduli_error_is_the_largest_relative_one() -> None:
-    law = HypoelasticLaw.linear(303.0, 220.0, 5.0)
-    known_law = HypoelasticLaw.linear(300.0, 220.0, 4.0)
-    error = moduli_error(law, known_law, np.array([0.1, 0.1, 0.1]))
-    assert error == pytest.approx({"E1": 0.01, "E2": 0.0, "G12": 0.25})
-
-
-def test_moduli_error_looks_at_every_strain() -> None:
+def test_moduli_error_looks_at_every_strain():
     """Off in the middle, at the start, at the end; and beyond the strain reached, which is left."""
     breaks = [[0.03, 0.06]] * 3
     known = HypoelasticLaw.trilinear([300.0] * 3, [220.0] * 3, [4.0] * 3, breaks)
@@ -48,7 +44,7 @@ def test_moduli_error_looks_at_every_strain() -> None:
     assert part == pytest.approx({"E1": 0.0, "E2": 0.05, "G12": 0.0})
 
 
-def test_certainty_predicts_the_scatter_of_noisy_fits() -> None:
+def test_certainty_predicts_the_scatter_of_noisy_fits():
     """Sigma is the scatter of linear estimates from drawn noise; a real fit goes where they do."""
     fit, moduli, noise = problem(CONSTANT), np.array([12.0, 250.0, 400.0]), 0.05
     clean = MembraneSolver(1e-10).run(MODEL, FLAT_LAW)
@@ -73,7 +69,7 @@ def test_certainty_predicts_the_scatter_of_noisy_fits() -> None:
     assert np.abs(off / scatter).max() < 0.05  # 0.016: G12 is not quite linear
 
 
-def test_what_a_nuisance_hides_is_not_determined() -> None:
+def test_what_a_nuisance_hides_is_not_determined():
     """At a single pressure that is not known for sure, moduli can only be told up to a factor."""
     model = replace(MODEL, pressures=PRESSURES[-1:], increments=PRESSURES)
     without, beside = flat(CONSTANT, model), flat(PRESSED, model)
@@ -101,8 +97,7 @@ def evaluated(fit: FitProblem) -> Evaluation:
     return point
 
 
-def test_what_the_data_never_reach_is_not_certain() -> None:
-    """Knots far beyond the strains reached do not change the residual at all."""
+def test_what_the_data_never_reach_is_not_certain():
     ends = [0.13, 0.13, 0.6]
     form = form_named("spline", {"knots": 7}, ends)
     ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
@@ -117,7 +112,7 @@ def test_what_the_data_never_reach_is_not_certain() -> None:
     assert any(words.startswith("G12 is uncertain") for words in sure.undetermined)
 
 
-def test_words_name_what_lies_on_its_bound() -> None:
+def test_words_name_what_lies_on_its_bound():
     fit = problem(replace(CUBIC, nuisance=NuisanceOf({"bubble": (PRESSURE,)})))
     y = fit.unknowns.at(np.where(np.arange(12) == 0, CUBIC.box[1], LAW.beta))
     y[12] = PRESSURE.lower
@@ -131,7 +126,7 @@ def test_words_name_what_lies_on_its_bound() -> None:
     assert "E2 touches its positivity margin: the data ask for less stiffness" in words
 
 
-def test_noise_and_mesh_together() -> None:
+def test_noise_and_mesh_together():
     sigma = {"E1": np.array([0.3, 0.5]), "E2": np.array([0.1, 0.1])}
     mesh = {"E1": np.array([-0.4, 1.2]), "E2": np.array([0.0, 0.0])}
     alone = Certainty({}, {}, sigma, ())
@@ -141,11 +136,232 @@ def test_noise_and_mesh_together() -> None:
     assert together["E2"].tolist() == pytest.approx([0.1, 0.1])
 
 
-def test_bounds_are_touched_within_a_millionth_of_their_width() -> None:
+def test_bounds_are_touched_within_a_millionth_of_their_width():
     values = np.array([2.0 + 1e-6, 2.0 + 3e-6, 4.0 - 1e-6, 4.0 - 3e-6, 3.0])
     notes = _on_bounds("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
-    assert [str(note) for note in notes] == [
-        "a lies on its lower bound",
-        "c lies on its upper bound",
-    ]
+    assert [str(note)[:19] for note in notes] == ["a lies on its lower", "c lies on its upper"]
     assert {note.kind for note in notes} == {NoteKind.BOUND}
+
+
+# --- information ---
+INFORMATION_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
+UNKNOWNS = Unknowns.of(
+    INFORMATION_LAW.form, 0.24, [0.1] * 3,
+    LawBounds.of_moduli({"E1": (1.0, 900.0), "E2": (1.0, 900.0), "G12": (0.1, 90.0)}),
+)  # fmt: skip
+Y = UNKNOWNS.at(INFORMATION_LAW.beta[list(UNKNOWNS.free)])
+
+
+def asked() -> Asked:
+    """Constant moduli; the unknowns are G12, E2, E1, each in a unit of its own."""
+    return Asked(UNKNOWNS, INFORMATION_LAW, Y, np.array([0.1, 0.1, 0.05]))
+
+
+def test_nuisance_is_what_the_whole_covariance_says_it_is():
+    """The inverse of what is left is the law's part of the covariance of all unknowns."""
+    random = np.random.default_rng(1)
+    slopes, sigma = random.standard_normal((40, 5)), random.uniform(0.5, 2.0, 40)
+    offsets = (Nuisance("a", -2.0, 2.0, "mm", prior=0.3), Nuisance("b", -1e-2, 1e-2, "kPa"))
+    # The second may lie anywhere within ten times the width of its bounds.
+    before = np.diag([0.0, 0.0, 0.0, 0.3**-2, 0.2**-2])
+    rows = slopes / sigma[:, None]
+    whole = np.linalg.inv(rows.T @ rows + before)
+    left = information(slopes, sigma, offsets)
+    np.testing.assert_allclose(np.linalg.inv(left), whole[:3, :3], rtol=1e-9)
+    # And it is less than without nuisance.
+    alone = information(slopes[:, :3], sigma)
+    np.testing.assert_allclose(alone, rows[:, :3].T @ rows[:, :3], rtol=1e-12)
+    assert (np.linalg.eigvalsh(alone - left) > 0).all()
+
+
+def test_values_that_only_a_nuisance_explains_say_nothing():
+    """A slope that is the same as that of an unknown offset (all but free) is lost."""
+    slopes = np.column_stack([np.ones(9), np.arange(9.0), np.ones(9)])
+    left = information(slopes, 1.0, (Nuisance("offset", -1e6, 1e6, "mm"),))
+    assert left[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert left[1, 1] == pytest.approx(60.0)
+
+
+def test_a_modulus_of_which_nothing_is_known_is_unknown():
+    """Without any test 1000 % of each; with E2 known to 2 % the others stay unknown."""
+    nothing = asked().sigma(np.zeros((3, 3)))
+    for name in ("E1", "E2", "G12"):
+        np.testing.assert_allclose(nothing[name], 10.0, rtol=1e-9)
+    one = np.diag([0.0, (0.02 * Y[1]) ** -2, 0.0])
+    found = summary(asked().sigma(one))
+    assert found["E2"] == pytest.approx(0.02, rel=1e-4)
+    assert [found["E1"], found["G12"]] == pytest.approx([10.0, 10.0])
+    assert summary({"E1": np.array([3.0, 4.0])}) == {"E1": pytest.approx(np.sqrt(12.5))}
+
+
+def test_a_direction_of_which_nothing_is_known_is_unknown():
+    """Only the product E1 G12 is measured: neither is known, however well the product is."""
+    slope = np.array([[1 / Y[0], 0.0, 1 / Y[2]]])
+    known = information(slope, 1e-3) + np.diag([0.0, (0.01 * Y[1]) ** -2, 0.0])
+    found = summary(asked().sigma(known))
+    assert [found["E1"], found["G12"]] == pytest.approx([10 / np.sqrt(2)] * 2, rel=1e-4)
+    assert found["E2"] == pytest.approx(0.01, rel=1e-4)
+
+
+# --- correlation ---
+SIDE, STEP = 40, 2.5
+NODES = MODEL.mesh.points[:, :2]
+PLACES = STEP * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
+
+
+def noise(width: float, count: int, seed: int = 3) -> list[np.ndarray]:
+    """Fields that are alike over a Gaussian of `width` steps: 4 pi width^2 err as one."""
+    random = np.random.default_rng(seed)
+    fields = random.standard_normal((count, SIDE, SIDE))
+    if width:
+        fields = np.array([gaussian_filter(field, width, mode="wrap") for field in fields])
+    return [field.reshape(-1) for field in fields]
+
+
+def smooth(length: float) -> np.ndarray:
+    """A root of the correlation of neighbours, (places, places)."""
+    distance = np.hypot(*(NODES[:, None] - NODES).T)
+    return np.linalg.cholesky(np.exp(-((distance / length) ** 2)) + 1e-9 * np.eye(len(NODES)))
+
+
+@pytest.mark.parametrize("width", [0.0, 0.7, 1.0, 1.5])
+def test_smoothed_noise(width):
+    fields = noise(width, 24)
+    expected = max(1.0, 4 * np.pi * width**2)
+    assert alike(fields, [PLACES] * 24) == pytest.approx(expected, rel=0.15)
+
+
+def test_blocks_count_alike_whatever_their_size():
+    fields, places = noise(1.0, 12), [PLACES] * 12
+    sizes = np.array([1.0, 100.0] * 6)
+    scaled = [size * field for size, field in zip(sizes, fields, strict=True)]
+    assert alike(scaled, places) == pytest.approx(alike(fields, places), rel=1e-12)
+    # What changes its sign from point to point counts as independent; so does nothing at all.
+    field = (-1.0) ** np.indices((SIDE, SIDE)).sum(axis=0).reshape(-1)
+    assert alike([field], [PLACES]) == alike([], []) == 1.0
+    assert alike([np.zeros(5), np.ones(1)], [PLACES[:5], PLACES[:1]]) == 1.0
+
+
+def test_the_scatter_of_an_estimate():
+    """A slope fitted to noise scatters as fewer independent values would have it."""
+    x = PLACES[:, 0] - PLACES[:, 0].mean()
+    fields = noise(1.0, 400, seed=11)
+    scatter = np.std([x @ field / (x @ x) for field in fields])
+    white = np.std(fields) / np.sqrt(x @ x)
+    said = white * np.sqrt(alike(fields[:30], [PLACES] * 30))
+    assert scatter == pytest.approx(said, rel=0.12)
+    assert scatter > 3 * white
+
+
+def test_a_fit_is_as_much_less_sure():
+    random = np.random.default_rng(5)
+    nodes, found = NODES, {}
+    for name, mix in (("white", np.eye(len(nodes))), ("shared", smooth(20.0))):
+        problem = cases.problem()
+        (comparison,) = problem.comparisons
+        objective = comparison.objective
+        moved = [t.displacement + 0.2 * mix @ random.standard_normal((len(nodes), 3))
+                 for t in objective.targets]  # fmt: skip
+        objective.targets = tuple(
+            replace(t, displacement=u, at_rest=nodes)
+            for t, u in zip(objective.targets, moved, strict=True)
+        )
+        point = problem.evaluate(problem.unknowns.at(cases.LAW.beta), True)
+        found[name] = certainty(problem, point, cases.LAW, np.full(3, 0.08))
+        if name == "shared":
+            assert alike_in(objective, point.residual) == found[name].alike["bubble"]
+    assert found["white"].alike["bubble"] == pytest.approx(1.0, abs=0.15)
+    assert 3.0 < found["shared"].alike["bubble"] < 12.0
+    for name in ("E1", "E2", "G12"):
+        ratio = found["shared"].sigma[name] / found["white"].sigma[name]
+        noise_ratio = found["shared"].noise["bubble"] / found["white"].noise["bubble"]
+        many = found["shared"].alike["bubble"] / found["white"].alike["bubble"]
+        # Noise that is shared leaves blocks of other norms, and so of other weights.
+        assert ratio == pytest.approx(noise_ratio * np.sqrt(many), rel=0.15)
+
+
+def test_a_misfit_below_the_noise_does_not_tell():
+    """Here it is a smooth one of 0.03 mm, beside 0.05 mm to reckon with."""
+    problem = cases.problem()
+    objective, nodes = problem.comparisons[0].objective, cases.MODEL.mesh.points[:, :2]
+    objective.targets = tuple(
+        replace(t, displacement=t.displacement + 0.03, at_rest=nodes) for t in objective.targets
+    )
+    point = problem.evaluate(problem.unknowns.at(cases.LAW.beta), True)
+    assert certainty(problem, point, cases.LAW, np.full(3, 0.08)).alike == {"bubble": 1.0}
+
+
+def test_along_a_curve():
+    """Of readings that follow each other by 0.6, (1 + 0.6) / (1 - 0.6) = 4 err as one."""
+    random = np.random.default_rng(2)
+    places = np.arange(2000.0)[:, None]
+    white = random.standard_normal((6, 2000))
+    follow = np.zeros_like(white)
+    for k in range(1, 2000):
+        follow[:, k] = 0.6 * follow[:, k - 1] + white[:, k]
+    fine = places[:60]
+    pieces = [piece for one in follow for piece in np.split(one[:1980], 33)]
+    assert alike(pieces, [fine] * len(pieces)) == pytest.approx(4.0, rel=0.15)
+    for count in (10, 100):
+        found = [alike([random.standard_normal(count)], [places[:count]]) for _ in range(60)]
+        assert np.median(found) == 1.0 and np.mean(found) < 1.15
+
+
+# --- chi square ---
+NOISE = 0.05
+
+
+def fit(given: float | None) -> FitProblem:
+    places = MODEL.mesh.points[:, :2]
+    fields = zip(MODEL.pressures, reference().displacement, strict=True)
+    targets = [FieldTarget(p, u, at_rest=places) for p, u in fields]
+    objective = FieldObjective(targets, "e", noise=given)
+    return single(MODEL, MembraneSolver(), LAW, objective, CONSTANT)
+
+
+@pytest.mark.parametrize("length", [1e-3, 15.0])
+def test_noise_as_it_is_given_is_seldom_told(length):
+    """White, or alike over a facet: in one of fifty, twice; more and less are always told."""
+    root, told = smooth(length), {0.5: 0, 1.0: 0, 2.0: 0}
+    problem, random = fit(NOISE), np.random.default_rng(3)
+    fields, count = len(MODEL.pressures), 30
+    for _ in range(count):
+        noise = np.concatenate(
+            [(root @ random.standard_normal((len(root), 3))).T.ravel() for _ in range(fields)]
+        )
+        for times in told:
+            tests = noise_tests(problem, NOISE * times * noise / problem.scale)
+            kinds = [note.kind for note in notes_of_noise(tests)]
+            expected = {0.5: [NoteKind.BELOW_NOISE], 2.0: [NoteKind.ABOVE_NOISE]}
+            told[times] += kinds == expected.get(times, kinds) and bool(kinds)
+    assert told[1.0] <= 2
+    assert told[0.5] == told[2.0] == count
+
+
+def test_what_is_counted():
+    problem = fit(NOISE)
+    residual = np.random.default_rng(5).standard_normal(len(problem.scale)) * NOISE / problem.scale
+    (test,) = noise_tests(problem, residual).values()
+    assert test.values == len(residual) and test.free == pytest.approx(test.independent - 3)
+    assert test.square == pytest.approx(test.independent * test.misfit.ratio**2)
+    assert test.above + test.below == pytest.approx(1.0)
+    # Nobody gave it: nothing is tested.
+    assert noise_tests(fit(None), residual) == {}
+
+
+def test_what_is_told():
+    above = NoiseTest(Misfit(4.54, 3.0, "given", "N"), 300, 30.0, 29.0)
+    below = NoiseTest(Misfit(1.5, 3.0, "given", "N"), 300, 30.0, 29.0)
+    few = NoiseTest(Misfit(4.54, 3.0, "given", "N"), 300, 3.0, 2.0)
+    # However many values say it: a twentieth is no matter.
+    little = NoiseTest(Misfit(3.15, 3.0, "given", "N"), 10**6, 1e6, 1e6)
+    assert little.above < CHANCE
+    notes = notes_of_noise({"warp": above, "fill": below, "bias": few, "other": little})
+    assert [(n.kind, n.of) for n in notes] == [
+        (NoteKind.ABOVE_NOISE, "warp"), (NoteKind.BELOW_NOISE, "fill"),
+    ]  # fmt: skip
+    said = "4.54 N RMS, 1.51 times the noise given (3 N; 300 values count as 30 independent ones)"
+    assert said in notes[0]
+    assert "the noise is given too large" in notes[1]
+    assert above.numbers["probability_of_more"] == above.above < CHANCE < few.above
+    assert Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf

@@ -1,21 +1,35 @@
-"""What a fit knows of its unknowns, on a linear problem whose answer is a formula."""
-
-from __future__ import annotations
+"""Draws of laws: posterior, truncated normal, likelihood, discrepancy."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from bubblefit.inference import posterior as truncated
 from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
 from bubblefit.inference.discretisation import Limit
+from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
+from bubblefit.inference.linear import Linear as LinearFit
 from bubblefit.inference.linear import posteriors_of
+from bubblefit.inference.misfit import (
+    Discrepancy,
+    discrepancy,
+    notes_of_discrepancies,
+    smooth_shapes,
+)
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.posterior import Posterior, bands_of
-from bubblefit.inference.problem import Evaluation
+from bubblefit.inference.posterior import Posterior, bands_of, truncated_draws
+from bubblefit.inference.problem import Evaluation, WeightedProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import NoteKind
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import minimize
+from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
 
+from .cases import CONSTANT, EVERYTHING, levenberg_marquardt, problem
+
+# --- posterior ---
 OFFSET = Nuisance("offset", -2.0, 2.0, "mm")
 BOUNDS = LawBounds.of_entries(
     [1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0], {"E1": 5.0, "E2": 5.0, "G12": 0.5}
@@ -41,6 +55,10 @@ PROBLEM = Linear(UNKNOWNS, Blocks(SIZES))
 RANDOM = np.random.default_rng(8)
 JACOBIAN = RANDOM.standard_normal((sum(SIZES), 4))
 ROWS = SIGMA[PROBLEM.blocks.of]
+#: The covariance of estimates whose blocks are weighted with the inverse of their norms.
+WEIGHT = 1.0 / (SIGMA * np.sqrt(SIZES))[PROBLEM.blocks.of]
+GAIN = np.linalg.inv(JACOBIAN.T @ (WEIGHT[:, None] * JACOBIAN)) @ JACOBIAN.T * WEIGHT
+FORMULA = (GAIN * ROWS) @ (GAIN * ROWS).T
 
 
 def noise(rows: np.ndarray = ROWS) -> Noise:
@@ -66,21 +84,16 @@ def best_of(drawn: np.ndarray) -> np.ndarray:
     return np.asarray(y)
 
 
-def test_the_covariance_is_that_of_the_fits_to_drawn_noise() -> None:
-    """And that of the formula: blocks weighted with the inverse of their norms."""
+def test_the_covariance_is_that_of_the_fits_to_drawn_noise():
     drawn = ROWS * np.random.default_rng(3).standard_normal((800, len(ROWS)))
     found = np.array([best_of(one) for one in drawn])
     said = of(PROBLEM, evaluation(best_of(drawn[0]), drawn[0]), Noise({}, {}, ROWS, 0.5 * ROWS))
     assert found.std(axis=0) == pytest.approx(said.sigma, rel=0.08)
-    w = 1.0 / (SIGMA * np.sqrt(SIZES))[PROBLEM.blocks.of]
-    gain = np.linalg.inv(JACOBIAN.T @ (w[:, None] * JACOBIAN)) @ JACOBIAN.T * w
-    formula = (gain * ROWS) @ (gain * ROWS).T
-    assert said.covariance == pytest.approx(formula, rel=0.1, abs=0.05 * np.abs(formula).max())
+    assert said.covariance == pytest.approx(FORMULA, rel=0.1, abs=0.05 * np.abs(FORMULA).max())
     assert said.centre == pytest.approx(said.best, abs=1e-6)
 
 
-def test_of_the_coefficients() -> None:
-    """In MPa, from one place; correlations are theirs; the nuisance follows in mm."""
+def test_of_the_coefficients():
     posterior = of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise())
     t = UNKNOWNS.to_coefficients
     expected = t @ posterior.covariance[:3, :3] @ t.T
@@ -92,24 +105,21 @@ def test_of_the_coefficients() -> None:
     assert np.diag(posterior.correlations) == pytest.approx(np.ones(4))
 
 
-def test_an_exact_fit_weighs_its_blocks_by_the_noise_to_reckon_with() -> None:
+def test_an_exact_fit_weighs_its_blocks_by_the_noise_to_reckon_with():
     exact = of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise())
-    w = 1.0 / (SIGMA * np.sqrt(SIZES))[PROBLEM.blocks.of]
-    gain = np.linalg.inv(JACOBIAN.T @ (w[:, None] * JACOBIAN)) @ JACOBIAN.T * w
-    assert exact.covariance == pytest.approx((gain * ROWS) @ (gain * ROWS).T)
+    assert exact.covariance == pytest.approx(FORMULA)
     nothing = of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise(0 * ROWS))
     assert not nothing.covariance.any()
 
 
-def test_the_centre_lies_where_the_data_ask_for_it() -> None:
-    """A best fit held by a bound: the least without it is outside."""
+def test_the_centre_lies_where_the_data_ask_for_it():
     held = TRUTH - [0.02, 0.0, 0.0, 0.0]
     posterior = of(PROBLEM, evaluation(held, 0 * ROWS), noise())
     assert posterior.centre == pytest.approx(TRUTH, abs=1e-12)
     assert (posterior.best == held).all()
 
 
-def test_laws_are_drawn_within_the_bounds() -> None:
+def test_laws_are_drawn_within_the_bounds():
     """One unknown lies on its bound, which cuts off half of what the data leave."""
     y = np.append(UNKNOWNS.at(np.array([1.0, 250.0, 400.0]))[:3], 2.0)
     covariance = np.diag([0.02, 1e-4, 1e-4, 0.1]) ** 2
@@ -126,7 +136,7 @@ def test_laws_are_drawn_within_the_bounds() -> None:
     assert all((one.beta == two.beta).all() for one, two in zip(laws, same, strict=True))
 
 
-def test_of_a_finer_model() -> None:
+def test_of_a_finer_model():
     """Its own best unknowns, their centre by its own residual, and a tenth of the way as doubt."""
     y, error = TRUTH + 0.01, JACOBIAN @ np.full(4, -0.02)
     point = evaluation(y, 0 * ROWS)
@@ -138,7 +148,7 @@ def test_of_a_finer_model() -> None:
     assert fine.covariance - own.covariance == pytest.approx(np.full((4, 4), 0.002**2))
 
 
-def test_bands_hold_their_share_and_the_law_itself() -> None:
+def test_bands_hold_their_share_and_the_law_itself():
     """Of an unbounded modulus 1.96 sigma to both sides; of one on its bound to one side only."""
     y = np.append(UNKNOWNS.at(np.array([1.0, 250.0, 400.0]))[:3], 0.0)
     posterior = Posterior(UNKNOWNS, y, y, np.diag([0.02, 1e-2, 1e-2, 0.1]) ** 2)
@@ -157,3 +167,241 @@ def test_bands_hold_their_share_and_the_law_itself() -> None:
     assert upper - 1.0 == pytest.approx([half_normal] * 2, rel=0.15)
     other = HypoelasticLaw.linear(600.0, 250.0, 1.0)
     assert bands_of(posterior, other, strains)["E1"][1] == pytest.approx([600.0, 600.0])
+
+
+# --- truncated ---
+COUNT = 4000
+COVARIANCE = np.array([[4.0, 1.5], [1.5, 1.0]])
+NOTHING = (np.zeros((0, 2)), np.zeros(0))
+
+
+def draws(mean: object, inequalities: tuple[object, object], allowed: object) -> np.ndarray:
+    a, c = (np.asarray(v, dtype=float) for v in inequalities)
+    drawn = truncated_draws(
+        np.asarray(mean, dtype=float), COVARIANCE, (a, c), np.asarray(allowed, dtype=float),
+        COUNT, np.random.default_rng(5),
+    )  # fmt: skip
+    assert drawn.shape == (COUNT, 2)
+    assert (drawn @ a.T >= c - 1e-7).all()
+    return drawn
+
+
+def test_without_bounds_it_is_the_normal_distribution():
+    drawn = draws([1.0, -2.0], NOTHING, [1.0, -2.0])
+    assert drawn.mean(axis=0) == pytest.approx([1.0, -2.0], abs=0.12)
+    assert np.cov(drawn.T) == pytest.approx(COVARIANCE, rel=0.1)
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_on_a_bound_it_is_half_of_it(walks, monkeypatch):
+    if walks:
+        monkeypatch.setattr(truncated, "MOST_DRAWS", 1)
+    drawn = draws([0.0, 0.0], ([[1.0, 0.0]], [0.0]), [0.0, 0.0])
+    assert kstest(drawn[:, 0], halfnorm(scale=2.0).cdf).pvalue > 0.01
+    # The other follows:  y1 | y0  is normal about 1.5 / 4 y0 with 1 - 1.5^2 / 4.
+    rest = drawn[:, 1] - 0.375 * drawn[:, 0]
+    assert kstest(rest, norm(scale=np.sqrt(1 - 1.5**2 / 4)).cdf).pvalue > 0.01
+
+
+def test_a_mean_far_outside():
+    """Five standard deviations: nothing drawn again would do, and it lies near the bound."""
+    drawn = draws([-10.0, 0.0], ([[1.0, 0.0], [-1.0, 0.0]], [0.0, -6.0]), [0.0, 0.0])
+    cut = truncnorm(5.0, 8.0, loc=-10.0, scale=2.0)
+    assert kstest(drawn[:, 0], cut.cdf).pvalue > 0.01
+    assert drawn[:, 0].mean() < 0.5
+
+
+def test_in_a_corner():
+    identity, random = np.eye(3), np.random.default_rng(1)
+    mean, c = np.array([-3.0, 0.0, 4.0]), np.zeros(3)
+    drawn = truncated_draws(mean, identity, (identity, c), c, COUNT, random)
+    for k, middle in enumerate(mean):
+        assert kstest(drawn[:, k], truncnorm(-middle, np.inf, loc=middle).cdf).pvalue > 0.01
+
+
+def test_what_has_no_room_stays():
+    drawn = draws([3.0, 0.0], ([[1.0, 0.0], [-1.0, 0.0]], [1.0, -1.0]), [1.0, 0.0])
+    assert drawn[:, 0] == pytest.approx(np.ones(COUNT), abs=1e-9)
+    given = norm(0.375 * (1.0 - 3.0), np.sqrt(1 - 1.5**2 / 4))
+    assert kstest(drawn[:, 1], given.cdf).pvalue > 0.01
+
+
+def test_what_has_no_variance_stays():
+    random, none = np.random.default_rng(0), np.zeros((2, 2))
+    assert (truncated_draws(np.ones(2), none, NOTHING, np.ones(2), 3, random) == 1.0).all()
+    above = np.eye(2), np.zeros(2)
+    drawn = truncated_draws(np.zeros(2), np.diag([1.0, 0.0]), above, np.zeros(2), 100, random)
+    assert (drawn[:, 0] >= 0).all() and drawn[:, 0].std() > 0.4 and not drawn[:, 1].any()
+
+
+def test_between_bounds_that_are_close_to_each_other():
+    """A slab of a thousandth of a standard deviation, askew: along it everything is drawn."""
+    across, along = np.array([[0.6, 0.8, 0.0], [0.8, -0.6, 0.0]])
+    inequalities = np.array([across, -across]), np.array([2.0, -2.001])
+    random = np.random.default_rng(2)
+    drawn = truncated_draws(np.zeros(3), np.eye(3), inequalities, 2.0 * across, COUNT, random)
+    assert kstest(drawn @ along, norm.cdf).pvalue > 0.01
+    assert kstest(drawn[:, 2], norm.cdf).pvalue > 0.01
+    assert kstest(drawn @ across, uniform(2.0, 0.001).cdf).pvalue > 0.01
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-8, 3e-9])
+def test_oblique_bounds_that_nearly_meet(width):
+    """Between x + y = 0 and a width more: rounding of so sharp a curvature is larger than one."""
+    rows = np.array([[1.0, 1.0, 0.3], [-1.0, -1.0, -0.3], [0.2, -0.7, 1.0]])
+    least = np.array([0.0, -width, -50.0])
+    start = np.array([width / 2, 0.0, 0.0])
+    random = np.random.default_rng(4)
+    drawn = truncated_draws(np.zeros(3), np.eye(3), (rows, least), start, COUNT, random)
+    across = drawn @ rows[0]
+    assert across.min() >= -1e-9 and across.max() <= width + 1e-9
+    along = drawn @ np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    assert along.std() == pytest.approx(1.0, abs=0.05)
+
+
+# --- likelihood ---
+#: mm: so much that G12 is off its first order.
+NOISE = 0.3
+
+
+@pytest.fixture(scope="module")
+def bubble():
+    """A fit of constants to noisy fields: problem, optimum, and the fit to first order."""
+    fit = problem(CONSTANT, noise=NOISE)
+    found = levenberg_marquardt(fit, CONSTANT.at(np.array([15.0, 190.0, 330.0])), 1e-9, 60)
+    return fit, found.best, Noise.of(fit, found.best.residual)
+
+
+def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
+    fit, best, noise = bubble
+    linear = LinearFit.of(fit, best, noise)
+    row = modulus_row(fit.unknowns, "G12", 0.0)
+    assert row @ best.unknowns == pytest.approx(best.coefficients[0])
+    own = WeightedProblem.of(fit, linear.weights / np.sqrt(linear.spread_over_curvature(row)))
+    posterior, _ = posteriors_of(fit, best, noise)
+    sigma = float(np.sqrt(row @ posterior.covariance @ row))
+    side = profile_side(own, own.seen(best), row, 1.0, sigma)
+    assert side.why == "" and side.ratios[-1] >= THRESHOLD > side.ratios[-2]
+    # Few analyses a place, and the objective of the fit itself is left as it was.
+    assert side.analyses <= 3 * len(side.values)
+    assert fit.evaluate(best.unknowns, False).value == pytest.approx(best.value, rel=1e-9)
+
+    value, ratio = side.values[3], side.ratios[3]
+    held = value / row[0]
+
+    def squares(others: np.ndarray) -> float:
+        point = own.evaluate(np.array([held, *others]), False)
+        return np.inf if point is None else float(point.residual @ point.residual)
+
+    start = best.unknowns[1:]
+    found = minimize(squares, start, method="Nelder-Mead",
+                     options={"xatol": 1e-5, "fatol": 1e-3, "maxfev": 60})  # fmt: skip
+    seen = own.seen(best).residual
+    assert found.fun - seen @ seen == pytest.approx(ratio, abs=0.03)
+
+
+def test_bounds_of_a_modulus(bubble):
+    unknowns = bubble[0].unknowns
+    row = modulus_row(unknowns, "E1", 0.05)
+    assert extreme(unknowns, row, -1.0) == pytest.approx(50.0, rel=1e-6)
+    assert extreme(unknowns, row, 1.0) == pytest.approx(1500.0, rel=1e-6)
+    # Nuisance is no part of a modulus.
+    whole = modulus_row(EVERYTHING, "G12", 0.02)
+    assert len(whole) == EVERYTHING.count and not whole[EVERYTHING.size :].any()
+
+
+def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
+    fit, best, noise = bubble
+    linear = LinearFit.of(fit, best, noise)
+    row = modulus_row(fit.unknowns, "E1", 0.0)
+    own = WeightedProblem.of(fit, linear.weights)
+    whole, start = own.evaluate, float(row @ best.unknowns)
+    sigma = 0.02 * start
+
+    def fails(y: np.ndarray, *rest: bool):
+        return None if row @ y > start + 0.7 * sigma else whole(y, *rest)
+
+    monkeypatch.setattr(own, "evaluate", fails)
+    side = profile_side(own, own.seen(best), row, 1.0, sigma)
+    assert side.why == FAILED and side.end is None
+    assert start + 0.5 * sigma <= side.values[-1] <= start + 0.7 * sigma
+
+
+# --- discrepancy ---
+SIDE, BLOCKS = 32, 9
+PLACES = 4.0 * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
+SHAPES = smooth_shapes(PLACES)
+NO_DOUBT = [np.zeros(SIDE**2)] * BLOCKS
+
+
+def smooth_noise(random: np.random.Generator, width: float, size: float = 0.02) -> list[np.ndarray]:
+    """Blocks of noise that is alike over a Gaussian of `width` steps."""
+    fields = random.standard_normal((BLOCKS, SIDE, SIDE))
+    if width:
+        fields = np.array([gaussian_filter(one, width, mode="wrap") for one in fields])
+    return [size * one.reshape(-1) / one.std() for one in fields]
+
+
+def judged(blocks: list[np.ndarray], doubts: list[np.ndarray] = NO_DOUBT, unknowns: int = 3):
+    found = discrepancy(blocks, doubts, [PLACES] * BLOCKS, unknowns, "mm")
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("width", [0.0, 0.7])
+def test_noise_is_taken_for_more_in_one_of_a_hundred(width):
+    """Whatever its facet: white, or alike over two steps; a fit has taken three shapes away."""
+    random = np.random.default_rng(4)
+    told = 0
+    for _ in range(50):
+        blocks = smooth_noise(random, width)
+        for k in range(3):
+            blocks[k] = blocks[k] - SHAPES[:, k] * (SHAPES[:, k] @ blocks[k])
+        told += judged(blocks).told
+    assert told <= 3  # more in one of 600 such tests, if one of a hundred is told
+
+
+def test_a_smooth_field_is_found_below_the_noise():
+    """0.005 mm of one shape in every block, beside noise of 0.02 mm."""
+    random, shape = np.random.default_rng(6), 0.005 * SHAPES[:, 7] * SIDE
+    told = [judged([b + shape for b in smooth_noise(random, 0.0)]) for _ in range(6)]
+    assert all(one.told for one in told)
+    assert np.mean([one.rms for one in told]) == pytest.approx(0.005, rel=0.2)
+    # What the mesh may be answerable for is none.
+    found = judged([b + shape for b in smooth_noise(random, 0.0)], [shape] * BLOCKS)
+    assert not found.told and found.rms < 0.003
+
+
+def test_blocks_count_alike_whatever_their_size():
+    blocks = smooth_noise(np.random.default_rng(1), 0.7)
+    scaled = [k * block for k, block in enumerate(blocks, start=1)]
+    assert judged(scaled).ratio == pytest.approx(judged(blocks).ratio, rel=1e-12)
+
+
+def test_too_little_to_tell():
+    few = [np.arange(20.0)]
+    assert discrepancy(few, [np.zeros(20)], [PLACES[:20]], 3, "mm") is None
+    assert discrepancy([np.zeros(SIDE**2)], NO_DOUBT[:1], [PLACES], 3, "mm") is None
+    whole = smooth_noise(np.random.default_rng(0), 0.0)[:1]
+    assert discrepancy(whole, NO_DOUBT[:1], [PLACES], 15, "mm") is None
+
+
+def test_the_shapes():
+    """Orthonormal; the first fifteen are all polynomials up to the fourth degree."""
+    assert SHAPES.T @ SHAPES == pytest.approx(np.eye(45), abs=1e-12)
+    x, y = PLACES.T
+    quartic = x**3 * y - 2 * y**4 + x
+    inside = SHAPES[:, :15] @ (SHAPES[:, :15].T @ quartic)
+    assert inside == pytest.approx(quartic, rel=1e-9, abs=1e-5)
+
+
+def test_the_words():
+    found = {
+        "bubble": Discrepancy(22.6, 1.25, 0.036, "mm"),
+        "other": Discrepancy(1.2, 1.25, 0.001, "mm"),
+        "computed": Discrepancy(61.8, 1.66, 2e-8, "mm", least=4e-4),
+    }
+    (note,) = notes_of_discrepancies(found)
+    assert (note.kind, note.of) == (NoteKind.DISCREPANCY, "bubble")
+    assert note.startswith("0.036 mm of what the fit leaves is smooth")
+    assert "(22.6 times" in note and "1.25 in one of a hundred" in note

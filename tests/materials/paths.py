@@ -1,7 +1,5 @@
 """A law followed along a path of strains, for the tests of the law."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

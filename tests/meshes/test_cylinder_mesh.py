@@ -1,19 +1,20 @@
-"""Cylinder meshes: closed, of the right size, well shaped, turned outwards, with all their sets."""
-
-from __future__ import annotations
+"""Meshes of cylinders, and displacements read on facets."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.mesh import Mesh, sampling_matrix
+from bubblefit.meshes.reading import Facet, FacetReading, SmoothReading
 from bubblefit.meshes.tube import GROWTH, Refinement, cylinder_mesh, rows
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from ..mesh_quality import edges, least_scaled_jacobian
 
+# --- cylinder mesh ---
 LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1
 RADIUS = DIAMETER / 2
 BENDING = (Refinement("collar", 0.0, 90.0, 12.0), Refinement("support", 1000.0, 40.0, 12.0))
@@ -90,9 +91,7 @@ def check_sound(mesh: Mesh, length: float, diameter: float, seam: float, symmetr
     # The warp lies in the quad's plane.
     assert mesh.warp.shape == (len(mesh.quads), 3)
     np.testing.assert_allclose(np.einsum("mx,mx->m", mesh.warp, unit), 0, atol=1e-9)
-    np.testing.assert_array_equal(
-        mesh.warp[~cap], np.broadcast_to([0, 0, 1], mesh.warp[~cap].shape)
-    )
+    assert (mesh.warp[~cap] == [0, 0, 1]).all()
 
     # The seam is as wide as it should be, around the bottom.
     if seam:
@@ -221,10 +220,8 @@ def test_a_quarter_is_a_quarter_of_the_whole():
     for name, numbers in quarter.element_sets.items():
         assert len(full.element_sets[name]) == 4 * len(numbers)
     for name, numbers in full.node_sets.items():
-        folded = {
-            tuple(p)
-            for p in np.abs(full.points[numbers]) * [1, 0, 1] + full.points[numbers] * [0, 1, 0]
-        }
+        at = full.points[numbers]
+        folded = {tuple(p) for p in np.abs(at) * [1, 0, 1] + at * [0, 1, 0]}
         assert folded == {tuple(p) for p in quarter.points[quarter.node_sets[name]]}
 
 
@@ -232,7 +229,7 @@ def test_the_caps_can_be_turned():
     for axis, direction in (("x", [1, 0, 0]), ("y", [0, 1, 0])):
         mesh = cylinder_mesh(600.0, DIAMETER, 30.0, SEAM, "full", cap_warp=axis)
         found = mesh.warp[mesh.element_sets["caps"]]
-        np.testing.assert_array_equal(found, np.broadcast_to(direction, found.shape))
+        assert (found == direction).all()
 
 
 @settings(deadline=None, max_examples=60)
@@ -271,34 +268,18 @@ def test_rows_are_graded(end, size, places, finer):
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"length": 0.0}, "length"),
-        ({"length": float("nan")}, "length"),
-        ({"length": "3000"}, "length"),
-        ({"diameter": -1.0}, "diameter"),
-        ({"diameter": True}, "diameter"),
-        ({"size": 0.0}, "size"),
-        ({"size": 76.0}, "size"),
-        ({"size": 0.01}, "size"),
-        ({"seam_width": -1.0}, "seam_width"),
-        ({"seam_width": 200.0}, "seam_width"),
-        ({"seam_width": 5.0}, "seam_width"),
-        ({"symmetry": "half"}, "symmetry"),
-        ({"cap_warp": "z"}, "cap_warp"),
-        ({"around": 0.0}, "around"),
-        ({"around": 1.5}, "around"),
+        *(({key: value}, key) for key, values in {
+            "length": [0.0, float("nan"), "3000"], "diameter": [-1.0, True],
+            "size": [0.0, 76.0, 0.01], "seam_width": [-1.0, 200.0, 5.0], "symmetry": ["half"],
+            "cap_warp": ["z"], "around": [0.0, 1.5],
+        }.items() for value in values),
         ({"seam_width": 7.0, "around": 0.5}, "seam_width"),
-        (
-            {"refinements": [Refinement("support", 1600.0, 40.0, 10.0)]},
-            "refinements.support.position",
-        ),
-        (
-            {"refinements": [Refinement("support", 1498.0, 40.0, 10.0)]},
-            "refinements.support.position",
-        ),
+        *(({"refinements": [Refinement("support", at, 40.0, 10.0)]}, "refinements.support.position")
+          for at in (1600.0, 1498.0)),
         ({"refinements": [Refinement("caps", 1000.0, 40.0, 10.0)]}, "refinements"),
         ({"refinements": [BENDING[0], Refinement("collar", 500.0, 40.0, 10.0)]}, "refinements"),
     ],
-)
+)  # fmt: skip
 def test_nonsense_is_refused_by_name(change, field):
     values = {"length": LENGTH, "diameter": DIAMETER, "size": 30.0, "seam_width": SEAM} | change
     with pytest.raises(InputError) as caught:
@@ -308,9 +289,151 @@ def test_nonsense_is_refused_by_name(change, field):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [{"name": "no name"}, {"position": -1.0}, {"reach": float("inf")}, {"size": 0.0}],
+    "change", [{"name": "no name"}, {"position": -1.0}, {"reach": float("inf")}, {"size": 0.0}]
 )
 def test_refinements_are_checked(change):
     with pytest.raises(InputError, match="expected"):
         Refinement(**({"name": "support", "position": 1.0, "reach": 1.0, "size": 1.0} | change))
+
+
+# --- facet reading ---
+FINE = SmoothReading.of(disk_mesh(100.0, 3072, "full"))
+#: Of a wave of 50 mm, and where it is looked at.
+WAVE = 2 * np.pi / 50.0
+PLACES = np.array([[11.0, -7.0], [-20.0, 30.0], [3.0, 44.0]])
+
+
+def wave(points: np.ndarray) -> np.ndarray:
+    return np.cos(WAVE * points[:, 0] + 0.3)
+
+
+def quadratic(points: np.ndarray) -> np.ndarray:
+    x, y = points[:, :2].T
+    return 3.0 + 0.2 * x - 0.1 * y + 0.01 * x**2 - 0.02 * x * y + 0.03 * y**2
+
+
+def check(facet: Facet, share: float) -> None:
+    """What a facet leaves of the wave, of height one."""
+    matrix, inside = FacetReading(FINE, facet).matrix(PLACES)
+    assert inside.all()
+    np.testing.assert_allclose(matrix @ wave(FINE.mesh.points), share * wave(PLACES), atol=1e-3)
+
+
+@pytest.mark.parametrize("size", [5.0, 20.0, 35.0])
+def test_a_facet_of_the_first_order_leaves_a_mean(size):
+    """sin(k f / 2) / (k f / 2) of a wave; 0.76 of one of 50 mm by a facet of 20."""
+    check(Facet(size), float(np.sinc(size / 50.0)))
+
+
+def test_smoothing_leaves_less():
+    """Of five points 6 mm apart sin(5 k s / 2) / (5 sin(k s / 2)) more is left."""
+    half = 0.5 * WAVE * 6.0
+    expected = np.sinc(20.0 / 50.0) * np.sin(5 * half) / (5 * np.sin(half))
+    assert expected < 0.5
+    check(Facet(20.0, window=5, step=6.0), expected)
+
+
+def test_a_facet_of_the_second_order_keeps_a_parabola_and_more_of_a_wave():
+    """Of the square, in a = k f / 2: 5/2 terms of Legendre's second polynomial are added."""
+    a = 0.5 * WAVE * 35.0
+    mean = np.sin(a) / a
+    second = mean + 3 * np.cos(a) / a**2 - 3 * np.sin(a) / a**3  # the mean of P2 times the wave
+    expected = mean - 2.5 * second
+    check(Facet(35.0, order=2), expected)
+    parabola, kept = quadratic(FINE.mesh.points), quadratic(PLACES)
+    second_order = FacetReading(FINE, Facet(35.0, order=2)).matrix(PLACES)[0] @ parabola
+    np.testing.assert_allclose(second_order, kept, rtol=1e-9)
+    # Of the first order f^2/24 of each curvature is added.
+    first_order = FacetReading(FINE, Facet(35.0)).matrix(PLACES)[0] @ parabola
+    np.testing.assert_allclose(first_order - kept, 35.0**2 / 24 * (0.02 + 0.06), rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_facet_over_the_edge_sees_what_is_there(order):
+    """Nothing is invented beyond the rim: a plane is kept, also by a third of a facet."""
+    places = np.array([[97.0, 0.0], [0.0, -99.0], [70.0, 70.0], [99.5, 2.0]])
+    matrix, inside = FacetReading(FINE, Facet(20.0, order)).matrix(places)
+    assert inside.all()
+    x, y = FINE.mesh.points[:, :2].T
+    kept = matrix @ (1.0 + 0.5 * x - 0.3 * y)
+    np.testing.assert_allclose(kept, 1.0 + places @ [0.5, -0.3], rtol=1e-9)
+    outside = FacetReading(FINE, Facet(20.0)).matrix(np.array([[0.0, 0.0], [105.0, 0.0]]))
+    assert outside[0].shape[0] == 1 and outside[1].tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"size": 0.0}, "facet: expected more than 0 mm"),
+        ({"size": 1.0, "order": 3}, "order: expected 1 or 2"),
+        ({"size": 1.0, "window": 4, "step": 1.0}, "smoothing: expected 1, 3, 5"),
+        ({"size": 1.0, "window": 3}, "step: this key is missing"),
+    ],
+)
+def test_what_is_no_facet(given, said):
+    with pytest.raises(InputError, match=said):
+        Facet(**given)
+
+
+# --- smooth reading ---
+POINTS = np.random.default_rng(5).uniform(-100, 100, (900, 2))
+
+
+def dome(points: np.ndarray) -> np.ndarray:
+    """Not a polynomial, neither symmetric nor zero at the rim, mm."""
+    x, y = points[:, :2].T / 100.0
+    return 30.0 * np.cos(1.2 * x + 0.3) * np.cos(1.0 * y - 0.2)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        disk_mesh(100.0, 48, "quarter"),
+        disk_mesh(100.0, 112),
+        elliptic_disk_mesh(Outline(120.0, 30.0, 40.0), 112),
+    ],
+    ids=["quarter", "full", "slender"],
+)
+def test_nodes_are_kept_and_quadratics_are_exact(mesh):
+    reading = SmoothReading.of(mesh)
+    matrix, inside = reading.matrix(mesh.points[:, :2])
+    assert inside.all()
+    np.testing.assert_allclose(matrix.toarray(), np.eye(len(mesh.points)), atol=1e-9)
+    matrix, inside = reading.matrix(POINTS)
+    np.testing.assert_array_equal(inside, sampling_matrix(mesh, POINTS)[1])
+    read = matrix @ quadratic(mesh.points)
+    np.testing.assert_allclose(read, quadratic(POINTS[inside]), rtol=1e-8)
+
+
+def test_what_is_read_converges_faster_than_facets_do():
+    """Third order instead of second; on 112 quads 0.03 mm instead of 0.3 mm."""
+    own, facets = [], []
+    for elements in (128, 512, 2048):
+        mesh = disk_mesh(100.0, elements)
+        for read, errors in ((SmoothReading.of(mesh).matrix, own), (None, facets)):
+            matrix, inside = read(POINTS) if read else sampling_matrix(mesh, POINTS)
+            left = matrix @ dome(mesh.points) - dome(POINTS[inside])
+            errors.append(float(np.sqrt(np.mean(left**2))))
+    assert facets[0] > 0.1 and own[0] < 0.03 * 1.0
+    assert np.log2(np.divide(facets[:-1], facets[1:])) == pytest.approx([2.0, 2.0], abs=0.2)
+    assert (np.log2(np.divide(own[:-1], own[1:])) > 2.7).all(), own
+
+
+def test_the_reading_is_continuous_from_quad_to_quad():
+    mesh = disk_mesh(100.0, 112)
+    values = dome(mesh.points)
+    ends = mesh.points[mesh.quads[:, :2], :2]
+    middle = ends.mean(axis=1)
+    across = np.stack([ends[:, 1, 1] - ends[:, 0, 1], ends[:, 0, 0] - ends[:, 1, 0]], axis=1)
+    across = across[np.hypot(*middle.T) < 80] * 1e-7
+    middle = middle[np.hypot(*middle.T) < 80]
+    reading = SmoothReading.of(mesh)
+    sides = [reading.matrix(middle + s * across)[0] @ values for s in (1, -1)]
+    np.testing.assert_allclose(*sides, atol=1e-4)
+
+
+def test_few_nodes_are_enough():
+    mesh = disk_mesh(100.0, 8, "quarter")
+    matrix, inside = SmoothReading.of(mesh).matrix(np.array([[30.0, 30.0], [200.0, 0.0]]))
+    assert inside.tolist() == [True, False]
+    np.testing.assert_allclose(matrix.sum(axis=1), 1.0)

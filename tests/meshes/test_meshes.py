@@ -1,6 +1,4 @@
-"""Disk meshes: area, connection, orientation, sets, element shapes."""
-
-from __future__ import annotations
+"""Meshes of disks, round and elliptic."""
 
 import builtins
 import subprocess
@@ -10,7 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.meshes.disk import disk_mesh, divisions
+from bubblefit.meshes.disk import (
+    Outline,
+    disk_mesh,
+    divisions,
+    elliptic_disk_mesh,
+    rim_form,
+    rim_share,
+)
 from bubblefit.meshes.mesh import Mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,6 +23,7 @@ from hypothesis import strategies as st
 from .. import needs
 from ..mesh_quality import edges, scaled_jacobian
 
+# --- meshes ---
 RADIUS = 100.0
 BEST = np.sin(np.deg2rad(120))  # three quads meet in a node of each quarter
 
@@ -73,12 +79,6 @@ def test_any_count_gives_a_sound_well_shaped_mesh(elements, symmetry, radius):
     assert abs(full - elements) <= max(16, 0.07 * elements)
 
 
-def test_the_thesis_mesh():
-    assert divisions(200) == (10, 5)
-    assert len(disk_mesh(RADIUS, 800, "quarter").quads) == 200
-    assert len(disk_mesh(RADIUS, 800, "full").quads) == 800
-
-
 def test_area_converges_to_that_of_the_circle_with_second_order():
     wanted = np.pi * RADIUS**2
     counts = [8 * n**2 for n in (4, 10, 20, 40)]  # alike: n / 2 layers around a core of n
@@ -95,33 +95,22 @@ def test_area_converges_to_that_of_the_circle_with_second_order():
 
 def test_the_full_disk_is_the_quarter_mirrored():
     quarter, full = disk_mesh(RADIUS, 800, "quarter"), disk_mesh(RADIUS, 800, "full")
+    assert (len(quarter.quads), len(full.quads), divisions(200)) == (200, 800, (10, 5))
     mirrored = {tuple(p * (sx, sy, 1)) for p in quarter.points for sx in (1, -1) for sy in (1, -1)}
     assert {tuple(p) for p in full.points} == mirrored
 
 
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"elements": 7}, "elements"),
-        ({"elements": 0}, "elements"),
-        ({"elements": -800}, "elements"),
-        ({"elements": 800.0}, "elements"),
-        ({"elements": True}, "elements"),
-        ({"elements": None}, "elements"),
-        ({"elements": 10**12}, "elements"),
-        ({"radius": 0.0}, "radius"),
-        ({"radius": -1.0}, "radius"),
-        ({"radius": float("nan")}, "radius"),
-        ({"radius": float("inf")}, "radius"),
-        ({"radius": "100"}, "radius"),
-        ({"symmetry": "half"}, "symmetry"),
-        ({"generator": "abaqus"}, "generator"),
-    ],
-)
-def test_nonsense_is_refused_by_name(change, field):
-    given_values = {"radius": RADIUS, "elements": 800, "symmetry": "full"} | change
+NONSENSE = {
+    "elements": [7, 0, -800, 800.0, True, None, 10**12],
+    "radius": [0.0, -1.0, float("nan"), float("inf"), "100"],
+    "symmetry": ["half"], "generator": ["abaqus"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("field", "value"), [(k, v) for k, some in NONSENSE.items() for v in some])
+def test_nonsense_is_refused_by_name(field, value):
     with pytest.raises(InputError) as caught:
-        disk_mesh(**given_values)
+        disk_mesh(**{"radius": RADIUS, "elements": 800, "symmetry": "full", field: value})
     assert caught.value.field == field
     assert "\n" not in str(caught.value)
 
@@ -145,8 +134,6 @@ def test_scaled_jacobian_of_known_shapes(corners, wanted):
 
 
 # gmsh
-
-
 def test_gmsh_makes_a_sound_mesh_too():
     gmsh = needs.library("gmsh")
     for symmetry in ("full", "quarter"):
@@ -191,3 +178,53 @@ def test_slow_packages_are_loaded_only_when_used():
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1]
     )
     assert done.stdout.strip() == "[]", done.stderr
+
+
+# --- elliptic disk ---
+TURNED = Outline(120.0, 80.0, 30.0)
+
+
+@pytest.mark.parametrize("symmetry", ["full", "quarter"])
+def test_equal_semi_axes_give_the_disk(symmetry):
+    own = elliptic_disk_mesh(Outline(90.0, 90.0, 20.0), 192, symmetry)
+    disk = disk_mesh(90.0, 192, symmetry)
+    np.testing.assert_array_equal(own.points, disk.points)
+    np.testing.assert_array_equal(own.quads, disk.quads)
+
+
+def test_the_rim_is_the_ellipse_and_the_area_its_own_to_second_order():
+    counts = [128, 512, 2048]
+    meshes = [elliptic_disk_mesh(TURNED, n) for n in counts]
+    gaps = [1 - areas(mesh).sum() / (np.pi * 120.0 * 80.0) for mesh in meshes]
+    assert gaps[-1] < 2e-3
+    assert np.log2(np.divide(gaps[:-1], gaps[1:])) == pytest.approx([2.0, 2.0], abs=0.1)
+    mesh = meshes[1]
+    assert (areas(mesh) > 0).all() and scaled_jacobian(mesh).min() > 0.4
+    assert (mesh.points[mesh.node_sets["apex"]] == 0).all()
+    share = TURNED.share(mesh.points[:, :2])
+    np.testing.assert_array_equal(mesh.node_sets["rim"], np.flatnonzero(share > 1 - 1e-9))
+    # What the solvers take the rim for, from its nodes alone.
+    form = rim_form(mesh.points[mesh.node_sets["rim"], :2])
+    np.testing.assert_allclose(rim_share(form, mesh.points[:, :2]), share, atol=1e-12)
+
+
+def test_a_quarter_has_its_lines_of_symmetry():
+    quarter = elliptic_disk_mesh(Outline(120.0, 80.0, 90.0), 192, "quarter")
+    assert (quarter.points[quarter.node_sets["symmetry_x"], 0] == 0).all()
+    assert (quarter.points[quarter.node_sets["symmetry_y"], 1] == 0).all()
+    np.testing.assert_allclose(quarter.points.max(axis=0), (80.0, 120.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("outline", "symmetry", "field"),
+    [
+        (Outline(120.0, 80.0, 30.0), "quarter", "symmetry"),
+        (Outline(80.0, 120.0), "full", "minor"),
+        (Outline(120.0, -80.0), "full", "minor"),
+        (Outline(120.0, 29.0), "full", "minor"),
+    ],
+)
+def test_what_cannot_be_meshed_is_named(outline, symmetry, field):
+    with pytest.raises(InputError) as error:
+        elliptic_disk_mesh(outline, 192, symmetry)
+    assert error.value.field == field

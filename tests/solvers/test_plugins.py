@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
@@ -21,6 +21,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import checked, solver_named, solver_names
 from click.testing import CliRunner
 
+from ..complaints import complaint
 from ..fortran_build import BETA, LAWS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,9 +63,7 @@ def bubblefit(site, *arguments, cwd, code=0):
     return done
 
 
-# --- the example, as its README says ------------------------------------------------------------
-
-
+# --- the example, as its README says ---
 @pytest.mark.slow
 def test_the_example_pulls_strips_from_the_command_line(site, strips):
     simulate = ("simulate", "uniaxial", "project.toml", "--card", "material.toml")
@@ -97,7 +96,6 @@ def test_the_example_is_in_the_doctors_list(site, strips):
 
 @pytest.mark.slow
 def test_a_fit_is_led_by_the_membrane_and_counts_the_examples_runs(site, strips):
-    """Data without a bias strip: what the example can do."""
     path = strips / "curves.csv"
     kept = [line for line in path.read_text().splitlines() if not line.startswith("bias")]
     path.write_text("\n".join(kept) + "\n")
@@ -150,9 +148,8 @@ def test_the_example_takes_a_law_of_any_form(example, name, direction):
 
 
 def test_the_example_carries_the_law(example):
-    assert strip_stresses(solver_named("homogeneous")) == pytest.approx(
-        [bar.stress for bar in BARS], rel=1e-4
-    )
+    published = pytest.approx([bar.stress for bar in BARS], rel=1e-4)
+    assert strip_stresses(solver_named("homogeneous")) == published
 
 
 def test_the_examples_failures_have_their_reasons(example, tmp_path):
@@ -161,9 +158,8 @@ def test_the_examples_failures_have_their_reasons(example, tmp_path):
     with pytest.raises(SolverFailure, match="homogeneous: takes strips along warp or fill only"):
         solver.run(bias, LAW)
     gone = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
-    with pytest.raises(
-        SolverFailure, match=r"a modulus is not positive \(exit number 3\)"
-    ) as found:
+    words = r"a modulus is not positive \(exit number 3\)"
+    with pytest.raises(SolverFailure, match=words) as found:
         solver.run(warp, gone, tmp_path)
     assert (found.value.scratch / "job.json").is_file()
     broken = tmp_path / "broken.py"
@@ -219,8 +215,7 @@ def test_the_code_in_the_documentation_is_that_of_the_example():
         assert any(block in source for source in sources), block
 
 
-# --- broken ones --------------------------------------------------------------------------------
-
+# --- broken ones ---
 BROKEN = {
     "missing": ("", "cannot be imported (ModuleNotFoundError: No module named 'acme_missing')"),
     "failing": ("raise RuntimeError('no licence file\\nand more')",
@@ -295,9 +290,8 @@ def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, nam
 def test_two_of_one_name(packages):
     install(packages, "acme", "Solver = 1")
     install(packages, "acme", "Solver = 1", "other-solvers", "acme_other")
-    with pytest.raises(
-        SolverFailure, match=r"acme: is offered by acme-solvers 2\.5 and other-solvers 2\.5; uninst"
-    ):
+    words = r"acme: is offered by acme-solvers 2\.5 and other-solvers 2\.5; uninst"
+    with pytest.raises(SolverFailure, match=words):
         solver_named("acme")
     assert solver_names().count("acme") == 1
 
@@ -382,5 +376,4 @@ def test_compiled_factories_without_a_signature_are_called(packages):
 def test_an_unknown_name_for_the_doctor_is_bad_input():
     done = CliRunner().invoke(main, ["doctor", "--solver", "nothere"])
     assert done.exit_code == 2 and "--solver: 'nothere' is not one of: calculix" in done.output
-    with pytest.raises(InputError, match="is not one of"):
-        solver_named("nothere")
+    assert "is not one of" in complaint(solver_named, "nothere")

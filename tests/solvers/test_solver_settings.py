@@ -1,7 +1,8 @@
-"""[solver.NAME] of a project, and what the command line says instead."""
+"""Settings of solvers, and their identity."""
 
 import importlib
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.solvers.bars import diagnose
 from bubblefit.solvers.base import Solver
+from bubblefit.solvers.calculix.solver import CalculixSolver
+from bubblefit.solvers.decks import file_mark, templates_mark
+from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import (
     SOLVERS,
@@ -23,10 +27,11 @@ from bubblefit.solvers.registry import (
 
 from ..complaints import complaint
 
+# --- solver settings ---
 PROJECT = Path("/somewhere/project.toml")
 
 
-def test_without_tables_every_solver_of_ours_has_its_defaults() -> None:
+def test_without_tables_every_solver_of_ours_has_its_defaults():
     found = solver_settings(PROJECT, {})
     assert set(found) == set(SOLVERS) == {"calculix", "marc", "membrane"}
     assert found["membrane"] == {
@@ -36,7 +41,7 @@ def test_without_tables_every_solver_of_ours_has_its_defaults() -> None:
     assert all(isinstance(solver_named(name, **o), Solver) for name, o in found.items())
 
 
-def test_paths_are_beside_the_project_and_bare_names_on_the_path() -> None:
+def test_paths_are_beside_the_project_and_bare_names_on_the_path():
     tables = {"calculix": {"ccx": "bin/ccx", "templates": "mine", "scratch": "~/runs"}}
     found = solver_settings(PROJECT, tables)["calculix"]
     assert found["ccx"] == Path("/somewhere/bin/ccx")
@@ -58,11 +63,11 @@ def test_paths_are_beside_the_project_and_bare_names_on_the_path() -> None:
         ({"calculiks": {}}, "solver.calculiks: no solver of this name is installed; there are: "),
     ],
 )
-def test_a_wrong_table_is_one_line_with_file_and_key(tables, words) -> None:
+def test_a_wrong_table_is_one_line_with_file_and_key(tables, words):
     assert complaint(solver_settings, PROJECT, tables).startswith(f"{PROJECT}: {words}")
 
 
-def test_a_json_schema_can_be_made_of_every_section() -> None:
+def test_a_json_schema_can_be_made_of_every_section():
     for name, section in solver_sections().items():
         schema = section.model_json_schema()
         assert schema["additionalProperties"] is False, name
@@ -70,7 +75,7 @@ def test_a_json_schema_can_be_made_of_every_section() -> None:
         json.dumps(schema)
 
 
-def test_a_usable_solver_names_the_file_and_the_key() -> None:
+def test_a_usable_solver_names_the_file_and_the_key():
     assert isinstance(usable_solver("membrane", {"bending_stiffness": 0.5}), MembraneSolver)
     words = complaint(usable_solver, "nothing", {}, PROJECT, "run.solver")
     assert words.startswith(f"{PROJECT}: run.solver (or --solver): 'nothing' is not one of: calc")
@@ -78,13 +83,13 @@ def test_a_usable_solver_names_the_file_and_the_key() -> None:
         usable_solver("marc", {"executable": "no-such-marc"})
 
 
-def test_the_command_line_has_each_option_once() -> None:
+def test_the_command_line_has_each_option_once():
     options = {one.name: one for one in command_line()}
     assert list(options) == ["ccx", "templates", "element", "marc"]
     assert options["element"].what == "Shell element: S8R or S4 (calculix), 139, 75 or 18 (marc)."
 
 
-def test_the_command_line_takes_the_place_of_a_setting(tmp_path: Path, monkeypatch) -> None:
+def test_the_command_line_takes_the_place_of_a_setting(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     options = solver_settings(PROJECT, {"calculix": {"element": "S4", "threads": 3}})["calculix"]
     given = {"ccx": None, "marc": None, "element": "S8R"}
@@ -108,13 +113,12 @@ def test_the_command_line_takes_the_place_of_a_setting(tmp_path: Path, monkeypat
         ("calculix", {}, ("thread=1",), "--solver-option thread: unknown key; did you mean"),
     ],
 )
-def test_what_the_command_line_cannot_say(name, given, settings, words) -> None:
+def test_what_the_command_line_cannot_say(name, given, settings, words):
     options = solver_settings(PROJECT, {})[name]
     assert complaint(overridden, name, options, given, settings).startswith(words)
 
 
 # A solver in the tree: one folder, one line
-
 FOLDER = {
     "__init__.py": "",
     "settings.py": """
@@ -167,7 +171,7 @@ def acme(tmp_path, monkeypatch):
         del sys.modules[name]
 
 
-def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch) -> None:
+def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch):
     options = solver_settings(PROJECT, {"acme": {"deck": "d.inp", "acme": "bin/acme"}})["acme"]
     assert options["deck"] == Path("/somewhere/d.inp")
     options = overridden("acme", options, {"element": "A2", "ccx": None}, ("acme=other",))
@@ -182,3 +186,89 @@ def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch) -> None:
     assert [one.name for one in diagnose()] == ["membrane", "acme"]
     (found,) = [one for one in diagnose(acme="/opt/acme") if one.name == "acme"]
     assert found.expected and found.path == "/opt/acme"
+
+
+# --- identity ---
+NO_CCX = "/nowhere/ccx"
+
+
+@pytest.fixture
+def templates(tmp_path: Path) -> Path:
+    folder = tmp_path / "templates"
+    (folder / "parts").mkdir(parents=True)
+    (folder / "bubble.inp.j2").write_text("{% include 'heading.inp' %}\n*STEP\n")
+    (folder / "heading.inp").write_text("*HEADING\n{% include 'parts/more.txt' %}\n")
+    (folder / "parts" / "more.txt").write_text("more\n")
+    (folder / "notes.txt").write_text("for myself\n")
+    return folder
+
+
+def solvers(folder: Path) -> list[Solver]:
+    return [CalculixSolver(NO_CCX, templates=folder), MarcSolver(templates=str(folder))]
+
+
+@pytest.mark.parametrize("edited", ["bubble.inp.j2", "heading.inp", "parts/more.txt"])
+def test_a_template_edited_in_place_changes_the_identity(templates, edited):
+    before = [solver.identity for solver in solvers(templates)]
+    file = templates / edited
+    file.write_text(file.read_text() + "** one line more\n")
+    after = [solver.identity for solver in solvers(templates)]
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def test_moving_the_folder_or_what_is_no_template_does_not(templates, tmp_path):
+    before = [solver.identity for solver in solvers(templates)]
+    (templates / "notes.txt").write_text("other words\n")
+    (templates / "out").mkdir()
+    (templates / "out" / "result.json").write_text("{}")
+    assert [solver.identity for solver in solvers(templates)] == before
+    elsewhere = tmp_path / "else" / "where"
+    shutil.move(templates, elsewhere)
+    assert [solver.identity for solver in solvers(elsewhere)] == before
+    # One more template, or another name of one, is another set of them.
+    shutil.copy(elsewhere / "notes.txt", elsewhere / "strip.inp.j2")
+    assert all(s.identity not in before for s in solvers(elsewhere))
+
+
+def test_a_template_that_cannot_be_parsed_still_counts(templates):
+    before = templates_mark(templates)
+    (templates / "bubble.inp.j2").write_text("{% include ")
+    broken = templates_mark(templates)
+    (templates / "bubble.inp.j2").write_text("{% include  ")
+    assert len({before, broken, templates_mark(templates), templates_mark(None)}) == 4
+
+
+def test_templates_that_include_each_other_end(tmp_path):
+    (tmp_path / "a.j2").write_text("{% include 'b' %}{% include name %}{% include 'gone' %}")
+    (tmp_path / "b").write_text("{% include 'a.j2' %}")
+    assert len(templates_mark(tmp_path)) == 64
+
+
+def test_what_changes_no_result_is_not_in_it(tmp_path):
+    one = CalculixSolver(NO_CCX)
+    other = CalculixSolver(NO_CCX, timeout=1.0, scratch=tmp_path, keep=True, threads=2)
+    assert one.identity == other.identity != CalculixSolver(NO_CCX, element="S4").identity
+    plain = MembraneSolver().identity
+    assert plain == MembraneSolver().identity and plain.startswith("membrane ")
+    others = {
+        MembraneSolver(tolerance=1e-9).identity,
+        MembraneSolver(wrinkle_stiffness=0.01).identity,
+        MembraneSolver(bending_stiffness=0.0).identity,
+    }
+    assert len({plain, *others}) == 4
+
+
+def test_blocks_of_a_site_count_by_content(tmp_path):
+    one, other = tmp_path / "post.dat", tmp_path / "moved" / "post.dat"
+    one.write_text("post\n")
+    other.parent.mkdir()
+    shutil.copy(one, other)
+    marks = [MarcSolver(include={"post": str(file)}).identity for file in (one, other)]
+    assert marks[0] == marks[1]
+    one.write_text("post again\n")
+    assert MarcSolver(include={"post": str(one)}).identity != marks[0]
+    assert MarcSolver(version="2023.1").identity != MarcSolver().identity
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    assert "cannot be read: No such file" in complaint(file_mark, tmp_path / "none")

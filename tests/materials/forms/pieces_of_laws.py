@@ -1,7 +1,5 @@
 """Laws of every form, and their moduli integrated by quadrature, for the tests of the law."""
 
-from __future__ import annotations
-
 import numpy as np
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC, LINEAR, QUADRATIC

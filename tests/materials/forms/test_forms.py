@@ -1,15 +1,16 @@
-"""Every form as a map onto piecewise cubics; splines; which form a name means."""
+"""Forms of the moduli: pieces, increments, registry."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
+from bubblefit.errors import InputError, PlugInFailure
 from bubblefit.materials.forms.base import (
     COMPONENTS,
     ORDER,
     UNLIMITED,
     Form,
+    map_in_range,
     moduli_on_grid,
     modulus_rows,
     pieces_of,
@@ -21,13 +22,18 @@ from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.forms.registry import form_named, form_names, form_settings
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
-from hypothesis import given, settings
+from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from .pieces_of_laws import BETA, KNOTS, RANGE
+from ...complaints import complaint
+from ...plug_ins import install
+from ..paths import follow
+from .pieces_of_laws import BETA, KNOTS, RANGE, integral, turning_points
 from .pieces_of_laws import LAWS as OF_STRAIN
 
+# --- forms ---
 LAWS = {
     **OF_STRAIN,
     "load-ratio": HypoelasticLaw(
@@ -39,7 +45,7 @@ NO_RANGE = [UNLIMITED] * 3
 
 
 @FORMS
-def test_what_every_form_says_fits_together(name: str) -> None:
+def test_what_every_form_says_fits_together(name):
     form = LAWS[name].form
     assert isinstance(form, Form) and form.name == name and name in form_names()
     assert len(form.labels) == form.size and len(set(form.labels)) == form.size
@@ -64,7 +70,7 @@ def test_what_every_form_says_fits_together(name: str) -> None:
 @FORMS
 @settings(max_examples=30, deadline=None)
 @given(data=st.data())
-def test_moduli_are_linear_in_the_entries(name: str, data: st.DataObject) -> None:
+def test_moduli_are_linear_in_the_entries(name, data):
     law = LAWS[name]
     modulus = data.draw(st.sampled_from(ORDER))
     strain = data.draw(st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=9))
@@ -76,7 +82,7 @@ def test_moduli_are_linear_in_the_entries(name: str, data: st.DataObject) -> Non
 
 @FORMS
 @pytest.mark.parametrize("ends", [RANGE, [0.005, 0.06, 0.05], [0.03, 0.02, 0.01], NO_RANGE])
-def test_pieces_end_where_the_range_does(name: str, ends: list[float]) -> None:
+def test_pieces_end_where_the_range_does(name, ends):
     form = LAWS[name].form
     pieces = pieces_of(form, LAWS[name].beta, ends)
     assert (pieces[:, -1, 0] == ends).all()
@@ -93,7 +99,7 @@ def test_pieces_end_where_the_range_does(name: str, ends: list[float]) -> None:
 
 
 @FORMS
-def test_the_grid_sees_every_piece(name: str) -> None:
+def test_the_grid_sees_every_piece(name):
     form = LAWS[name].form
     for component, end in enumerate(RANGE):
         grid = form.grid(component, end)
@@ -112,8 +118,7 @@ def test_the_grid_sees_every_piece(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", DEGREES)
-def test_control_values_of_a_polynomial_are_moduli(name: str) -> None:
-    """from_values takes the moduli at Chebyshev points back to the coefficients."""
+def test_control_values_of_a_polynomial_are_moduli(name):
     law, n = LAWS[name], DEGREES.index(name) + 1
     share = 0.5 * (1 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
     values = [law.modulus(m, share * RANGE[COMPONENTS[m]]) for m in ORDER]
@@ -122,9 +127,7 @@ def test_control_values_of_a_polynomial_are_moduli(name: str) -> None:
 
 
 # Splines
-
-
-def test_a_spline_is_the_not_a_knot_spline_through_its_values() -> None:
+def test_a_spline_is_the_not_a_knot_spline_through_its_values():
     law = LAWS["spline"]
     start = 0
     for modulus in ORDER:
@@ -140,7 +143,7 @@ def test_a_spline_is_the_not_a_knot_spline_through_its_values() -> None:
     assert not law.jumps and LAWS["trilinear"].jumps
 
 
-def test_from_four_knots_on_a_spline_contains_every_cubic() -> None:
+def test_from_four_knots_on_a_spline_contains_every_cubic():
     cubic = HypoelasticLaw(BETA, strain_range=RANGE)
     for count in (4, 5, 9, 20):
         form = form_named("spline", {"knots": count}, RANGE)
@@ -154,7 +157,7 @@ def test_from_four_knots_on_a_spline_contains_every_cubic() -> None:
             assert law.modulus(modulus, strain) == same
 
 
-def test_two_knots_are_a_line_and_beyond_the_last_the_modulus_is_held() -> None:
+def test_two_knots_are_a_line_and_beyond_the_last_the_modulus_is_held():
     form = Spline.at([[0.0, 0.1], [0.0, 0.05, 0.1], [0.0, 0.1]])
     law = HypoelasticLaw(np.array([10.0, 20, 100, 150, 100, 300, 500]), form=form)
     assert law.E1([0.0, 0.05, 0.1, 0.7]) == pytest.approx([300, 400, 500, 500])
@@ -162,7 +165,7 @@ def test_two_knots_are_a_line_and_beyond_the_last_the_modulus_is_held() -> None:
     assert law.G12([-0.05, -0.2]) == pytest.approx([15, 20])
 
 
-def test_a_spline_that_is_positive_on_its_grid_hardly_dips_between() -> None:
+def test_a_spline_that_is_positive_on_its_grid_hardly_dips_between():
     random = np.random.default_rng(5)
     form = form_named("spline", {"knots": 6}, RANGE)
     coarse = moduli_on_grid(form, RANGE)["E1"][:, -6:]
@@ -175,62 +178,256 @@ def test_a_spline_that_is_positive_on_its_grid_hardly_dips_between() -> None:
     assert len(dips) > 200 and max(dips) < 1.5 * (2 / PARTS) ** 2
 
 
-# Names
-
-
 BAD = [
-    ("quartic", {}, "form"),
-    ("cubics", {}, "form"),
-    ("cubic", {"knots": 4}, "knots"),
-    ("spline", {"breaks": {}}, "breaks"),
-    ("spline", {}, "knots"),
-    ("spline", {"knots": 1}, "knots"),
-    ("spline", {"knots": True}, "knots"),
-    ("spline", {"knots": 1000}, "knots"),
-    ("spline", {"knots": 4.0}, "knots"),
-    ("spline", {"knots": "many"}, "knots"),
-    ("spline", {"knots": [0.01, 0.1]}, "knots"),
-    ("spline", {"knots": [0.0, 0.05, 0.125]}, "knots"),  # beyond the end of the warp's range
+    ("quartic", {}, "form"), ("cubics", {}, "form"), ("cubic", {"knots": 4}, "knots"),
+    ("spline", {"breaks": {}}, "breaks"), ("spline", {}, "knots"),
+    # Too few, no number, too many; not from zero; beyond the end of the warp's range.
+    *(("spline", {"knots": wrong}, "knots")
+      for wrong in (1, True, 1000, 4.0, "many", [0.01, 0.1], [0.0, 0.05, 0.125])),
     ("spline", {"knots": {"warp": 4, "fill": 4}}, "knots.shear"),
     ("spline", {"knots": {"warp": 4, "fill": 4, "shear": [0.0, 0.2]}}, "knots.shear"),
     ("spline", {"knots": {"warp": 4, "fill": 4, "weft": 4}}, "knots.weft"),
-    ("spline", {"knots": {"warp": 4, "fill": [0.01, 0.1], "shear": 4}}, "knots.fill"),
-    ("spline", {"knots": {"warp": 4, "fill": [0.0, 0.1, 0.1], "shear": 4}}, "knots.fill"),
-    ("spline", {"knots": {"warp": 4, "fill": [0.0], "shear": 4}}, "knots.fill"),
-    ("spline", {"knots": {"warp": 4, "fill": [0.0, float("nan")], "shear": 4}}, "knots.fill"),
-    ("trilinear", {}, "breaks"),
-    ("trilinear", {"breaks": [[0.1, 0.2]] * 3}, "breaks"),
+    *(("spline", {"knots": {"warp": 4, "fill": wrong, "shear": 4}}, "knots.fill")
+      for wrong in ([0.01, 0.1], [0.0, 0.1, 0.1], [0.0], [0.0, float("nan")])),
+    ("trilinear", {}, "breaks"), ("trilinear", {"breaks": [[0.1, 0.2]] * 3}, "breaks"),
     ("trilinear", {"breaks": {"warp": [0.1, 0.2], "fill": [0.2, 0.1]}}, "breaks.fill"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "given_settings", "field"), BAD)
-def test_bad_forms_are_named(name: str, given_settings: dict, field: str) -> None:
+def test_bad_forms_are_named(name, given_settings, field):
     with pytest.raises(InputError) as caught:
         form_named(name, given_settings, RANGE)
     assert caught.value.field == field and "\n" not in str(caught.value)
 
 
-def test_a_number_of_knots_needs_a_range() -> None:
-    with pytest.raises(InputError, match="strain range"):
-        form_named("spline", {"knots": 4}, NO_RANGE)
+def test_a_number_of_knots_needs_a_range():
+    assert "strain range" in complaint(form_named, "spline", {"knots": 4}, NO_RANGE)
     mixed = {"knots": {"warp": [0.0, 0.05, 0.11], "fill": 4, "shear": 2}}
     assert form_named("spline", mixed, RANGE).size == 9
     same = form_named("spline", {"knots": [0.0, 0.05, 0.1]}, NO_RANGE)
     assert same.knots == ((0.0, 0.05, 0.1),) * 3
 
 
-def test_names_and_what_they_take() -> None:
+def test_names_and_what_they_take():
     assert {*DEGREES, "trilinear", "spline"} <= set(form_names())
-    assert form_settings("spline") == ("knots",) and form_settings("cubic") == ()
-    with pytest.raises(InputError, match="did you mean 'quadratic'"):
-        form_named("quadratics", {}, RANGE)
+    assert "did you mean 'quadratic'" in complaint(form_named, "quadratics", {}, RANGE)
     assert form_named("cubic", {}, RANGE) == CUBIC != LINEAR
 
 
-def test_an_entry_that_a_form_does_not_have_is_named() -> None:
+def test_an_entry_that_a_form_does_not_have_is_named():
     with pytest.raises(InputError, match=r"linear law has no beta_0, beta_1: expected 0") as caught:
         HypoelasticLaw(np.array([1.0, 2.0, *BETA[2:4]] + [0.0, 0.0, 1.0, 1.0] * 2), form=LINEAR)
     assert caught.value.field == "beta"
-    with pytest.raises(InputError, match="expected 13 finite"):
-        HypoelasticLaw(BETA, form=LAWS["spline"].form)
+    assert "expected 13 finite" in complaint(HypoelasticLaw, BETA, form=LAWS["spline"].form)
+
+
+# --- increments ---
+EVERY_FORM = pytest.mark.parametrize("form", OF_STRAIN)
+STEPS = pytest.mark.parametrize("steps", [1, 2, 7, 50])
+names = st.sampled_from(sorted(COMPONENTS))
+forms = st.sampled_from(sorted(OF_STRAIN))
+strains = st.floats(-0.2, 0.2)
+
+
+def mean_of(form: str, name: str, x: float, x_old: float) -> tuple[float, float, float]:
+    return increment_modulus(OF_STRAIN[form].pieces, COMPONENTS[name], x, x_old)
+
+
+@settings(max_examples=400, deadline=None)
+@given(forms, names, strains, strains)
+@example("spline", "G12", 0.2, -0.2)
+@example("trilinear", "E1", 0.03, 0.01)
+def test_the_mean_is_the_integral_over_the_increment(form, name, x, x_old):
+    law = OF_STRAIN[form]
+    mean, ahead, behind = mean_of(form, name, x, x_old)
+    assert mean == pytest.approx(mean_of(form, name, x_old, x)[0], rel=1e-14)
+    assume(abs(x - x_old) > 1e-9)
+    assert mean == pytest.approx(integral(law, name, x_old, x) / (x - x_old), rel=1e-9)
+    # Whatever the path between the two ends is made of, the moduli there bound the mean.
+    way = np.concatenate([np.linspace(x_old, x, 200), turning_points(law, name)])
+    way = way[(way >= min(x, x_old)) & (way <= max(x, x_old))]
+    moduli = law.modulus(name, way)
+    room = 1e-3 * moduli.max()
+    assert moduli.min() - room <= mean <= moduli.max() + room
+    # d(stress)/d(strain) is the modulus at the end of the increment.
+    end = float(law.modulus(name, x))
+    assert mean + (x - x_old) * ahead == pytest.approx(end, rel=1e-9)
+    assume(x_old not in turning_points(law, name))  # there it may jump, and the way tells
+    start = float(law.modulus(name, x_old))
+    assert mean - (x - x_old) * behind == pytest.approx(start, rel=1e-9)
+
+
+@settings(deadline=None)
+@given(forms, names, strains, strains, strains)
+def test_two_increments_make_the_stress_of_one(form, name, a, b, c):
+    rise = [mean_of(form, name, y, x)[0] * (y - x) for x, y in ((a, b), (b, c), (a, c))]
+    assert rise[0] + rise[1] == pytest.approx(rise[2], rel=1e-12, abs=1e-12)
+
+
+@settings(max_examples=400, deadline=None)
+@given(forms, names, strains, strains)
+def test_derivatives_against_finite_differences(form, name, x, x_old):
+    law, step = OF_STRAIN[form], 1e-6
+    near = turning_points(law, name)
+    assume(np.abs(np.subtract.outer([x, x_old], near)).min() > 2 * step)
+    assume(abs(x - x_old) > 1e-3)
+    _, ahead, behind = mean_of(form, name, x, x_old)
+    size = 1e-5 * float(law.pieces[COMPONENTS[name], 0, 4]) / abs(x - x_old)
+    by_new = [mean_of(form, name, x + s, x_old)[0] for s in (step, -step)]
+    assert ahead == pytest.approx((by_new[0] - by_new[1]) / (2 * step), rel=1e-4, abs=size)
+    by_old = [mean_of(form, name, x, x_old + s)[0] for s in (step, -step)]
+    assert behind == pytest.approx((by_old[0] - by_old[1]) / (2 * step), rel=1e-4, abs=size)
+
+
+@settings(deadline=None)
+@given(forms, names, strains, st.sampled_from([0.0, 1e-18, -1e-15, 1e-13, 1e-10, -1e-8, 1e-7]))
+def test_small_increments_lose_no_digits(form, name, x, change):
+    """Inside a piece, mean and half slopes are those of the point, however small the change."""
+    law, component = OF_STRAIN[form], COMPONENTS[name]
+    near = turning_points(law, name)
+    assume(np.abs(x - near).min() > 1e-6)
+    mean, ahead, behind = mean_of(form, name, x + change, x)
+    assert mean == pytest.approx(point_modulus(law.pieces, component, x + change / 2), rel=1e-12)
+    step = 1e-7
+    half = (law.modulus(name, x + step) - law.modulus(name, x - step)) / (4 * step)
+    scale = 1e-6 * float(law.pieces[component, :, 4].max()) / step * 1e-3
+    assert [ahead, behind] == pytest.approx([half, half], rel=1e-4, abs=scale)
+
+
+@settings(max_examples=400, deadline=None)
+@given(forms, names, strains, strains)
+@example("trilinear", "E1", 0.01, 0.01)
+@example("trilinear", "E1", 0.01 + 1e-13, 0.01 - 1e-13)
+@example("spline", "G12", 0.0, 0.0)
+@example("cubic", "E2", 0.13, 0.13)
+@example("cubic", "G12", -0.2, 0.15)
+def test_rows_by_piece_are_the_derivatives_by_the_coefficients(form, name, x, x_old):
+    law, component = OF_STRAIN[form], COMPONENTS[name]
+    weights = np.full((law.pieces.shape[1], 4), np.nan)
+    first, stop = by_pieces(law.pieces, component, x, x_old, weights)
+    rows = map_in_range(law.form, law.strain_range)[component, first:stop]
+    mean = mean_of(form, name, x, x_old)[0]
+    assert weights[first:stop, 3].sum() == pytest.approx(1.0)
+    by_beta = np.einsum("ki,kij->j", weights[first:stop], rows)
+    assert by_beta @ law.beta == pytest.approx(mean, rel=1e-9)
+
+
+@EVERY_FORM
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_stress_is_continuous_where_a_piece_ends(form, name):
+    law = OF_STRAIN[form]
+    for at in turning_points(law, name):
+        for old in (-0.17, 0.0, 0.005, 0.15):
+            ends = (at - 1e-12, at, at + 1e-12)
+            rises = [mean_of(form, name, x, old)[0] * (x - old) for x in ends]
+            assert np.ptp(rises) < 3e-12 * law.modulus(name, np.linspace(0, 0.2, 99)).max()
+
+
+@pytest.mark.parametrize("bad", [(np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan), (np.nan, 0.5)])
+@EVERY_FORM
+def test_what_is_no_number_gives_none(form, bad):
+    for name in COMPONENTS:
+        assert np.isnan(mean_of(form, name, *bad)[0])
+
+
+@EVERY_FORM
+@STEPS
+@pytest.mark.parametrize("end", [0.005, 0.06, 0.11, 0.16])
+def test_bars_are_exact_in_any_number_of_increments(form, steps, end):
+    """Along the warp and along the fill; E of the yarn across is held, because it gets shorter."""
+    law = OF_STRAIN[form]
+    along = np.linspace(0.0, end, steps + 1)
+    path = np.column_stack([along, -law.nu12 * along, 0 * along])
+    warp = integral(law, "E1", 0.0, end)
+    assert follow(law, path) == pytest.approx([warp, 0, 0], rel=1e-10, abs=1e-10)
+    across = [-law.nu12 * integral(law, "E2", 0.0, x) / law.E1(0.0) for x in along]
+    path = np.column_stack([across, along, 0 * along])
+    fill = integral(law, "E2", 0.0, end)
+    assert follow(law, path) == pytest.approx([0, fill, 0], rel=1e-10, abs=1e-10)
+
+
+@EVERY_FORM
+@settings(max_examples=50, deadline=None)
+@given(names, st.lists(strains, min_size=1, max_size=6))
+def test_any_path_of_one_strain_ends_on_the_curve(form, name, path):
+    law, component = replace(OF_STRAIN[form], nu12=0.0), COMPONENTS[name]
+    whole = np.zeros((len(path) + 1, 3))
+    whole[1:, component] = path
+    expected = np.zeros(3)
+    expected[component] = integral(law, name, 0.0, path[-1])
+    assert follow(law, whole) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@EVERY_FORM
+def test_the_tangent_of_the_law_is_that_of_its_stress(form):
+    law, step = OF_STRAIN[form], 1e-7
+    random = np.random.default_rng(3)
+    old, new = random.uniform(-0.15, 0.15, (2, 300, 3))
+    stress = random.standard_normal((300, 3))
+    near = [np.abs(np.subtract.outer(new[:, c], turning_points(law, n))).min(axis=1)
+            for n, c in COMPONENTS.items()]  # fmt: skip
+    keep = (np.array(near) > 1e-5).all(axis=0)
+    assert keep.sum() > 200
+    old, new, stress = old[keep], new[keep], stress[keep]
+    _, tangent = law.increment(old, new, stress)
+    for j in range(3):
+        shift = step * np.eye(3)[j]
+        ahead, behind = (law.increment(old, new + s, stress)[0] for s in (shift, -shift))
+        off = tangent[:, :, j] - (ahead - behind) / (2 * step)
+        assert np.abs(off).max() < 1e-6 * np.abs(tangent).max()
+
+
+# --- form registry ---
+ENDS = (0.1, 0.2, 0.5)
+WORKING = """
+from dataclasses import dataclass, replace
+from bubblefit.materials.forms.polynomial import LINEAR
+from bubblefit.materials.forms.registry import Offer
+
+def make(name, settings, strain_range):
+    {body}
+
+THING = Offer("acme", make, ("knee",))
+"""
+
+
+def test_ours_are_there_and_say_their_settings():
+    ours = ("constant", "linear", "quadratic", "cubic", "load-ratio", "spline", "trilinear")
+    assert form_names()[: len(ours)] == ours
+    assert form_settings("cubic") == () and form_settings("spline") == ("knots",)
+    assert form_settings("nothere") == ()
+    assert isinstance(form_named("cubic", {}, ENDS), Form)
+    message = complaint(form_named, "cubik", {}, ENDS)
+    assert message.startswith("form: no form is called 'cubik'; did you mean 'cubic'? known: con")
+    assert "a cubic law has no knots" in complaint(form_named, "cubic", {"knots": 3}, ENDS)
+
+
+def test_a_plug_ins_form_is_one_of_them(packages):
+    install(packages, "acme", WORKING.format(body="return LINEAR"))
+    assert "acme" in form_names() and form_settings("acme") == ("knee",)
+    assert form_named("acme", {"knee": 0.1}, ENDS).size == 12
+    assert "a acme law has no knots" in complaint(form_named, "acme", {"knots": 1}, ENDS)
+    # One of ours is not replaced.
+    install(packages, "cubic", "raise RuntimeError", distribution="acme-others")
+    assert form_named("cubic", {}, ENDS).name == "cubic" and form_names().count("cubic") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("raise RuntimeError('no licence')", "cannot be imported (RuntimeError: no licence)"),
+        ("THING = 3", "is no form: acme_acme:THING has no name, make, settings"),
+        (WORKING.format(body="pass").replace('"acme"', '"else"'), "calls its form 'else'; both"),
+        (WORKING.format(body="return settings['k']"), "fails when it is made (KeyError: 'k')"),
+        (WORKING.format(body="return 3"), "gives no form: int has no describe, free, from_values"),
+    ],
+)
+def test_a_broken_form_is_one_line_and_breaks_no_other(packages, text, words):
+    install(packages, "acme", text)
+    with pytest.raises(PlugInFailure) as failure:
+        form_named("acme", {}, ENDS)
+    message = str(failure.value)
+    assert message.startswith(f"the plug-in 'acme' of acme-things 2.5 {words}")
+    assert message.endswith("; repair or uninstall it") and "\n" not in message
+    assert form_named("cubic", {}, ENDS).name == "cubic"

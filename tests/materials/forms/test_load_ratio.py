@@ -1,7 +1,5 @@
 """Moduli that go with the load ratio: closed forms, derivatives, increments, pressed yarns."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +23,8 @@ from bubblefit.solvers.registry import solver_named
 from bubblefit.solvers.run_cache import RunCache
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from ...complaints import complaint
 
 NU = 0.24
 #: MPa: G12, E2 at 1:1 and its gain, E1 at 1:1 and its gain.
@@ -57,9 +57,7 @@ angles = st.floats(0.0, RIGHT)
 
 @settings(max_examples=60, deadline=None)
 @given(gains, gains, angles, st.integers(1, 5))
-def test_a_proportional_path_has_the_moduli_of_its_ratio(
-    fill_gain: float, warp_gain: float, angle: float, increments: int
-) -> None:
+def test_a_proportional_path_has_the_moduli_of_its_ratio(fill_gain, warp_gain, angle, increments):
     """Strain is the compliance of the ratio times the stress, in any number of increments."""
     beta = (30.0, 500.0, fill_gain, 700.0, warp_gain)
     share = np.array([np.cos(angle), np.sin(angle)])
@@ -73,7 +71,7 @@ def test_a_proportional_path_has_the_moduli_of_its_ratio(
 
 
 @pytest.mark.parametrize("share", RATIOS)
-def test_a_patch_at_small_loads_has_them_too(share: tuple[float, float]) -> None:
+def test_a_patch_at_small_loads_has_them_too(share):
     """Forces are over the width before the test: at loads that hardly strain it, the same."""
     load = 1e-5 * np.array([share], dtype=float)
     wanted = compliance(BETA, share) @ load[0] / 0.8
@@ -81,22 +79,19 @@ def test_a_patch_at_small_loads_has_them_too(share: tuple[float, float]) -> None
     np.testing.assert_allclose(found.strain[0], wanted, rtol=1e-6, atol=1e-6 * wanted.max())
 
 
-def test_without_gains_it_is_the_constant_law() -> None:
+def test_without_gains_it_is_the_constant_law():
     flat = law_of((30.0, 800.0, 0.0, 1000.0, 0.0))
     known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU)
     rng = np.random.default_rng(1)
     old, new = rng.normal(0.0, 0.03, (2, 50, 3))
     stress = rng.normal(0.0, 20.0, (50, 3))
-    for a, b in zip(
-        flat.increment(old, new, stress), known.increment(old, new, stress), strict=True
-    ):
+    ours, theirs = (law.increment(old, new, stress) for law in (flat, known))
+    for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_array_equal(a, b)
 
 
 # Which ratio it is
-
-
-def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed() -> None:
+def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed():
     for a, b in ((3.0, 1.0), (1.0, 2.0)):
         assert load_angle(a, b)[0] == pytest.approx(np.arctan2(b, a), rel=1e-15)
     assert load_angle(0.0, 0.0) == (RIGHT / 2, 0.0, 0.0)
@@ -110,43 +105,38 @@ def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed() -> None:
 
 
 @pytest.mark.parametrize("stress", [(3.0, 1.0), (-1.0, -3.0), (2.0, -1.0)])
-def test_derivatives_of_the_ratio(stress: tuple[float, float]) -> None:
+def test_derivatives_of_the_ratio(stress):
     step, a, b = 1e-6, *stress
     by = [
         (load_angle(a + step, b)[0] - load_angle(a - step, b)[0]) / (2 * step),
         (load_angle(a, b + step)[0] - load_angle(a, b - step)[0]) / (2 * step),
     ]
     assert load_angle(a, b)[1:] == pytest.approx(by, abs=1e-9)
-
-
-def test_without_stress_it_begins_at_equal_loads() -> None:
+    # Without stress it begins at equal loads.
     none = np.zeros(3)
     _, tangent = law_of().increment(none, none, none)
     known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU).increment(none, none, none)[1]
     np.testing.assert_allclose(tangent, known, rtol=1e-14)
 
 
-def test_a_yarn_that_is_pressed_beside_a_pulled_one_counts_as_one_without_load() -> None:
+def test_a_yarn_that_is_pressed_beside_a_pulled_one_counts_as_one_without_load():
     e1, e2 = moduli(BETA, (1, 0))
     new = np.array([[0.02, -0.02, 0.0]])
     stress, _ = law_of().increment(np.zeros((1, 3)), new, np.zeros((1, 3)))
-    wanted = HypoelasticLaw.linear(e1, e2, 30.0, NU).increment(
-        np.zeros((1, 3)), new, np.zeros((1, 3))
-    )
+    known = HypoelasticLaw.linear(e1, e2, 30.0, NU)
+    wanted = known.increment(np.zeros((1, 3)), new, np.zeros((1, 3)))
     assert stress[0, 1] < 0
     np.testing.assert_allclose(stress, wanted[0], rtol=1e-12)
 
 
 # Increments and derivatives
-
-
 def along(increments: int) -> np.ndarray:
     """Warp first, then the fill while the warp is let go: nowhere in proportion."""
     share = np.linspace(0.0, 1.0, increments + 1)[1:, None]
     return np.concatenate([share * [20.0, 5.0], [20.0, 5.0] + share * [-10.0, 20.0]])
 
 
-def test_the_error_goes_with_the_square_of_the_increment() -> None:
+def test_the_error_goes_with_the_square_of_the_increment():
     ends = {n: biaxial_response(law_of(), along(n), 1.0).strain[-1] for n in (4, 8, 16, 32, 1024)}
     off = [np.abs(ends[n] - ends[1024]).max() for n in (4, 8, 16, 32)]
     orders = np.log2(np.array(off[:-1]) / off[1:])
@@ -156,7 +146,7 @@ def test_the_error_goes_with_the_square_of_the_increment() -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_the_tangent(seed: int) -> None:
+def test_the_tangent(seed):
     rng = np.random.default_rng(seed)
     old = rng.normal(0.0, 0.02, 3)
     new, stress = old + rng.normal(0.0, 0.02, 3), rng.normal(0.0, 10.0, 3)
@@ -177,7 +167,7 @@ def test_the_tangent(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", [*(f"beta_{i}" for i in range(5)), "nu12", "thickness"])
-def test_derivatives_of_a_patch_through_its_history(name: str) -> None:
+def test_derivatives_of_a_patch_through_its_history(name):
     loads = np.concatenate([along(3), [[10.0, 1.0], [2.0, 8.0]]])
     steps = {"nu12": 1e-6, "thickness": 1e-6}
     step = steps.get(name, 1e-2)
@@ -201,22 +191,19 @@ def test_derivatives_of_a_patch_through_its_history(name: str) -> None:
 
 
 # Where it holds
-
-
-def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio() -> None:
+def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio():
     falling = law_of((30.0, 800.0, 0.0, 1000.0, 1500.0))  # E1 < 0 where the warp carries little
     assert falling.modulus("E1", 0.0) == 1000.0
     assert falling.modulus("E1", 0.0, 0.0) == pytest.approx(1000.0 - 1500.0 * EVEN)
     assert positive(law_of()) and not positive(falling)
     check_positive(MaterialCard(law_of(), 0.8))
-    with pytest.raises(InputError, match=r"E1 is -60\.66 MPa"):
-        check_positive(MaterialCard(falling, 0.8))
+    assert "E1 is -60.66 MPa" in complaint(check_positive, MaterialCard(falling, 0.8))
     along_fill = np.array([[0.0, 10.0]])
     assert biaxial_response(falling, along_fill, 0.8).reached == 0
     assert biaxial_response(falling, along_fill[:, ::-1], 0.8).reached == 1
 
 
-def test_where_it_is_definite_in_a_pull_along_either_yarn() -> None:
+def test_where_it_is_definite_in_a_pull_along_either_yarn():
     """E1 > nu12^2 E2 with both at the ratio of the pull, not at equal loads."""
     nu = 0.9
     beta = np.array([30.0, 800.0, 0.0, 1000.0, 800.0])
@@ -228,7 +215,7 @@ def test_where_it_is_definite_in_a_pull_along_either_yarn() -> None:
     assert (rows @ [30.0, 800.0, 0.0, 1000.0, 0.0]).min() > 0
 
 
-def test_a_card_of_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_card_of_it(tmp_path):  # type: ignore[no-untyped-def]
     known = replace(law_of(), strain_range=[0.02, 0.1, 0.1])
     MaterialCard(known, 0.8, "ratio").write(tmp_path / "m.toml")
     text = (tmp_path / "m.toml").read_text()
@@ -240,7 +227,7 @@ def test_a_card_of_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
     assert LABELS == ("G12", "E2 at 1:1", "dE2", "E1 at 1:1", "dE1")
 
 
-def test_what_knows_strain_alone_refuses_it_in_one_line() -> None:
+def test_what_knows_strain_alone_refuses_it_in_one_line():
     card = MaterialCard(law_of(), 0.8, "ratio")
     takes = {f.name for f in FORMATS.values() if f.load_ratios}
     assert takes == {"constants", "gsa", "rfem"}
@@ -250,8 +237,7 @@ def test_what_knows_strain_alone_refuses_it_in_one_line() -> None:
         else:
             with pytest.raises(InputError, match=r"form: the format .* depend on the ratio"):
                 one.export(card)
-    with pytest.raises(InputError, match="is for the solver membrane"):
-        piece_constants(card.law)
+    assert "is for the solver membrane" in complaint(piece_constants, card.law)
     check_carries(solver_named("membrane"), card.law)
     with pytest.raises(InputError, match="calculix takes moduli of strain"):
         check_carries(solver_named("calculix"), card.law)

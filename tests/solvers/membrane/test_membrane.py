@@ -1,7 +1,6 @@
-"""The membrane solver: bar, patch, rotation, equilibrium, tangent, cut-back, failure."""
+"""The membrane: kernel, equilibrium, failure, single elements, marching."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,18 +8,32 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh
+from bubblefit.meshes.strip_models import SIDE, PatchModel, elongations, straight_strip
+from bubblefit.solvers.base import analysis_of
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.factorisation import BandedTangent, SparseTangent, tangent_for
 from bubblefit.solvers.membrane.kernel import reference_elements
-from bubblefit.solvers.membrane.newton import Membrane
+from bubblefit.solvers.membrane.newton import (
+    Asked,
+    Loading,
+    Membrane,
+    NoEquilibrium,
+    lagrange,
+    march,
+)
+from bubblefit.solvers.membrane.newton import straight_on as line
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
+from ...biaxial_files import BENT
+from ...complaints import complaint, complaint_with
 from ...published_laws import TABLE_4_2
 
+# --- membrane ---
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
 E1, E2, G12, NU, THICKNESS = 300.0, 220.0, 5.0, 0.24, 0.81
@@ -67,12 +80,10 @@ def inflated(model: BubbleModel, law: HypoelasticLaw = LAW) -> tuple[Membrane, n
 
 
 # Bar and patch
-
-
 @BOTH
 @pytest.mark.parametrize("distort", [0.0, 0.3])
 @pytest.mark.parametrize("direction", ["warp", "fill"])
-def test_uniaxial_bar(thickness_change: str, distort: float, direction: str) -> None:
+def test_uniaxial_bar(thickness_change, distort, direction):
     """Stress E log(l/L); the width follows nu; the force is stress times the current section."""
     length, width, steps, end = 40.0, 10.0, 4, 6.0
     points, quads = grid(3, 6, width, length, distort)
@@ -107,7 +118,7 @@ def test_uniaxial_bar(thickness_change: str, distort: float, direction: str) -> 
     assert forces[near, axis].sum() == pytest.approx(-force, rel=1e-9)
 
 
-def test_bar_with_a_linear_modulus_is_exact_in_any_number_of_steps() -> None:
+def test_bar_with_a_linear_modulus_is_exact_in_any_number_of_steps():
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = G12, E2, 900.0, E1
     points, quads = grid(2, 4, 10.0, 40.0)
@@ -127,7 +138,7 @@ def test_bar_with_a_linear_modulus_is_exact_in_any_number_of_steps() -> None:
 
 
 @BOTH
-def test_patch_of_distorted_elements(thickness_change: str) -> None:
+def test_patch_of_distorted_elements(thickness_change):
     """Rim displaced by one deformation gradient, in a turned plane: the inside must follow it."""
     points, quads = grid(4, 4, 10.0, 12.0, distort=0.3)
     law = replace(LAW, thickness_change=thickness_change)
@@ -149,10 +160,8 @@ def test_patch_of_distorted_elements(thickness_change: str) -> None:
 
 
 # Rotation and equilibrium
-
-
 @BOTH
-def test_rigid_rotation_turns_every_force_and_nothing_else(thickness_change: str) -> None:
+def test_rigid_rotation_turns_every_force_and_nothing_else(thickness_change):
     law = replace(LAW, thickness_change=thickness_change)
     m, u = inflated(quarter_bubble(), law)
     random = np.random.default_rng(8).uniform(-0.3, 0.3, u.shape)  # out of balance, too
@@ -172,7 +181,7 @@ def polygon_area(points: np.ndarray) -> float:
     return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
-def test_reactions_balance_the_pressure_on_the_full_disk() -> None:
+def test_reactions_balance_the_pressure_on_the_full_disk():
     """The rim is plane and fixed: the resultant is pressure times its polygon."""
     mesh = disk_mesh(100.0, 192, "full")
     model = BubbleModel(mesh, THICKNESS, PRESSURES, default_increments(PRESSURES))
@@ -183,7 +192,7 @@ def test_reactions_balance_the_pressure_on_the_full_disk() -> None:
     assert np.abs(reaction[:, :2]).max() < 1e-6 * area * PRESSURES[-1]
 
 
-def test_quarter_and_full_disk_agree() -> None:
+def test_quarter_and_full_disk_agree():
     whole, quarter = (disk_mesh(100.0, 192, s) for s in ("full", "quarter"))
     steps = default_increments(PRESSURES)
     a, b = (MembraneSolver(1e-11).run(BubbleModel(m, THICKNESS, PRESSURES, steps), LAW)
@@ -196,7 +205,7 @@ def test_quarter_and_full_disk_agree() -> None:
     assert 4 * total == pytest.approx(a.reactions["rim"][:, 2], rel=1e-8)
 
 
-def test_the_bubble_grows_with_pressure_inside_its_rim() -> None:
+def test_the_bubble_grows_with_pressure_inside_its_rim():
     model = quarter_bubble(192)
     history = MembraneSolver().run(model, LAW)
     apex = history.displacement[:, model.mesh.node_sets["apex"][0], 2]
@@ -206,7 +215,7 @@ def test_the_bubble_grows_with_pressure_inside_its_rim() -> None:
     assert (history.displacement[:, model.mesh.node_sets["rim"]] == 0).all()
 
 
-def test_increments_converge_with_second_order() -> None:
+def test_increments_converge_with_second_order():
     """The seven pressures as increments are within 0.002 % of many: the modulus is a mean."""
     seven = quarter_bubble(192, ())
     fine = quarter_bubble(192, sorted({*PRESSURES, *np.arange(2e-3, 0.3, 2e-3)}))
@@ -224,13 +233,9 @@ def test_increments_converge_with_second_order() -> None:
 
 
 # Tangent
-
-
 @BOTH
 @pytest.mark.parametrize("pressure", [0.0, 0.3])
-def test_kernel_tangent_against_differences_of_the_residual(
-    thickness_change: str, pressure: float
-) -> None:
+def test_kernel_tangent_against_differences_of_the_residual(thickness_change, pressure):
     """Large deformation, stress and strain history, follower pressure: all 3 n by 3 n entries."""
     points, quads = grid(2, 2, 8.0, 10.0, distort=0.2)
     law = replace(LAW, thickness_change=thickness_change)
@@ -258,7 +263,7 @@ def test_kernel_tangent_against_differences_of_the_residual(
     assert np.abs(tangent - expected).max() < 1e-6 * np.abs(tangent).max()
 
 
-def test_newton_is_quadratic_near_the_answer() -> None:
+def test_newton_is_quadratic_near_the_answer():
     m, u = inflated(quarter_bubble())
     # The state is accepted: a little more pressure, starting from it.
     norms, v = [], u.copy()
@@ -271,7 +276,7 @@ def test_newton_is_quadratic_near_the_answer() -> None:
     assert orders.max() > 1.8
 
 
-def test_band_and_superlu_solve_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_band_and_superlu_solve_the_same(monkeypatch):
     mesh = disk_mesh(100.0, 192, "quarter")
     model = BubbleModel(mesh, THICKNESS, PRESSURES)
     free = np.setdiff1d(np.arange(mesh.points.size), model.fixed)
@@ -285,7 +290,7 @@ def test_band_and_superlu_solve_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     assert by_superlu.displacement == pytest.approx(by_band.displacement, abs=1e-7)
 
 
-def test_tangents_assemble_and_solve_a_known_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tangents_assemble_and_solve_a_known_matrix(monkeypatch):
     points, quads = grid(3, 4, 3.0, 4.0)
     free = np.arange(6, points.size)
     random = np.random.default_rng(3)
@@ -305,50 +310,29 @@ def test_tangents_assemble_and_solve_a_known_matrix(monkeypatch: pytest.MonkeyPa
 
 
 # Robustness
-
-
-@pytest.mark.parametrize("refused", [1, 3, 6])
-def test_cut_back_does_not_change_the_result(monkeypatch: pytest.MonkeyPatch, refused: int) -> None:
-    """Equilibrium iterations that fail on purpose: found by halved load steps all the same."""
-    model = quarter_bubble(192, ())
+@pytest.mark.parametrize(("level", "refused"), [(3, 1), (3, 3), (3, 6), (0, 7)])
+def test_cut_back_does_not_change_the_result(monkeypatch, level, refused):
+    model = quarter_bubble(192, () if level else None)
     expected = MembraneSolver(1e-11).run(model, LAW)
     original, calls = Membrane.equilibrium, []
 
     def stubborn(self: Membrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
         calls.append(pressure)
-        # The fourth level is refused until the load step has been halved often enough.
-        if pressure == model.increments[3] and calls.count(pressure) <= refused:
+        # One level is refused until the load step has been halved often enough.
+        if pressure == model.increments[level] and calls.count(pressure) <= refused:
             return None
         return original(self, u, pressure)
 
     monkeypatch.setattr(Membrane, "equilibrium", stubborn)
     found = MembraneSolver(1e-11).run(model, LAW)
-    assert calls.count(model.increments[3]) == refused + 1
+    assert calls.count(model.increments[level]) == refused + 1
     assert len(set(calls)) > len(model.increments)
     assert found.displacement == pytest.approx(expected.displacement, abs=1e-7)
     assert found.strain_max == pytest.approx(expected.strain_max, abs=1e-9)
 
 
-def test_the_first_increment_is_cut_back_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = quarter_bubble()
-    expected = MembraneSolver(1e-11).run(model, LAW)
-    original, first = Membrane.equilibrium, model.increments[0]
-    refused = []
-
-    def stubborn(self: Membrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
-        if pressure == first and len(refused) < 7:
-            refused.append(pressure)
-            return None
-        return original(self, u, pressure)
-
-    monkeypatch.setattr(Membrane, "equilibrium", stubborn)
-    found = MembraneSolver(1e-11).run(model, LAW)
-    assert len(refused) == 7
-    assert found.displacement == pytest.approx(expected.displacement, abs=1e-7)
-
-
 @BOTH
-def test_one_increment_to_full_pressure_equals_many(thickness_change: str) -> None:
+def test_one_increment_to_full_pressure_equals_many(thickness_change):
     """With constant moduli the path does not matter, so one giant step must find the same."""
     law = HypoelasticLaw.linear(E1, E2, G12, NU, thickness_change)
     mesh = disk_mesh(100.0, 192, "quarter")
@@ -358,7 +342,7 @@ def test_one_increment_to_full_pressure_equals_many(thickness_change: str) -> No
     assert once.displacement == pytest.approx(often.displacement, abs=1e-7)
 
 
-def test_a_warm_start_finds_the_same_result() -> None:
+def test_a_warm_start_finds_the_same_result():
     model = quarter_bubble()
     cold = MembraneSolver(1e-11).run(model, LAW)
     other = LAW.with_beta(LAW.beta * 1.01)
@@ -368,7 +352,7 @@ def test_a_warm_start_finds_the_same_result() -> None:
     assert warm.iterations < expected.iterations
 
 
-def test_a_useless_guess_is_survived() -> None:
+def test_a_useless_guess_is_survived():
     model = quarter_bubble()
     expected = MembraneSolver(1e-11).run(model, LAW)
     guess = np.random.default_rng(0).uniform(-60, 60, expected.path.shape)
@@ -377,7 +361,7 @@ def test_a_useless_guess_is_survived() -> None:
     assert found.displacement == pytest.approx(expected.displacement, abs=1e-7)
 
 
-def test_a_tolerance_below_rounding_is_met_as_well_as_can_be() -> None:
+def test_a_tolerance_below_rounding_is_met_as_well_as_can_be():
     model = quarter_bubble()
     expected = MembraneSolver(1e-10).run(model, LAW)
     found = MembraneSolver(1e-15).run(model, LAW)
@@ -385,8 +369,7 @@ def test_a_tolerance_below_rounding_is_met_as_well_as_can_be() -> None:
     assert found.iterations < 3 * expected.iterations
 
 
-def test_runs_leave_nothing_behind() -> None:
-    """The same solver object, used twice and after a failure, repeats itself to the last bit."""
+def test_runs_leave_nothing_behind():
     model, solver = quarter_bubble(), MembraneSolver()
     first = solver.run(model, LAW)
     with pytest.raises(SolverFailure):
@@ -404,24 +387,24 @@ HOPELESS = {
 
 
 @pytest.mark.parametrize("law", HOPELESS.values(), ids=HOPELESS)
-def test_hopeless_moduli_raise_solver_failure(law: HypoelasticLaw) -> None:
+def test_hopeless_moduli_raise_solver_failure(law):
     with pytest.raises(SolverFailure, match="no equilibrium at"):
         MembraneSolver().run(quarter_bubble(), law)
 
 
-def test_a_modulus_that_turns_negative_on_the_way_fails_there() -> None:
+def test_a_modulus_that_turns_negative_on_the_way_fails_there():
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = G12, E2, -5000.0, E1
     with pytest.raises(SolverFailure, match="kPa"):
         MembraneSolver().run(quarter_bubble(), HypoelasticLaw(beta))
 
 
-def test_a_pressure_offset_below_the_first_pressure_fails() -> None:
+def test_a_pressure_offset_below_the_first_pressure_fails():
     with pytest.raises(InputError, match="expected positive"):
         quarter_bubble().with_parameters({"pressure_offset": -1.0})
 
 
-def test_a_pressure_offset_is_a_shift_of_every_load() -> None:
+def test_a_pressure_offset_is_a_shift_of_every_load():
     model = quarter_bubble()
     shifted = BubbleModel(
         model.mesh, THICKNESS, PRESSURES + 0.002, np.array(model.increments) + 0.002
@@ -433,33 +416,178 @@ def test_a_pressure_offset_is_a_shift_of_every_load() -> None:
 
 
 # Bad input
-
-
-def test_a_quad_inside_out_is_named() -> None:
+def test_a_quad_inside_out_is_named():
     points, quads = grid(2, 2, 1.0, 1.0)
     points[4] = [2.0, 2.0, 0.0]
     with pytest.raises(InputError, match=r"element .*mend the mesh"):
         reference_elements(points, quads)
 
 
-@pytest.mark.parametrize("pressures", [[], [0.0, 0.1], [0.2, 0.1], [0.1, 0.1], [-0.1]])
-def test_pressures_must_increase(pressures: list[float]) -> None:
-    with pytest.raises(InputError, match="pressures"):
-        BubbleModel(disk_mesh(100.0, 48, "quarter"), THICKNESS, pressures)
-
-
-def test_increments_must_contain_the_pressures() -> None:
+def test_pressures_must_increase_and_be_increments():
     mesh = disk_mesh(100.0, 48, "quarter")
-    with pytest.raises(InputError, match="increments"):
-        BubbleModel(mesh, THICKNESS, [0.1, 0.2], [0.05, 0.2])
-    with pytest.raises(InputError, match="rim"):
-        BubbleModel(Mesh(mesh.points, mesh.quads, {}), THICKNESS, [0.1])
-    with pytest.raises(InputError, match="thickness"):
-        BubbleModel(mesh, 0.0, [0.1])
+    for pressures in ([], [0.0, 0.1], [0.2, 0.1], [0.1, 0.1], [-0.1]):
+        assert "pressures" in complaint(BubbleModel, mesh, THICKNESS, pressures)
+    assert "increments" in complaint(BubbleModel, mesh, THICKNESS, [0.1, 0.2], [0.05, 0.2])
+    assert "rim" in complaint(BubbleModel, Mesh(mesh.points, mesh.quads, {}), THICKNESS, [0.1])
+    assert "thickness" in complaint(BubbleModel, mesh, 0.0, [0.1])
 
 
-def test_solvers_by_name() -> None:
+def test_solvers_by_name():
     check = solver_named("membrane").check()
     assert check.available and check.carries_law
-    with pytest.raises(InputError, match="membrane"):
-        solver_named("abacus")
+    assert "membrane" in complaint(solver_named, "abacus")
+
+
+# --- patch ---
+LOADS = np.outer(np.linspace(2, 30, 8), [1.0, 0.5])
+
+
+def test_the_corners_move_as_the_law_says_and_so_do_their_derivatives():
+    names = ("beta_7", "beta_11", "nu12")
+    history, slope = MembraneSolver().run_with_sensitivity(PatchModel(LOADS, 0.8), BENT, names)
+    wanted = biaxial_response(BENT, LOADS, 0.8, names)
+    np.testing.assert_allclose(elongations(history.displacement), wanted.elongation, rtol=1e-13)
+    np.testing.assert_allclose(history.displacement[:, 1, 0], SIDE * wanted.elongation[:, 0])
+    np.testing.assert_allclose(history.displacement[:, 3, 1], SIDE * wanted.elongation[:, 1])
+    assert (history.displacement[:, 0] == 0).all() and (history.displacement[..., 2] == 0).all()
+    step = 1e-3 * np.eye(12)[7]
+    laws = [BENT.with_beta(BENT.beta + step), BENT.with_beta(BENT.beta - step)]
+    ends = [MembraneSolver().run(PatchModel(LOADS, 0.8), law).displacement for law in laws]
+    ahead, behind = (elongations(end) for end in ends)
+    by_e2 = (ahead - behind) / 2e-3
+    np.testing.assert_allclose(elongations(slope)[..., 0], by_e2, atol=1e-7 * np.abs(by_e2).max())
+    assert slope.shape == (8, 4, 3, 3)
+    np.testing.assert_allclose(history.strain_max[:2], wanted.strain.max(axis=0))
+    np.testing.assert_allclose(history.strain_min[:2], wanted.strain.min(axis=0))
+    assert history.unstable == () and history.strain_max[2] == 0
+    np.testing.assert_allclose(history.load, LOADS.sum(axis=1))
+
+
+def test_progress_and_stress_are_told():
+    solver, told = MembraneSolver(), []
+    solver.progress = lambda done: told.append(done.time)
+    solver.run(PatchModel(LOADS, 0.8), BENT)
+    assert told == [8.0]
+    stress = biaxial_response(BENT, LOADS, 0.8).stress[-1]
+    np.testing.assert_allclose(solver.stress[0, 0], [*stress, 0.0])
+
+
+def test_a_load_without_equilibrium_is_a_failure_that_says_which():
+    falling = HypoelasticLaw([0, 0, 0, 30, 0, 0, -8e3, 600, 0, 0, -8e3, 600], 0.2, [0.08] * 3)
+    loads = np.outer(np.linspace(2, 60, 30), [1.0, 1.0])
+    with pytest.raises(SolverFailure, match=r"no equilibrium at \d+ and \d+ N/mm.*load \d+ of 30"):
+        MembraneSolver().run(PatchModel(loads, 0.8), falling)
+
+
+def test_unstable_loads_are_named():
+    law = HypoelasticLaw.linear(100.0, 100.0, 5.0, 0.6)
+    history = MembraneSolver().run(PatchModel([[10.0, 10.0], [100.0, 100.0]], 0.8), law)
+    assert history.unstable == ("100 and 100 N/mm",)
+
+
+def test_a_patch_needs_loads_and_a_thickness():
+    complaint_with(["loads", "(n, 2)", "(3,)"], PatchModel, [1.0, 2.0, 3.0], 0.8)
+    complaint_with(["finite"], PatchModel, [[1.0, np.nan]], 0.8)
+    complaint_with(["thickness", "> 0"], PatchModel, [[1.0, 1.0]], 0.0)
+
+
+# --- march ---
+MARCH_LAW = HypoelasticLaw.linear(300.0, 300.0, 100.0, 0.3)
+
+
+class Ladder(Loading):
+    """u = level, found only from a start nearer than `reach`; every look is noted."""
+
+    most_cuts = 3
+
+    def __init__(self, reach: float, top: float = np.inf) -> None:
+        self.reach, self.top, self.looks = reach, top, []
+
+    def equilibrium(self, start, level):
+        self.looks.append((float(start[0, 0]), level))
+        near = abs(float(start[0, 0]) - level) <= self.reach and level <= self.top
+        return np.full((1, 3), level) if near else None
+
+    def first(self, level):
+        return self.reached(0.0, np.zeros((1, 3)), level, np.zeros((1, 3)), self.most_cuts)
+
+    def ahead(self, levels, path, level):
+        return path[-1]
+
+    def onward(self, u, at, to, before):
+        return u
+
+    def problem(self, before, level, place):
+        return f"nothing between {before:g} and {level:g}, {place}"
+
+
+def ends(loading: Loading, levels: Sequence[float], **options) -> list[float]:
+    return [float(u[0, 0]) for u in march(loading, levels, Asked(), **options)]
+
+
+def test_what_is_near_is_reached_directly():
+    ladder = Ladder(1.0)
+    assert ends(ladder, [1.0, 2.0, 3.0]) == [1.0, 2.0, 3.0]
+    assert ladder.looks == [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]
+    # A march goes on from where another ended.
+    ladder = Ladder(1.0)
+    assert ends(ladder, [6.0], begun=(5.0, np.full((1, 3), 5.0))) == [6.0]
+    assert ladder.looks == [(5.0, 6.0)]
+
+
+def test_what_is_far_is_reached_in_halves_and_quarters():
+    ladder = Ladder(1.0)
+    assert ends(ladder, [1.0, 5.0]) == [1.0, 5.0]
+    assert [level for _, level in ladder.looks] == [1.0, 5.0, 3.0, 2.0, 3.0, 5.0, 4.0, 5.0]
+    assert ends(Ladder(0.125), [1.0]) == [1.0]  # eighths: three cuts
+    with pytest.raises(NoEquilibrium, match="nothing between 0 and 1, increment 1 of 1"):
+        ends(Ladder(0.1), [1.0])
+
+
+def test_the_levels_before_the_last_one_are_not_lost():
+    found = []
+    with pytest.raises(SolverFailure, match="nothing between 2 and 3, increment 3 of 3"):
+        for u in march(Ladder(1.0, top=2.0), [1.0, 2.0, 3.0], Asked()):
+            found.append(float(u[0, 0]))
+    assert found == [1.0, 2.0]
+
+
+def test_a_good_guess_is_taken_and_a_bad_one_costs_a_look():
+    ladder, guess = Ladder(1.0), np.array([1.0, 9.0])[:, None, None] * np.ones((2, 1, 3))
+    found = [float(u[0, 0]) for u in march(ladder, [2.0, 3.0], Asked(guess=guess))]
+    assert found == [2.0, 3.0]
+    assert ladder.looks == [(1.0, 2.0), (9.0, 3.0), (2.0, 3.0)]
+
+
+def test_extrapolation():
+    x = np.array([0.0, 1.0, 2.5, 4.0])
+    cubic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 0.3])
+    known = cubic(x)[:, None, None] * np.ones((4, 2, 3))
+    np.testing.assert_allclose(lagrange(x, known, 5.0), cubic(5.0), rtol=1e-12)
+    path = [np.full((1, 3), 2.0), np.full((1, 3), 3.0)]
+    np.testing.assert_allclose(line([1.0, 3.0], path, 4.0), 3.5)
+    assert line([1.0], path[:1], 4.0) is path[0]
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        BubbleModel(disk_mesh(90.0, 48, "quarter"), 0.81, (0.02, 0.05, 0.1)),
+        straight_strip("warp", 20.0, 22.0, 0.81, increments=3),
+    ],
+    ids=["bubble", "strip"],
+)
+def test_the_embedded_solver_tells_its_increments(model):
+    solver, told = MembraneSolver(), []
+    solver.progress = told.append
+    solver.run(model, MARCH_LAW)
+    assert [one.time for one in told] == [1, 2, 3]
+
+
+def test_a_model_that_is_not_in_the_table_is_refused():
+    class Mine(BubbleModel):
+        pass
+
+    assert analysis_of({BubbleModel: 1, object: 2}, Mine(disk_mesh(9.0, 48), 1.0, (0.1,)), "") == 1
+    with pytest.raises(SolverFailure, match="membrane: cannot run a str, only: BubbleModel, Uni"):
+        MembraneSolver().run("a bubble", MARCH_LAW)

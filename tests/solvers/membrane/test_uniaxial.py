@@ -1,7 +1,5 @@
 """The strip tests: mesh, model, closed forms, gauge, derivatives, failure."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,6 +24,7 @@ from bubblefit.solvers.membrane import newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.strip import Pull
 
+from ...complaints import complaint
 from ...places import PUBLISHED
 from ...published_laws import TABLE_3_2
 
@@ -54,9 +53,7 @@ def bias(increments: int = 100, final: float = BIAS[1], **counts: int) -> Uniaxi
 
 
 # Mesh
-
-
-def test_the_thesis_meshes() -> None:
+def test_the_thesis_meshes():
     half, whole = straight("warp").mesh, bias().mesh
     assert len(half.quads) == 40
     assert len(whole.quads) == 300
@@ -69,7 +66,7 @@ def test_the_thesis_meshes() -> None:
 
 @pytest.mark.parametrize("symmetry", ["full", "half"])
 @pytest.mark.parametrize(("along", "gauge"), [(7, 3.0), (8, 7.9), (3, 0.5), (5, None)])
-def test_every_quad_and_set(symmetry: str, along: int, gauge: float | None) -> None:
+def test_every_quad_and_set(symmetry, along, gauge):
     mesh = strip_mesh(4.0, 8.0, 4, along, gauge, symmetry)
     x, y = mesh.points[:, 0], mesh.points[:, 1]
     corner = mesh.points[mesh.quads]
@@ -88,54 +85,36 @@ def test_every_quad_and_set(symmetry: str, along: int, gauge: float | None) -> N
     assert y[a] == pytest.approx(8.0 - y[b], abs=1e-13)
 
 
-BAD_MESHES = {
-    "width": {"width": 0.0},
-    "length": {"length": np.inf},
-    "gauge_length": {"gauge_length": 9.0},
-    "across": {"across": 3},
-    "along": {"along": 2, "gauge_length": 4.0},
-}
-
-
-@pytest.mark.parametrize("field", BAD_MESHES)
-def test_bad_meshes_are_named(field: str) -> None:
+def test_bad_meshes_are_named():
     good = {"width": 4.0, "length": 8.0, "across": 4, "along": 6}
-    with pytest.raises(InputError, match=field):
-        strip_mesh(**{**good, **BAD_MESHES[field]})
+    for change in (
+        {"width": 0.0}, {"length": np.inf}, {"gauge_length": 9.0}, {"across": 3},
+        {"along": 2, "gauge_length": 4.0},
+    ):  # fmt: skip
+        assert next(iter(change)) in complaint(strip_mesh, **{**good, **change})
 
 
 # Model
-
-
-def test_bad_models_are_named() -> None:
+def test_bad_models_are_named():
     model = bias()
-    with pytest.raises(InputError, match="elongations"):
-        replace(model, elongations=[1.0, 1.0])
-    with pytest.raises(InputError, match="thickness"):
-        replace(model, thickness=0.0)
-    with pytest.raises(InputError, match="held there"):
-        replace(model, supports={"top": (1,), "bottom": (0, 1)})
-    with pytest.raises(InputError, match="jaw"):
-        replace(model, supports={"jaw": (1,)})
+    assert "elongations" in complaint(replace, model, elongations=[1.0, 1.0])
+    assert "thickness" in complaint(replace, model, thickness=0.0)
+    assert "held there" in complaint(replace, model, supports={"top": (1,), "bottom": (0, 1)})
+    assert "jaw" in complaint(replace, model, supports={"jaw": (1,)})
     with pytest.raises(InputError, match="gauge"):
         mesh = model.mesh
         replace(model, mesh=Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "gauge": [0]}))
-    with pytest.raises(InputError, match="final_length"):
-        straight_strip("warp", 20.0, 19.0, THICKNESS)
-    with pytest.raises(InputError, match="direction"):
-        straight_strip("bias", *WARP, THICKNESS)
-    with pytest.raises(InputError, match="increments"):
-        straight_strip("warp", *WARP, THICKNESS, increments=0)
+    assert "final_length" in complaint(straight_strip, "warp", 20.0, 19.0, THICKNESS)
+    assert "direction" in complaint(straight_strip, "bias", *WARP, THICKNESS)
+    assert "increments" in complaint(straight_strip, "warp", *WARP, THICKNESS, increments=0)
 
 
-def test_a_strip_has_no_pressure() -> None:
+def test_a_strip_has_no_pressure():
     with pytest.raises(InputError, match="pressure_offset"):
         MembraneSolver().run_with_sensitivity(straight("warp"), LAW, ["pressure_offset"])
 
 
 # Warp and fill: the homogeneous strip
-
-
 def closed_form(direction: str, law: HypoelasticLaw, model: UniaxialModel):
     """Load (N), Cauchy stress (MPa), strain across: the integral of the modulus.
 
@@ -156,7 +135,7 @@ def closed_form(direction: str, law: HypoelasticLaw, model: UniaxialModel):
 @STRAIGHT
 @BOTH
 @pytest.mark.parametrize("distort", [0.0, 0.25])
-def test_the_homogeneous_strip(direction: str, thickness_change: str, distort: float) -> None:
+def test_the_homogeneous_strip(direction, thickness_change, distort):
     model, law = straight(direction), replace(LAW, thickness_change=thickness_change)
     if distort:
         points = model.mesh.points.copy()
@@ -177,25 +156,18 @@ def test_the_homogeneous_strip(direction: str, thickness_change: str, distort: f
 
 @STRAIGHT
 @pytest.mark.parametrize("increments", [1, 2, 9, 100])
-def test_a_strip_is_the_integral_in_any_number_of_increments(
-    direction: str, increments: int
-) -> None:
-    lengths = WARP if direction == "warp" else FILL
-    end = np.log(lengths[1] / lengths[0])
-    first = 8 if direction == "warp" else 4
-    integral = np.polyval(np.polyint(LAW.beta[first : first + 4]), end)
-    across = LAW.nu12 * (end if direction == "warp" else integral / LAW.E1(0.0))
-    exact = integral * WIDTH * THICKNESS * np.exp(-across)
-    history = MembraneSolver(TIGHT).run(straight(direction, increments), LAW)
-    assert history.load[-1] == pytest.approx(exact, rel=1e-9)
+def test_a_strip_is_the_integral_in_any_number_of_increments(direction, increments):
+    model = straight(direction, increments)
+    exact, _, _ = closed_form(direction, LAW, model)
+    assert MembraneSolver(TIGHT).run(model, LAW).load[-1] == pytest.approx(exact[-1], rel=1e-9)
 
 
 @STRAIGHT
 @BOTH
 @pytest.mark.parametrize("increments", [1, 2, 9, 100])
 def test_a_trilinear_strip_is_exact_in_any_number_of_increments(
-    direction: str, thickness_change: str, increments: int
-) -> None:
+    direction, thickness_change, increments
+):
     law = replace(TRILINEAR, thickness_change=thickness_change)
     model = straight(direction, increments)
     name, first = ("E1", 8) if direction == "warp" else ("E2", 4)
@@ -212,7 +184,7 @@ def test_a_trilinear_strip_is_exact_in_any_number_of_increments(
 
 
 @pytest.mark.parametrize("bar", BARS, ids=lambda bar: f"{bar.model}-{bar.direction}")
-def test_the_end_stresses_of_marc(bar) -> None:
+def test_the_end_stresses_of_marc(bar):
     """Cauchy stress from the load of the strip and its width at the end; published to 5 digits."""
     lengths = WARP if bar.direction == "warp" else FILL
     model = straight_strip(bar.direction, lengths[0], lengths[0] * (1 + bar.elongation), THICKNESS)
@@ -223,7 +195,7 @@ def test_the_end_stresses_of_marc(bar) -> None:
 
 
 @STRAIGHT
-def test_reactions_balance_and_double_to_the_load(direction: str) -> None:
+def test_reactions_balance_and_double_to_the_load(direction):
     history = MembraneSolver(TIGHT).run(straight(direction), LAW)
     top, bottom = history.reactions["top"], history.reactions["bottom"]
     assert top[:, 1] == pytest.approx(-bottom[:, 1], rel=1e-9)
@@ -232,13 +204,8 @@ def test_reactions_balance_and_double_to_the_load(direction: str) -> None:
 
 
 # Bias
-
-
-def test_patch_of_turned_material() -> None:
-    """Warp at 30 degrees, constant moduli: the free strip is Hooke's law in turned axes.
-
-    Small strain, because Hooke's law is: the load of an off-axis bar between ends that slide.
-    """
+def test_patch_of_turned_material():
+    """The free strip is Hooke's law in turned axes, at small strain."""
     angle, e1, e2, g12, nu = np.radians(30.0), 300.0, 220.0, 5.0, 0.24
     c, s = np.cos(angle), np.sin(angle)
     compliance = c**4 / e1 + s**4 / e2 + (1 / g12 - 2 * nu / e1) * c**2 * s**2
@@ -265,7 +232,7 @@ def test_patch_of_turned_material() -> None:
     assert np.sqrt(gradient[1]).max() < 1e-6 * elongation
 
 
-def test_the_gauge_has_the_measured_length_in_every_increment() -> None:
+def test_the_gauge_has_the_measured_length_in_every_increment():
     model = bias()
     history = MembraneSolver().run(model, LAW)
     position = model.mesh.points + history.displacement
@@ -284,7 +251,7 @@ def test_the_gauge_has_the_measured_length_in_every_increment() -> None:
     assert history.load == pytest.approx(history.reactions["top"][:, 1], rel=1e-6)
 
 
-def test_bias_at_zero_and_ninety_degrees() -> None:
+def test_bias_at_zero_and_ninety_degrees():
     """Turned by 90 degrees, warp and fill change places."""
     swapped = HypoelasticLaw.linear(220.0, 300.0, 20.0, 0.24 * 220.0 / 300.0)
     law = HypoelasticLaw.linear(300.0, 220.0, 20.0, 0.24)
@@ -293,20 +260,14 @@ def test_bias_at_zero_and_ninety_degrees() -> None:
     b = MembraneSolver(TIGHT).run(bias_strip(20.0, 22.0, THICKNESS, angle=0.0, **counts), swapped)
     assert a.load == pytest.approx(b.load, rel=1e-8)
     assert a.displacement == pytest.approx(b.displacement, abs=1e-7)
-
-
-def test_a_mirrored_bias_strip_carries_the_same() -> None:
+    # A mirrored strip carries the same.
     a, b = (MembraneSolver(TIGHT).run(bias_strip(*BIAS, THICKNESS, angle=angle, increments=20), LAW)
             for angle in (45.0, -45.0))  # fmt: skip
     assert a.load == pytest.approx(b.load, rel=1e-8)
 
 
-def test_refinement_of_the_bias_strip() -> None:
-    """The thesis' mesh against finer ones: 1 % apart at the first millimetre, 0.01 % at the end.
-
-    The moduli are held at the end of their range: at the corners of the grips the strain grows
-    without limit under refinement.
-    """
+def test_refinement_of_the_bias_strip():
+    """Moduli are held at the end of their range: strains at the grips' corners have no limit."""
     law = replace(LAW, strain_range=[0.153, 0.232, 0.7])
     loads = np.array([
         MembraneSolver().run(bias(20, across=10 * k, along=30 * k), law).load for k in (1, 2, 3)
@@ -317,15 +278,13 @@ def test_refinement_of_the_bias_strip() -> None:
     assert off[1].max() < 0.5 * off[0].max()
 
 
-def test_a_fine_strip_fails_where_its_corners_leave_the_modulus_positive() -> None:
+def test_a_fine_strip_fails_where_its_corners_leave_the_modulus_positive():
     assert LAW.E1(0.34) < 0 < LAW.E1(0.32)
     with pytest.raises(SolverFailure, match="mm of gauge elongation"):
         MembraneSolver().run(bias(20, across=20, along=60), LAW)
 
 
 # Derivatives
-
-
 def differences(
     model: UniaxialModel, law: HypoelasticLaw, name: str, scale: float, move: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -376,7 +335,7 @@ def check_derivatives(
 
 @BOTH
 @STRAIGHT
-def test_derivatives_of_the_straight_strips(direction: str, thickness_change: str) -> None:
+def test_derivatives_of_the_straight_strips(direction, thickness_change):
     law = replace(LAW, thickness_change=thickness_change)
     own = [f"beta_{i}" for i in (range(8, 12) if direction == "warp" else range(4, 8))]
     # The load of an incompressible strip does not depend on its width.
@@ -386,18 +345,16 @@ def test_derivatives_of_the_straight_strips(direction: str, thickness_change: st
 
 
 @pytest.mark.parametrize("name", PARAMETERS[:13])
-def test_derivatives_of_the_bias_strip(name: str) -> None:
+def test_derivatives_of_the_bias_strip(name):
     """A coarse strip, far enough that the gauge is far from linear in the pull."""
     check_derivatives(bias(8, across=4, along=12), LAW, [name])
-
-
-def test_derivatives_of_an_incompressible_bias_strip() -> None:
-    law = replace(LAW, thickness_change="incompressible")
-    check_derivatives(bias(8, across=4, along=12), law, ["beta_1", "beta_5", "beta_11", "nu12"])
+    if name in ("beta_1", "beta_5", "beta_11", "nu12"):
+        thin = replace(LAW, thickness_change="incompressible")
+        check_derivatives(bias(8, across=4, along=12), thin, [name])
 
 
 @STRAIGHT
-def test_derivatives_of_the_trilinear_strips(direction: str) -> None:
+def test_derivatives_of_the_trilinear_strips(direction):
     own = [f"beta_{i}" for i in (range(9, 12) if direction == "warp" else range(5, 8))]
     check_derivatives(straight(direction, 10), TRILINEAR, [*own, "nu12"])
 
@@ -405,15 +362,12 @@ def test_derivatives_of_the_trilinear_strips(direction: str) -> None:
 @pytest.mark.parametrize(
     "name", [name for i, name in enumerate(PARAMETERS[:13]) if i % 4 or i > 11]
 )
-def test_derivatives_of_the_trilinear_bias_strip(name: str) -> None:
-    """In eight increments most points pass a break inside of one.
-
-    A small move, so that next to no point passes from one side of a break to the other.
-    """
+def test_derivatives_of_the_trilinear_bias_strip(name):
+    """In eight increments most points pass a break inside of one."""
     check_derivatives(bias(8, across=4, along=12), TRILINEAR, [name], 0.001)
 
 
-def test_the_gauge_does_not_move_with_the_parameters() -> None:
+def test_the_gauge_does_not_move_with_the_parameters():
     model = bias(8, across=4, along=12)
     history, slope = MembraneSolver(TIGHT).run_with_sensitivity(model, LAW)
     lower, upper = model.mesh.node_sets["gauge"]
@@ -424,21 +378,14 @@ def test_the_gauge_does_not_move_with_the_parameters() -> None:
     assert np.abs(slope[:, model.mesh.node_sets["bottom"], 1]).max() > 0
 
 
-def test_the_history_is_that_of_a_plain_run() -> None:
-    model = bias(20)
-    plain = MembraneSolver().run(model, LAW)
-    history, _ = MembraneSolver().run_with_sensitivity(model, LAW)
-    assert history.load == pytest.approx(plain.load, rel=1e-7)
-    assert plain.load_slope is None
-    assert plain.unstable == history.unstable == ()
-
-
 # Robustness
-
-
-def test_a_warm_start_finds_the_same_with_less_work() -> None:
+def test_a_warm_start_finds_the_same_with_less_work():
     model = bias(20)
     cold = MembraneSolver(TIGHT).run(model, LAW)
+    # Derivatives or not: the history is the same.
+    history, _ = MembraneSolver().run_with_sensitivity(model, LAW)
+    assert history.load == pytest.approx(cold.load, rel=1e-7)
+    assert cold.load_slope is None and cold.unstable == history.unstable == ()
     other = LAW.with_beta(1.01 * LAW.beta)
     expected = MembraneSolver(TIGHT).run(model, other)
     warm = MembraneSolver(TIGHT).run(model, other, guess=cold.path)
@@ -446,7 +393,7 @@ def test_a_warm_start_finds_the_same_with_less_work() -> None:
     assert warm.iterations < expected.iterations
 
 
-def test_a_useless_guess_is_survived() -> None:
+def test_a_useless_guess_is_survived():
     model = bias(8, across=4, along=12)
     expected = MembraneSolver(TIGHT).run(model, LAW)
     guess = np.random.default_rng(0).uniform(-20, 20, expected.displacement.shape)
@@ -457,9 +404,7 @@ def test_a_useless_guess_is_survived() -> None:
 
 @pytest.mark.parametrize("refused", [1, 3])
 @pytest.mark.parametrize("at", [0, 4])
-def test_cut_back_does_not_change_the_result(
-    monkeypatch: pytest.MonkeyPatch, refused: int, at: int
-) -> None:
+def test_cut_back_does_not_change_the_result(monkeypatch, refused, at):
     model = bias(8, across=4, along=12)
     expected = MembraneSolver(TIGHT).run(model, LAW)
     original: Callable = Pull.equilibrium
@@ -485,7 +430,7 @@ RESTLESS = HypoelasticLaw.trilinear(
 )  # fmt: skip
 
 
-def test_newton_gets_past_moduli_that_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_newton_gets_past_moduli_that_jump(monkeypatch):
     model = bias(20)
     history = MembraneSolver(TIGHT).run(model, RESTLESS)
     assert (np.diff(history.load) > 0).all()
@@ -494,8 +439,7 @@ def test_newton_gets_past_moduli_that_jump(monkeypatch: pytest.MonkeyPatch) -> N
         MembraneSolver(TIGHT).run(model, RESTLESS)
 
 
-def test_one_solver_for_strips_and_bubble() -> None:
-    """Prepared geometry is not mixed up, and runs repeat to the last bit."""
+def test_one_solver_for_strips_and_bubble():
     solver, strip = MembraneSolver(), straight("fill", 10)
     first = solver.run(strip, LAW)
     bubble = BubbleModel(disk_mesh(100.0, 48, "quarter"), THICKNESS, [0.1, 0.2])
@@ -516,12 +460,12 @@ HOPELESS = {
 
 @pytest.mark.parametrize("law", HOPELESS.values(), ids=HOPELESS)
 @pytest.mark.parametrize("model", [straight("warp", 10), bias(10)], ids=["warp", "bias"])
-def test_hopeless_moduli_raise_solver_failure(model: UniaxialModel, law: HypoelasticLaw) -> None:
+def test_hopeless_moduli_raise_solver_failure(model, law):
     with pytest.raises(SolverFailure, match="no equilibrium at"):
         MembraneSolver().run(model, law)
 
 
-def test_a_modulus_that_turns_negative_on_the_way_fails_there() -> None:
+def test_a_modulus_that_turns_negative_on_the_way_fails_there():
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = 5.0, 220.0, -5000.0, 300.0
     with pytest.raises(SolverFailure, match="mm of gauge elongation"):
@@ -529,26 +473,16 @@ def test_a_modulus_that_turns_negative_on_the_way_fails_there() -> None:
 
 
 # The published curves
-
-
 @pytest.mark.parametrize(
     ("direction", "thickness_change", "error"),
     [
-        ("warp", "constant", 3.107),
-        ("fill", "constant", 16.578),
-        ("bias45", "constant", 153.145),
-        ("warp", "incompressible", 68.0),
-        ("fill", "incompressible", 90.4),
+        ("warp", "constant", 3.107), ("fill", "constant", 16.578), ("bias45", "constant", 153.145),
+        ("warp", "incompressible", 68.0), ("fill", "incompressible", 90.4),
         ("bias45", "incompressible", 42.3),
     ],
-)
-def test_table_3_2_on_the_published_curves(
-    direction: str, thickness_change: str, error: float
-) -> None:
-    """RMS in N (Eqs 3.4-3.6), as measured here: a change of model or mesh shows.
-
-    The thesis has 50.1 N for the sum; ours is 172.8 N, nearly all of it in the bias strip.
-    """
+)  # fmt: skip
+def test_table_3_2_on_the_published_curves(direction, thickness_change, error):
+    """RMS in N (Eqs 3.4-3.6), as measured here: a change of model or mesh shows."""
     path = PUBLISHED / "published_uniaxial_polynomials.csv"
     with path.open() as lines:
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
