@@ -25,13 +25,12 @@ from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
 from ..reports.html import percent
-from .executor import cores
+from .executor import Task, cores
 from .folder import Store
 from .refound import Card, Refound, refound
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
-from .workers import Task
 
 if TYPE_CHECKING:
     import pandas as pd

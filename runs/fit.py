@@ -20,6 +20,7 @@ from ..project.project import Project, settings_of
 from ..reports.fit_page import failure_page
 from .best import BestFit, best_fit, with_certainty
 from .check import judge
+from .executor import Task
 from .folder import Store
 from .record import Record, data_rows, facts_of, solver_facts, this_run
 from .result import Fit
@@ -35,7 +36,6 @@ from .starts import (
     run_start,
     timed,
 )
-from .workers import Task
 
 Array = NDArray[np.float64]
 

@@ -35,10 +35,10 @@ from ..project.project import Project, settings_of_predictions
 from ..reports.fit_page import failure_page
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
+from .executor import Task
 from .folder import PROVENANCE, RunRecords
 from .record import Record, data_rows, solver_facts, this_run, versions
 from .starts import log_run
-from .workers import Task
 
 if TYPE_CHECKING:
     import pandas as pd

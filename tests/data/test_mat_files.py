@@ -7,8 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers.mat_files import is_mat, numbers_of, read_variables, variable_names
-from bubblefit.readers.mat_matrix import MatrixParts
+from bubblefit.readers.mat_files import (
+    MatrixParts,
+    is_mat,
+    numbers_of,
+    read_variables,
+    variable_names,
+)
 
 from ..complaints import complaint
 from .test_hostile_frames import mat, part, variable
