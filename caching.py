@@ -1,4 +1,4 @@
-"""Where bubblefit keeps what it compiled: kernels here, material libraries and ccx elsewhere."""
+"""Caches of what bubblefit compiled: kernels here, material libraries and ccx elsewhere."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from platformdirs import user_cache_path
 
 SETTINGS: Any = numba.config
 ROOT = Path(__file__).parent
@@ -27,12 +28,12 @@ KERNELS = (
 
 
 def cache_folder() -> Path:
-    """$BUBBLEFIT_CACHE, else bubblefit/ in $XDG_CACHE_HOME or ~/.cache; it may not exist yet."""
+    """Return $BUBBLEFIT_CACHE, else the user's cache folder of this system; it may not exist yet.
+
+    On Linux that is bubblefit/ in $XDG_CACHE_HOME or ~/.cache.
+    """
     named = os.environ.get("BUBBLEFIT_CACHE")
-    if named:
-        return Path(named)
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path(os.path.expanduser("~")) / ".cache") / "bubblefit"
+    return Path(named) if named else user_cache_path("bubblefit", appauthor=False)
 
 
 @cache
@@ -50,7 +51,7 @@ def _kernel_folder() -> Path | None:
 
 
 def kernels_are_compiled() -> bool:
-    """Whether compiled kernels of exactly these sources are kept: otherwise a run begins with it.
+    """Return whether compiled kernels of these sources are kept; else a run compiles first.
 
     Where no folder can be written they are compiled every time.
     """

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Write files that are there whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import psutil
+
 from .errors import InputError, OutputError
 
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """A temporary path beside `path` (same suffix) that takes its place when the block ends well.
+    """Yield a temporary path beside `path` that takes its place when the block ends well.
 
     The parent folder is made. A reader sees the old file or the new one, never half of one.
 
@@ -57,13 +59,9 @@ def remove_cut(folder: Path | str) -> None:
 
 
 def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        pass  # of somebody else
-    return True
+    with suppress(OverflowError):
+        return psutil.pid_exists(process)
+    return False
 
 
 def checksum(path: Path | str) -> str:
@@ -82,7 +80,7 @@ def checksum(path: Path | str) -> str:
 
 @contextmanager
 def telling(path: Path | str) -> Iterator[None]:
-    """An OSError within the block becomes one line about `path`.
+    """Turn an OSError within the block into one line about `path`.
 
     Raises
     ------

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .trials import ends
+from ..reading import ends
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Bytes of one array at most: a frame of a million points has 48 MB.
@@ -26,7 +26,8 @@ SECONDS = 60.0
 def check_readable(path: Path, read: Callable[[], object], seconds: float = SECONDS) -> None:
     """Try a reading in a process of its own: on some damaged files HDF5 loops for ever, or crashes.
 
-    read : what is about to be done; what it raises is left to the caller's own reading.
+    read : what is about to be done, picklable where processes are spawned; what it raises is left
+    to the caller's own reading.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def check_readable(path: Path, read: Callable[[], object], seconds: float = SECO
 
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
-    """The open file, an `h5py.File`.
+    """Open a file, as an `h5py.File`.
 
     Raises
     ------
@@ -65,7 +66,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
 
 def member(path: Path, group: Any, name: str) -> Any:
-    """The object below a group by its path in the file; None where there is none.
+    """Return the object below a group by its path; None where there is none.
 
     Raises
     ------
@@ -84,7 +85,7 @@ def member(path: Path, group: Any, name: str) -> Any:
 
 
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
-    """A dataset's numbers.
+    """Read a dataset's numbers.
 
     Raises
     ------

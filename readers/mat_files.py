@@ -1,42 +1,58 @@
-"""MATLAB's files: variables as plain data, from version 5 (`mat_version_5`) and 7.3.
+"""Variables of MATLAB's files as plain data, from version 5 and from version 7.3 (HDF5).
 
 A numeric or logical array becomes an array, text a str, a cell array a list, a struct array a list
 of dicts; both lists run along the first index first. Objects of MATLAB's classes become None: they
 cannot be read without MATLAB.
+
+Version 5 is parsed here, after MathWorks' "MAT-File Format", and not by scipy.io: on a damaged or
+hostile file scipy 1.17 crashes the process (an unknown type of numbers, deep nesting) or runs for
+minutes (counts of 2^31 cells); tests/data/test_mat_files.py holds these files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import struct
+import zlib
+from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from .hdf5_files import SIGNATURE, check_readable
-from .mat_version_5 import names_5, variables_5
-from .mat_version_73 import names_73, variables_73
+from ..reading import content_of
+from .hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
+
+#: Bytes that one compressed variable may have when it is unpacked: at most, always, and by what it
+#: has packed (numbers do not pack a hundredfold).
+LARGEST, SMALL, RATIO = 2**30, 2**26, 100
+#: Cells and structs within each other; parts of a variable of 7.3, which may refer to each other.
+DEEPEST, MOST_PARTS = 16, 10**5
+_MATRIX, _COMPRESSED = 14, 15
+_DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"}
+_DTYPES |= {12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4"}
+_CELL, _STRUCT, _CHARACTERS, _FIRST_NUMBER, _LAST_NUMBER = 1, 2, 4, 6, 15
 
 
 def is_mat(head: bytes) -> bool:
-    """Whether a file begins as MATLAB's do, version 5 or 7.3."""
+    """Return whether a file begins as MATLAB's do, version 5 or 7.3."""
     return head[:7] == b"MATLAB " and len(head) >= 128
 
 
 def variable_names(path: Path, head: bytes) -> Collection[str] | None:
-    """Names of the variables; None where they cannot be told, as of a damaged file."""
+    """Return the names of the variables; None of a damaged file."""
     try:
         if head[512:520] == SIGNATURE:
-            check_readable(path, lambda: names_73(path))
-            return names_73(path)
-        return names_5(path)
+            check_readable(path, partial(_names_73, path))
+            return _names_73(path)
+        return [name for name, _, _ in _parts_5(path)]
     except InputError:
         return None
 
 
 def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    """The variables of these names, those that there are.
+    """Read the variables of these names, those that there are.
 
     Raises
     ------
@@ -50,13 +66,13 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
     if head[512:520] == SIGNATURE:
-        check_readable(path, lambda: variables_73(path, wanted))
-        return variables_73(path, wanted)
-    return variables_5(path, wanted)
+        check_readable(path, partial(_variables_73, path, wanted))
+        return _variables_73(path, wanted)
+    return _variables_5(path, wanted)
 
 
 def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
-    """An array of numbers among variables or fields.
+    """Return an array of numbers among variables or fields.
 
     Raises
     ------
@@ -68,3 +84,201 @@ def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
         problem = f"expected an array of numbers; there are: {there}"
         raise InputError(path, f"variable {name!r}", problem)
     return value.astype(float)
+
+
+def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+    found = {}
+    for name, order, body in _parts_5(path, wanted):
+        try:
+            found[name] = MatrixParts(body, order).matrix(0)
+        except (ValueError, struct.error, MemoryError, RecursionError, OverflowError) as error:
+            problem = f"cannot be read; is the file damaged? ({str(error)[:100]})"
+            raise InputError(path, f"variable {name!r}", problem) from None
+    return found
+
+
+def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tuple[str, str, bytes]]:
+    """Yield name, byte order and content of the variables, the latter whole where `wanted`."""
+    try:
+        content = content_of(path)
+        order = {b"IM": "<", b"MI": ">"}[content[126:128]]
+    except (OSError, KeyError):
+        raise InputError(path, "", "is not a MAT-file; is it damaged?") from None
+    at = 128
+    while at + 8 <= len(content):
+        kind, size = struct.unpack_from(f"{order}II", content, at)
+        body = content[at + 8 : at + 8 + size]
+        at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
+        if len(body) < size:
+            raise InputError(path, "", "ends within a variable; is it damaged?")
+        try:
+            if kind == _COMPRESSED:
+                first = zlib.decompressobj().decompress(body, 4096)
+                name = MatrixParts(first[8:], order).name()
+                if wanted is not None and name in wanted:
+                    whole = zlib.decompressobj()
+                    first = whole.decompress(body, min(LARGEST, max(SMALL, RATIO * size)))
+                    if whole.unconsumed_tail:
+                        raise ValueError(f"{len(first)} bytes and more of {size}")
+                yield name, order, first[8:]
+            elif kind == _MATRIX:
+                name = MatrixParts(body, order).name()
+                yield name, order, body
+        except (ValueError, struct.error, zlib.error) as error:
+            problem = f"holds a variable that cannot be read; is it damaged? ({str(error)[:100]})"
+            raise InputError(path, "", problem) from None
+
+
+class MatrixParts:
+    """Read the parts of one matrix in turn.
+
+    content : from behind the matrix' own tag. order : of the bytes, "<" or ">". Every method takes
+    what comes next, and raises ValueError or struct.error where the content is damaged.
+    """
+
+    def __init__(self, content: bytes, order: str) -> None:
+        self.content, self.order, self.at = content, order, 0
+
+    def name(self) -> str:
+        """Return the variable's name, from the parts before its numbers."""
+        self.part()
+        self.part()
+        return self.part()[1].decode("latin-1")
+
+    def part(self) -> tuple[int, bytes]:
+        """Type and content of the next part."""
+        kind, size = struct.unpack_from(f"{self.order}II", self.content, self.at)
+        if kind >> 16:
+            size, kind, start, step = kind >> 16, kind & 0xFFFF, self.at + 4, 8
+        else:
+            start, step = self.at + 8, 8 + size + -size % 8
+        body = self.content[start : start + size]
+        if len(body) < size:
+            raise ValueError("a part is longer than the variable")
+        self.at += step
+        return kind, body
+
+    def matrix(self, depth: int) -> Any:
+        """Return the value; its name is passed over."""
+        if depth > DEEPEST:
+            raise ValueError("nested too deeply")
+        if not self.content:
+            return np.zeros((0, 0))
+        flags = struct.unpack_from(f"{self.order}I", self.part()[1])[0]
+        kind, logical = flags & 0xFF, bool(flags & 0x200)
+        if kind > _LAST_NUMBER or kind in (3, 5):
+            return None
+        shape = [int(n) for n in np.frombuffer(self.part()[1], f"{self.order}i4")]
+        count = int(np.prod(shape, dtype=object))
+        if len(shape) < 2 or min(shape) < 0:
+            raise ValueError(f"no shape: {shape[:8]}")
+        self.part()
+        if kind == _CELL:
+            return self.several(count, depth)
+        if kind == _STRUCT:
+            return self.structs(count, depth)
+        numbers = self.numbers()
+        if kind == _CHARACTERS:
+            return "".join(chr(int(n)) for n in numbers[:4096] if 0 < n < 0x110000)
+        if not _FIRST_NUMBER <= kind <= _LAST_NUMBER or numbers.size != count:
+            raise ValueError(f"{numbers.size} numbers for a shape of {shape[:8]}")
+        value = numbers.reshape(shape, order="F")
+        return value != 0 if logical else value
+
+    def numbers(self) -> np.ndarray:
+        """Return the numbers of the next part, flat."""
+        kind, body = self.part()
+        dtype = np.dtype(self.order + _DTYPES[kind]) if kind in _DTYPES else None
+        if dtype is None or len(body) % dtype.itemsize:
+            raise ValueError(f"numbers of an unknown kind {kind}")
+        return np.frombuffer(body, dtype)
+
+    def several(self, count: int, depth: int) -> list[Any]:
+        """Return the next matrices."""
+        if count > (len(self.content) - self.at) // 8:
+            raise ValueError(f"{count} parts in {len(self.content)} bytes")
+        return [MatrixParts(self.part()[1], self.order).matrix(depth + 1) for _ in range(count)]
+
+    def structs(self, count: int, depth: int) -> list[dict[str, Any]]:
+        """Return the elements of a struct array."""
+        (length,) = struct.unpack_from(f"{self.order}i", self.part()[1])
+        text = self.part()[1]
+        if length < 1 or len(text) % length:
+            raise ValueError(f"field names of {length} letters")
+        starts = range(0, len(text), length)
+        names = [text[i : i + length].split(b"\0")[0].decode("latin-1") for i in starts]
+        if not names:
+            return []
+        values = self.several(count * len(names), depth)
+        width = len(names)
+        return [
+            dict(zip(names, values[i * width : (i + 1) * width], strict=True)) for i in range(count)
+        ]
+
+
+def _names_73(path: Path) -> list[str]:
+    with open_hdf5(path) as file:
+        return [str(name) for name in file]
+
+
+def _variables_73(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+    with open_hdf5(path) as file:
+        parts = iter(range(MOST_PARTS))
+        there = {name: member(path, file, name) for name in wanted}
+        return {
+            name: _of_hdf5(path, item, name, 0, parts)
+            for name, item in there.items()
+            if item is not None
+        }
+
+
+def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
+    """Return the value of a variable of version 7.3.
+
+    parts : runs out when too many have been read.
+    """
+    import h5py
+
+    if depth > DEEPEST or next(parts, None) is None:
+        raise InputError(path, name, "has too many parts; is the file damaged?")
+    if isinstance(item, h5py.Group):
+        fields = {key: member(path, item, key) for key in item}
+        values = {
+            key: _of_hdf5(path, field, f"{name}.{key}"[-200:], depth + 1, parts)
+            for key, field in fields.items()
+        }
+        return _structs(values, fields)
+    kind = item.attrs.get("MATLAB_class", b"")
+    kind = kind.decode("latin-1") if isinstance(kind, bytes) else str(kind)
+    if item.dtype == h5py.ref_dtype:
+        if item.size > MOST_PARTS:
+            raise InputError(path, name, "has too many parts; is the file damaged?")
+        references = np.asarray(item[()]).T.ravel(order="F")
+        return [
+            _of_hdf5(path, item.file[one], name, depth + 1, parts) if one else None
+            for one in references
+        ]
+    if item.dtype.kind not in "fiub" or "MATLAB_object_decode" in item.attrs:
+        return None
+    if "MATLAB_empty" in item.attrs:
+        return "" if kind == "char" else np.zeros((0, 0))
+    value = array_of(path, item, name).T
+    if kind == "char":
+        return "".join(chr(int(n)) for n in value.ravel(order="F")[:4096] if 0 < n < 0x110000)
+    return value != 0 if kind == "logical" else value
+
+
+def _structs(values: dict[str, Any], fields: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the elements of a struct array, each field of which is a list of references."""
+    import h5py
+
+    listed = [
+        isinstance(field, h5py.Dataset)
+        and field.dtype == h5py.ref_dtype
+        and "MATLAB_class" not in field.attrs
+        for field in fields.values()
+    ]
+    if not (values and all(listed)):
+        return [values]
+    count = min(len(value) for value in values.values())
+    return [{key: value[i] for key, value in values.items()} for i in range(count)]

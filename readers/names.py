@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..reading import ends
 from .columns import MOST_NAMES, split_unit
 from .machine_tables import Channel, in_unit
 from .tables import HOLES, read_lines
 from .text_frames import SEPARATORS, TOP, Lines, cells_of
-from .trials import ends
 
 # Without a sign: in a name it is a dash.
 #: One repeat in a pattern ends soon on any name; of several it is seen whether they do (s).

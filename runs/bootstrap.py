@@ -24,14 +24,13 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from .executor import cores, executor_of
+from .executor import Task, cores, executor_of
 from .folder import Store
 from .presenters import write_report
 from .refound import Card, Refound, refound
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
-from .workers import Task
 
 if TYPE_CHECKING:
     import pandas as pd

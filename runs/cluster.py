@@ -7,20 +7,29 @@ that come later are used. What a task told comes with what it gives, once.
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import logging
+import platform
 import queue
+import threading
 import time
 import uuid
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
+import cloudpickle
+from threadpoolctl import threadpool_limits
+
+from .. import __version__
 from ..errors import BubblefitError, InputError
-from ..solvers.base import Announcement, announce, pass_on
+from ..solvers.base import Announcement, announce, hearing, pass_on
+from ..solvers.decks import CODE, file_mark
+from ..solvers.process import Unwanted, unless
 from ..solvers.scheduler import ANSWER_S, connected
-from . import cluster_worker
-from .cluster_worker import NotJoined
-from .workers import Task
+from .executor import Task
 
 log = logging.getLogger(__name__)
 #: s between two looks at who is there, and to an event.
@@ -29,6 +38,12 @@ LOOK_S, WAIT_S = 1.0, 0.5
 FETCH_S = 30.0
 #: Workers that may die of a task before it is given up.
 DEATHS = 3
+
+ROOT = Path(__file__).resolve().parents[1]
+#: Series of tasks that a worker keeps ready; who runs one has one or two at a time.
+MOST = 4
+_prepared: OrderedDict[str, bytes] = OrderedDict()
+_ready = threading.local()
 
 
 def run_tasks(
@@ -39,7 +54,7 @@ def run_tasks(
     what: str,
     lost: Callable[[int, str], Any] | None,
 ) -> Iterator[Any]:
-    """As `Executor.run_tasks`, on the workers of the scheduler at `address`."""
+    """Do tasks as `Executor.run_tasks`, on the workers of the scheduler at `address`."""
     with connected(address) as client:
         series = Series(client, prepare, numbers, jobs, what, lost)
         try:
@@ -60,8 +75,6 @@ class Series:
         what: str,
         lost: Callable[[int, str], Any] | None,
     ) -> None:
-        import cloudpickle
-
         self.client, self.jobs, self.what, self.lost = client, jobs, what, lost
         self.name = f"bubblefit-{uuid.uuid4().hex}"
         self.prepare: bytes = cloudpickle.dumps(prepare)
@@ -103,7 +116,7 @@ class Series:
         self.running.clear()
 
     def _look(self) -> Iterator[Any]:
-        """Who has gone, and who has come."""
+        """Look which workers have gone and which have come."""
         try:
             ask = self.client.scheduler.ncores
             there = self.client.sync(ask, workers=None, callback_timeout=ANSWER_S)
@@ -139,18 +152,16 @@ class Series:
     def _submit(self, worker: str, number: int | None) -> None:
         options = {"workers": [worker], "allow_other_workers": False, "pure": False}
         if number is None:
-            wanted = cluster_worker.version()
+            wanted = version()
             give = self.client.submit
-            future = give(cluster_worker.join, self.name, self.prepare, wanted, **options)
+            future = give(join, self.name, self.prepare, wanted, **options)
         else:
-            future = self.client.submit(
-                cluster_worker.work, self.name, number, self.name, **options
-            )
+            future = self.client.submit(work, self.name, number, self.name, **options)
         self.running[future.key] = (future, worker, number)
         future.add_done_callback(self.events.put)
 
     def _ended(self, future: Any, worker: str, number: int | None) -> Iterator[Any]:
-        """A task, or what a worker does first, has ended in one way or another."""
+        """Handle the end of a task, or of a worker's joining, however it ended."""
         error: BaseException | None = None
         try:
             result = future.result(timeout=FETCH_S)
@@ -172,8 +183,8 @@ class Series:
             raise error
 
     def _joined(self, worker: str, said: Any) -> None:
-        """A worker is used if its bubblefit is ours."""
-        wanted = cluster_worker.version()
+        """Use a worker if its bubblefit is ours."""
+        wanted = version()
         if said == wanted:
             self.threads[worker], self._used = self.there.get(worker, 1), True
         elif worker in self.there:
@@ -181,7 +192,7 @@ class Series:
             announce(self.refused[worker])
 
     def _died(self, worker: str) -> Iterator[Any]:
-        """A worker is gone: what it had is done by others."""
+        """Give the tasks of a worker that is gone to others."""
         self.threads.pop(worker, None)
         own = {k: v for k, v in self.running.items() if v[1] == worker}
         for key, (future, _, _) in own.items():
@@ -227,3 +238,79 @@ def _error(words: str) -> BubblefitError:
     error = BubblefitError(words)
     error.exit_code = 4
     return error
+
+
+# On a worker: it prepares a series of tasks once, and does them by number.
+
+
+@functools.cache
+def version() -> tuple[str, str, str]:
+    """Return the versions of Python, of bubblefit, and of its code by content."""
+    return platform.python_version(), __version__, _code()
+
+
+def _code() -> str:
+    """SHA-256 of every module and template of the package, not of tests and documents beside it."""
+    files = [*ROOT.glob("*.py")]
+    for room in ROOT.iterdir():
+        if room.name == "templates" or (room / "__init__.py").exists():
+            files += [path for path in room.rglob("*") if path.suffix in CODE]
+    named = {path.relative_to(ROOT).as_posix(): path for path in files}
+    marks = [(name, file_mark(named[name])) for name in sorted(named)
+             if name.split("/")[0] not in ("tests", "setup.py")]  # fmt: skip
+    return hashlib.sha256(repr(marks).encode()).hexdigest()
+
+
+def join(series: str, prepare: bytes, wanted: tuple[str, str, str]) -> tuple[str, str, str]:
+    """Take what prepares a series of tasks, if this is the version that is wanted; which it is."""
+    if version() == wanted:
+        _prepared[series] = prepare
+        while len(_prepared) > MOST:
+            _prepared.popitem(last=False)
+    return version()
+
+
+class NotJoined(Exception):
+    """A worker that came again under its address, without what it was given before."""
+
+
+def work(series: str, number: int, topic: str) -> list[Any]:
+    """Do the task of a number: everything that it told, and last what it gives.
+
+    Raises
+    ------
+    NotJoined : the worker knows nothing of the series. Unwanted : the task was cancelled.
+    """
+    from distributed import get_worker
+
+    worker: Any = get_worker()
+    key = worker.get_current_task()
+
+    def unwanted() -> bool:
+        state = worker.state.tasks.get(key)
+        return state is None or state.state == "cancelled"
+
+    def said(announcement: Announcement) -> None:
+        worker.log_event(topic, [announcement.words, announcement.of])
+
+    told: list[Any] = []
+
+    def tell(record: Any) -> None:
+        if unwanted():
+            raise Unwanted
+        told.append(record)
+
+    with hearing(said), unless(unwanted):
+        told.append(_task(series)(number, tell))
+    return told
+
+
+def _task(series: str) -> Any:
+    """Return what does the tasks of a series; made once a thread, as solvers keep things."""
+    ready: dict[str, Any] | None = getattr(_ready, "tasks", None)
+    if ready is None or series not in ready:
+        if series not in _prepared:
+            raise NotJoined(series)
+        _ready.limits = threadpool_limits(1)  # the worker's threads are what runs side by side
+        _ready.tasks = ready = {series: cloudpickle.loads(_prepared[series])()}
+    return ready[series]

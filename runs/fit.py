@@ -19,7 +19,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, settings_of
 from .best import BestFit, best_fit, with_certainty
 from .check import judge
-from .executor import executor_of
+from .executor import Task, executor_of
 from .folder import Store
 from .presenters import failure_page
 from .record import Record, data_rows, facts_of, solver_facts, this_run
@@ -36,7 +36,6 @@ from .starts import (
     run_start,
     timed,
 )
-from .workers import Task
 
 Array = NDArray[np.float64]
 

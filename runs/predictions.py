@@ -34,12 +34,11 @@ from ..project.cards import Cards
 from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
-from .executor import executor_of
+from .executor import Task, executor_of
 from .folder import PROVENANCE, RunRecords
 from .presenters import failure_page, write_report
 from .record import Record, data_rows, solver_facts, this_run, versions
 from .starts import log_run
-from .workers import Task
 
 if TYPE_CHECKING:
     import pandas as pd

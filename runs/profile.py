@@ -26,11 +26,10 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from .executor import cores, executor_of
+from .executor import Task, cores, executor_of
 from .presenters import write_report
 from .refound import Card, Refound, refound
 from .setup import FitSetup
-from .workers import Task
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,9 +17,8 @@ from ..notes import Note, NoteKind, rows, write_notes
 from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History, Solver, check_carries
-from ..solvers.once import Once
 from ..solvers.registry import counted, usable_solver
-from ..solvers.run_cache import RunCache, run_cache
+from ..solvers.run_cache import Once, RunCache, run_cache
 from ..writing import write_text
 from .starts import timed
 

@@ -1,4 +1,15 @@
-"""Licences of an external program: counted while it runs, asked for again where one is denied."""
+"""Licences of an external program: counted while it runs, asked for again where one is denied.
+
+On one machine there are as many files as there are licences, each locked by whoever has one. The
+locks are the kernel's: whoever ends, in whatever way, has given its lock back. The program that
+runs inherits the open file (not on Windows), so that a licence is not free before it has ended,
+too. Users share the files: these hold nothing, and are never removed.
+
+In a whole cluster a Dask scheduler leases licences (not Dask's resources of workers, which are each
+worker's own). A lease that is not renewed, because its holder died, is free again after
+`distributed.scheduler.locks.lease-timeout`, 30 s unless the cluster says otherwise: a dead worker's
+program has ended by then.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +17,22 @@ import inspect
 import os
 import random
 import socket
+import stat
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import LicenceDenied, SolverFailure
+from filelock import lock_descriptor
+
+from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
 from ..materials.law import HypoelasticLaw
 from .base import BandedSolver, DifferentiatingSolver, History, Solver, announce
 from .process import check_wanted, kept_open
+from .scheduler import CONNECT_S, dask
 from .scratch import remove
 from .settings import SCHEDULER, LicenceSettings, licence_settings
 from .wrapped import WrappedBand, WrappedSolver
@@ -24,10 +40,17 @@ from .wrapped import WrappedBand, WrappedSolver
 T = TypeVar("T")
 #: Pauses between tries grow by GROWTH, up to MOST times the first one.
 GROWTH, MOST = 2.0, 10.0
+#: One place for every user of the machine, whatever TMPDIR says.
+FOLDER = Path("/tmp/bubblefit-licences")  # noqa: S108 (its files hold nothing)
+if os.name == "nt":
+    FOLDER = Path(os.environ.get("PROGRAMDATA", tempfile.gettempdir())) / "bubblefit-licences"
+#: s between two looks at the locks: at first, and at most; and at the scheduler.
+SOON_S, LATER_S, LOOK_S = 0.02, 1.0, 1.0
+_clients: dict[tuple[str, int], Any] = {}
 
 
 def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
-    """The solver, every run of which has a licence; itself where its licences do not matter.
+    """Return the solver with a licence for every run; itself where licences do not matter.
 
     Parameters
     ----------
@@ -90,7 +113,7 @@ class _Slopes:
     """Of a solver that differentiates."""
 
     def run_with_sensitivity(self: Any, *given: Any, **named: Any) -> Any:
-        """As the solver, with a licence."""
+        """Run as the solver does, with a licence."""
         return self._with_one(lambda: self.solver.run_with_sensitivity(*given, **named))
 
 
@@ -99,7 +122,7 @@ class _Program:
 
     @property
     def programs(self: Any) -> tuple[Path, ...]:
-        """The solver's own."""
+        """Return the solver's own."""
         found: tuple[Path, ...] = self.solver.programs
         return found
 
@@ -118,9 +141,6 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
     if settings.licences is None:
         yield
         return
-    # Not where nothing is licensed: locks of files are Unix's, and Dask is an extra.
-    from .licence_locks import locked
-
     me = f"{socket.gethostname()} {os.getpid()} {threading.get_ident()} {name}"
     said = False
 
@@ -138,8 +158,6 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
                 locked(name, settings.licences, None if folder is None else Path(folder), waiting)
             )
             if scheduler is not None:
-                from .licence_leases import leased
-
                 stack.enter_context(leased(name, settings.licences, scheduler, waiting))
         finally:
             if said:
@@ -183,8 +201,162 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
 
 
 def _denied(failure: SolverFailure, settings: LicenceSettings) -> bool:
-    """Whether it failed for want of a licence, by its kind or by words of the site's own."""
+    """Return whether a licence was denied, by the kind of failure or by words of the site."""
     if isinstance(failure, LicenceDenied):
         return True
     text = f"{failure.reason}\n{failure.log_tail}".lower()
     return any(words.lower() in text for words in settings.licence_denied)
+
+
+# On one machine
+
+
+@contextmanager
+def locked(
+    name: str, count: int, folder: Path | None, waiting: Callable[[], None]
+) -> Iterator[int]:
+    """Hold one of `count` licences of the program `name`; the number of the open file.
+
+    Parameters
+    ----------
+    folder : of the files, made where it is not there; one for the machine unless given.
+    waiting : called while there is none, now and then.
+
+    Raises
+    ------
+    InputError : the files cannot be made or locked.
+    """
+    place = FOLDER if folder is None else folder
+    pause = SOON_S
+    while True:
+        try:
+            _make(place)
+            file = _any(place, name, count)
+        except OSError as error:
+            problem = f"no licence can be counted here: {error.strerror}; name another folder"
+            raise InputError(place, f"solver.{name}.licence_folder", problem) from None
+        if file is not None:
+            break
+        waiting()
+        time.sleep(pause * random.uniform(0.5, 1.5))  # noqa: S311 (no secret)
+        pause = min(LATER_S, 1.5 * pause)
+    try:
+        yield file
+    finally:
+        os.close(file)
+
+
+def _make(place: Path) -> None:
+    """Make the folder, for all users where it is the machine's own."""
+    if not place.is_dir():
+        with suppress(FileExistsError):
+            place.mkdir(parents=True)
+            if place == FOLDER:
+                place.chmod(0o1777)
+
+
+def _any(place: Path, name: str, count: int) -> int | None:
+    """Lock one of the files; return it, None where all are locked."""
+    for number in random.sample(range(1, count + 1), count):
+        path = place / f"{name}-{number}.lock"
+        file = _opened(path)
+        try:
+            # A file that was tidied away meanwhile is another than the one of that name now.
+            if lock_descriptor(file, blocking=False) and os.path.samestat(
+                os.fstat(file), os.lstat(path)
+            ):
+                with suppress(OSError, TypeError):
+                    os.utime(file)  # files of old date are what is tidied away
+                return file
+        except FileNotFoundError:
+            pass
+        except BaseException:
+            os.close(file)
+            raise
+        os.close(file)
+    return None
+
+
+def _opened(path: Path) -> int:
+    """Open the file, which is made where it is not there.
+
+    Not made and opened at once: of a file of another user in a folder of everybody's the kernel
+    refuses that.
+    """
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
+    while True:
+        try:
+            file = os.open(path, flags)
+        except FileNotFoundError:
+            with suppress(FileExistsError):
+                file = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o666)
+                with suppress(OSError, AttributeError):  # not on Windows
+                    os.fchmod(file, 0o666)  # whatever the umask
+                return file
+            continue
+        if not stat.S_ISREG(os.fstat(file).st_mode):
+            os.close(file)
+            raise OSError(0, f"{path.name} is no file")
+        return file
+
+
+# In a cluster
+
+
+@contextmanager
+def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> Iterator[None]:
+    """Hold one of `count` licences of the program `name` in the cluster of a scheduler.
+
+    Parameters
+    ----------
+    waiting : called while there is none, now and then.
+
+    Raises
+    ------
+    InputError : another count is in use in this cluster, or Dask is not installed.
+    BubblefitError : the scheduler does not answer.
+    """
+    place = _place(address)
+    try:
+        semaphore = dask().Semaphore(count, f"bubblefit licences of {name}", *place())
+        semaphore.register()
+        while not semaphore.acquire(LOOK_S):
+            waiting()
+    except ValueError as error:
+        problem = f"the cluster counts another number of them already ({error})"
+        raise InputError(None, f"solver.{name}.licences", problem) from None
+    except OSError as error:
+        said = BubblefitError(f"{address}: the Dask scheduler leases no licence: {error}")
+        said.exit_code = 4
+        raise said from None
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # it is gone, and the lease with it
+            semaphore.release()
+        if hasattr(semaphore, "refresh_callback"):  # none where leases never time out
+            semaphore.refresh_callback.stop()
+
+
+def _place(address: str) -> Callable[[], tuple[Any, Any]]:
+    """Gives connections to the scheduler, and the loop that serves them: a worker's, or a client's.
+
+    The client raises OSError where nobody answers.
+    """
+    distributed = dask()
+
+    def place() -> tuple[Any, Any]:
+        try:
+            worker = distributed.get_worker()
+            return worker.scheduler, worker.loop
+        except ValueError:
+            pass
+        # A copy of a process (fork) has no use of the connections of the original.
+        key = address, os.getpid()
+        client = _clients.get(key)
+        if client is None or client.status != "running":
+            client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+            _clients[key] = client
+        return client.scheduler, client.loop
+
+    return place

@@ -11,10 +11,11 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+import psutil
 
 from ..errors import InputError
-from ..parent import kill_with_parent
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.
@@ -22,17 +23,17 @@ _kept_open: ContextVar[tuple[int, ...]] = ContextVar("kept_open", default=())
 _unwanted: ContextVar[Callable[[], bool]] = ContextVar("unwanted", default=lambda: False)
 
 POLL_S = 0.05
+#: Whether what a program starts is in one group with it, which one signal reaches.
+GROUPS = hasattr(os, "killpg")
 #: Lines of the log that an error carries.
 TAIL = 25
 #: What a shell adds to the number of the signal that killed its program, and the signals that are
 #: looked for in its exit code: other numbers are the program's own.
 SHELL = 128
-KILLS = {
-    signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE,
-    signal.SIGILL, signal.SIGXFSZ, signal.SIGXCPU,
-}  # fmt: skip
-#: Kills a process group when nobody holds the other end of its input any more.
-WATCHER = ("/bin/sh", "-c", 'read -r end; kill -9 "-$1"', "bubblefit-watch")
+_NAMES = ("KILL", "TERM", "SEGV", "ABRT", "BUS", "FPE", "ILL", "XFSZ", "XCPU")
+KILLS = {getattr(signal, f"SIG{name}", None) for name in _NAMES} - {None}
+#: Reads the number of a process group, and kills it when nobody holds the other end of the pipe.
+WATCHER = ("/bin/sh", "-c", 'read -r group; read -r end; kill -9 "-$group"', "bubblefit-watch")
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Outcome:
 
     @property
     def signal_name(self) -> str:
-        """Name of the signal that killed it, or empty.
+        """Return the name of the signal that killed it, or empty.
 
         A shell that was in between says 128 and the signal's number.
         """
@@ -73,7 +74,7 @@ def kept_open(file: int) -> Iterator[None]:
 
 @contextmanager
 def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
-    """A program that is run within is killed, and `Unwanted` raised, once `unwanted` says so."""
+    """Kill a program that is run within, and raise `Unwanted`, once `unwanted` says so."""
     before = _unwanted.set(unwanted)
     try:
         yield
@@ -99,7 +100,7 @@ def run_process(
 
     Parameters
     ----------
-    timeout : s; then the whole process group is killed.
+    timeout : s; then the program is killed with all that it has started.
     environment : added to ours.
     watch : called about twenty times a second while it runs.
 
@@ -107,11 +108,13 @@ def run_process(
     ------
     InputError : the program cannot be started (not there, no permission, another machine's).
     Unwanted : see `unless`.
-    Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after the group is killed.
-    Where this process is killed outright, the group is killed, too.
+    Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after that, too, is
+    killed. Where this process is killed outright, a shell that waits for it kills the program's
+    process group; on a system without groups or /bin/sh it runs to its end.
     """
-    begun = time.monotonic()
-    with log.open("wb") as output:
+    begun, timed_out = time.monotonic(), False
+    kept: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
+    with log.open("wb") as output, _watched() as watch_group:
         try:
             process = subprocess.Popen(
                 [str(part) for part in command],
@@ -121,19 +124,14 @@ def run_process(
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,
-                pass_fds=_kept_open.get(),
-                preexec_fn=kill_with_parent,
+                **kept,
             )
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
             raise InputError(Path(command[0]), "", problem) from None
-        timed_out = False
+        tree: set[psutil.Process] = set()
         try:
-            watcher, held = _watcher(process.pid)
-        except BaseException:
-            _kill(process)
-            raise
-        try:
+            watch_group(process.pid)
             while True:
                 try:
                     process.wait(POLL_S)
@@ -142,17 +140,14 @@ def run_process(
                     if timeout is not None and time.monotonic() - begun > timeout:
                         timed_out = True
                         break
+                if not GROUPS:
+                    tree |= _started_by(process.pid)
                 check_wanted()
                 if watch is not None:
                     watch()
         finally:
             # Also after a clean end: what a wrapper script left behind must not go on writing.
-            _kill(process)
-            # Before the pipe is closed: the number of the group may be somebody else's by now.
-            if watcher is not None:
-                watcher.kill()
-                watcher.wait()
-            os.close(held)
+            _kill(process, tree)
     return Outcome(process.returncode, timed_out, time.monotonic() - begun)
 
 
@@ -181,27 +176,51 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+def _kill(process: subprocess.Popen[bytes], tree: set[psutil.Process]) -> None:
+    """Kill a program with its process group; where there are none, with all it is seen to start."""
+    if GROUPS:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        tree |= _started_by(process.pid)
+        with suppress(psutil.Error):
+            tree.add(psutil.Process(process.pid))
+        for one in tree:
+            with suppress(psutil.Error):
+                one.kill()
     process.wait()
 
 
-def _watcher(group: int) -> tuple[subprocess.Popen[bytes] | None, int]:
-    """What kills the group when we are killed outright, and our end of the pipe that it reads.
+def _started_by(number: int) -> set[psutil.Process]:
+    with suppress(psutil.Error):
+        return set(psutil.Process(number).children(recursive=True))
+    return set()
 
-    The kernel's own signal reaches the program that we started, not what a script has started.
+
+@contextmanager
+def _watched() -> Iterator[Callable[[int], None]]:
+    """Return what has a process group killed where this process is killed outright.
+
+    It is a shell that waits for the end of a pipe whose other end only this process holds.
     """
     read, held = os.pipe()
+    watcher = None
     try:
-        return subprocess.Popen(
-            [*WATCHER, str(group)],
-            stdin=read,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        ), held
-    except OSError:  # no such shell: then it is the kernel's signal alone
-        return None, held
-    finally:
+        with suppress(OSError):  # no such shell
+            null = subprocess.DEVNULL
+            watcher = subprocess.Popen(
+                WATCHER, stdin=read, stdout=null, stderr=null, start_new_session=True
+            )
         os.close(read)
+        yield lambda group: _tell(held, group)
+    finally:
+        # Before the pipe is closed: the number of the group may be somebody else's by now.
+        if watcher is not None:
+            watcher.kill()
+            watcher.wait()
+        os.close(held)
+
+
+def _tell(held: int, group: int) -> None:
+    with suppress(OSError):  # there is no watcher
+        os.write(held, f"{group}\n".encode())

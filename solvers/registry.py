@@ -20,8 +20,7 @@ from .calculix.settings import OFFER as CALCULIX
 from .licences import licensed
 from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
-from .once import with_cache
-from .run_cache import RunCache
+from .run_cache import RunCache, with_cache
 from .scratch import sweep_left
 from .settings import (
     SCHEDULER,

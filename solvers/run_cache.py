@@ -3,26 +3,39 @@
 A file a run, named by its key, in folders by the key's first two digits. A file appears whole
 under its name (it is written beside and renamed), so that any number of processes and machines may
 write and read the same folder, a network file system's among them: there is no lock and no
-database, which many of those do not carry.
+database, which many of those do not carry: so it is neither diskcache, whose SQLite writes ahead
+into a file that cannot be shared over a network, nor joblib, which unpickles what it finds there
+(tests/solvers/test_run_cache.py).
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
+import io
+import json
 import logging
 import os
 import tempfile
 import time
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..caching import cache_folder
-from ..errors import OutputError
+from ..content import digest_of
+from ..errors import BubblefitError, OutputError
+from ..materials.law import HypoelasticLaw
+from ..notes import Note, NoteKind, as_note
 from ..writing import write_text
-from .base import History, announce
-from .history_file import Damaged, from_bytes, to_bytes
+from .base import BandedSolver, DifferentiatingSolver, History, ProgramSolver, Solver, announce
+from .decks import code_mark, program_mark
+from .wrapped import WrappedBand, WrappedSolver
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +51,12 @@ ROOM = 0.9
 LOOK = 50
 #: s; what was begun earlier and has no name yet was cut off.
 OLD = 86400.0
+#: First bytes of every file: what it is, and of which layout.
+TITLE = b"bubblefit run 1\n"
+#: Fields that are no arrays, and are words instead.
+WORDS = ("iterations", "unstable", "remarks", "early")
+#: Not of the run itself.
+NOT_WRITTEN = ("seconds", "from_cache")
 
 
 @dataclass(frozen=True)
@@ -59,7 +78,7 @@ class RunCache:
 
     @property
     def limit(self) -> int:
-        """Bytes beyond which runs go: what the folder says, else `LIMIT`."""
+        """Return the bytes beyond which runs go: what the folder says, else `LIMIT`."""
         with suppress(OSError, ValueError):
             return max(0, int((self.folder / LIMIT_FILE).read_text(encoding="ascii")))
         return LIMIT
@@ -70,7 +89,7 @@ class RunCache:
         self.prune(limit)
 
     def read(self, key: str) -> History | None:
-        """The run under this key; None where there is none.
+        """Return the run under this key; None where there is none.
 
         A damaged one is dropped, and said so.
         """
@@ -178,7 +197,7 @@ class RunCache:
 
 
 def run_cache(said: bool | str | Path = True) -> RunCache | None:
-    """The cache that is used: none where either the project or the environment turns it off.
+    """Return the cache in use; None where the project or the environment turns it off.
 
     said : by the project: whether there is one, or its folder; the environment's counts before.
     """
@@ -193,3 +212,165 @@ def run_cache(said: bool | str | Path = True) -> RunCache | None:
 def _cache_in(folder: Path) -> RunCache:
     """One a folder: how full it is, is known to all solvers of a process."""
     return RunCache(folder)
+
+
+# A history as bytes and back, compressed and checked
+
+
+class Damaged(ValueError):
+    """Bytes that are not what was written."""
+
+
+def to_bytes(history: History, key: str, seconds: float) -> bytes:
+    """Return the history with its key and the seconds it took, behind a checksum of all.
+
+    Raises
+    ------
+    ValueError, TypeError : it holds what is no result of numbers: a plug-in's own sort of history,
+        objects in place of numbers, numbers that are not finite.
+    """
+    if type(history) is not History:
+        raise TypeError(f"{type(history).__name__} is not a History")
+    arrays: dict[str, Any] = {}
+    for name in (field.name for field in fields(History)):
+        value = getattr(history, name)
+        if name in WORDS or name in NOT_WRITTEN or value is None:
+            continue
+        if name == "reactions":
+            arrays |= {f"reactions of {of}": _numbers(value[of], name) for of in value}
+        else:
+            arrays[name] = _numbers(value, name)
+    remarks = [(note.kind, str(note), note.of) for note in map(as_note, history.remarks)]
+    unstable = None if history.unstable is None else list(map(str, history.unstable))
+    words = {
+        "key": key,
+        "seconds": float(seconds),
+        "iterations": int(history.iterations),
+        "unstable": unstable,
+        "remarks": remarks,
+        "early": str(history.early),
+    }
+    content = io.BytesIO()
+    np.savez_compressed(content, words=np.array(json.dumps(words)), **arrays)
+    whole = content.getvalue()
+    return TITLE + hashlib.sha256(whole).digest() + whole
+
+
+def from_bytes(content: bytes, key: str) -> History:
+    """Return the history that `to_bytes` wrote under this key, every number as it was.
+
+    Raises
+    ------
+    Damaged : cut off, changed, of another layout, or of another key; says which.
+    """
+    start = len(TITLE) + hashlib.sha256().digest_size
+    if not content.startswith(TITLE):
+        raise Damaged("it is not a run that was kept, or of another version")
+    if hashlib.sha256(content[start:]).digest() != content[len(TITLE) : start]:
+        raise Damaged("its checksum is wrong")
+    # The checksum is no proof against somebody who writes one: nothing is ever unpickled.
+    try:
+        with np.load(io.BytesIO(content[start:]), allow_pickle=False) as arrays:
+            words = json.loads(str(arrays["words"]))
+            if words["key"] != key:
+                raise Damaged("it is of another run")
+            there: dict[str, Any] = {
+                name: np.array(arrays[name]) for name in arrays.files if name != "words"
+            }
+        reactions = {
+            name.removeprefix("reactions of "): there.pop(name)
+            for name in list(there)
+            if name.startswith("reactions of ")
+        }
+        return History(
+            **there,
+            reactions=reactions,
+            iterations=int(words["iterations"]),
+            unstable=None if words["unstable"] is None else tuple(words["unstable"]),
+            remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
+            early=str(words["early"]),
+            seconds=float(words["seconds"]),
+            from_cache=True,
+        )
+    except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, Damaged):
+            raise
+        raise Damaged(f"it cannot be read ({error})") from None
+
+
+def _numbers(value: Any, name: str) -> Any:
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiub" or not np.isfinite(array).all():
+        raise ValueError(f"{name} is not all finite numbers")
+    return array
+
+
+# A solver that looks into a cache before it runs
+
+
+def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> Solver:
+    """Return the solver with a cache before it, or as it is where that is of no use.
+
+    That is one that runs in this process, one that starts from a guess of its own path (it
+    differentiates), and one that is asked to keep the folders of its runs.
+
+    Parameters
+    ----------
+    options : what it was made with, as far as that changes a result.
+    """
+    if not solver.external or isinstance(solver, DifferentiatingSolver):
+        return solver
+    if getattr(solver, "keep", False):
+        return solver
+    kind = BandedOnce if isinstance(solver, BandedSolver) else Once
+    return kind(solver, cache, options)
+
+
+class Once(WrappedSolver):
+    """A solver of the protocol `Solver`, whoever runs it, that looks into a cache before it runs.
+
+    A run that fails is not kept: what made it fail (a licence, memory, a full disk) may be gone the
+    next time, and its folder is there to look into.
+    """
+
+    def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
+        super().__init__(solver)
+        self.cache, self.options = cache, options
+
+    def run(
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+    ) -> History:
+        """Return the run from the cache (`History.from_cache`); else run and keep it."""
+        key = self.key(model, law)
+        history = None if key is None else self.cache.read(key)
+        if history is not None:
+            return history
+        given = {"scratch": scratch, "timeout": timeout}
+        said = {name: value for name, value in given.items() if value is not None}
+        begun = time.perf_counter()
+        ended: History = self.solver.run(model, law, **said)
+        if key is not None and isinstance(ended, History):
+            seconds = time.perf_counter() - begun
+            self.cache.write(key, ended, seconds)
+            ended = replace(ended, seconds=seconds)
+        return ended
+
+    def key(self, model: Any, law: HypoelasticLaw) -> str | None:
+        """Return the digest of all that the result depends on; None where that is not known."""
+        try:
+            files = self.solver.programs if isinstance(self.solver, ProgramSolver) else ()
+            program = [program_mark(path) for path in files]
+            code = code_mark(type(self.solver).__module__)
+            own = (self.name, self.solver.identity, dict(self.options), program, code)
+            return digest_of("run", own, model, law)
+        except (TypeError, BubblefitError) as error:  # whoever runs it is told of the latter
+            log.info("runs of %s are not kept: %s", self.name, error)
+            return None
+
+
+class BandedOnce(WrappedBand, Once):
+    """Look into a cache before a solver whose answer to some models is a band."""

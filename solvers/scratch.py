@@ -1,27 +1,42 @@
-"""Scratch folders of external solvers: fresh for every run, in memory where there is room."""
+"""Scratch folders of external solvers: fresh for every run, in memory where there is room.
+
+A folder of a run under way holds a file that names the machine, its boot and the process, and that
+this process has locked for as long as it lives: what a killed process has left is found by that,
+and removed. A folder without that file is a run that is kept to be looked into.
+"""
 
 from __future__ import annotations
 
 import atexit
+import functools
 import logging
 import os
+import platform
 import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+import psutil
+from filelock import lock_descriptor
 
 from ..errors import OutputError, SolverFailure
 from .process import log_tail
-from .scratch_owner import OWNER, claim, clear, release, sweep
 
 log = logging.getLogger(__name__)
 
+#: A file system in memory, on Linux; elsewhere runs go to the disk.
 MEMORY = Path("/dev/shm")
 #: Free space (bytes) below which runs go to the disk instead; a bubble takes about 2 MB.
 ROOM = 256 * 1024**2
+OWNER, PATTERN = ".owner", "bubblefit-*-*"
+#: s; a folder that is younger may be about to get its owner.
+YOUNG = 60.0
+_BOOT = Path("/proc/sys/kernel/random/boot_id")
 _INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM)
 #: Folders of runs under way. An interruption can fall between any two lines, also within the
 #: removal of a folder: what it leaves is removed at the end of the process.
@@ -31,7 +46,7 @@ _under_way: dict[Path, int | None] = {}
 
 
 def fresh_folder(name: str, parent: Path | None = None) -> Path:
-    """A new, empty folder `bubblefit-NAME-...` below `parent` (default: memory, else disk).
+    """Make an empty folder `bubblefit-NAME-...` below `parent` (default: memory, else disk).
 
     Raises
     ------
@@ -50,7 +65,7 @@ def fresh_folder(name: str, parent: Path | None = None) -> Path:
 def run_folder(
     name: str, parent: Path | None, keep: bool, solver: str, logs: str
 ) -> Iterator[Path]:
-    """The fresh folder of one run: removed after a good end unless `keep`, kept after a failure.
+    """Make the folder of one run: removed after a good end unless `keep`, kept after a failure.
 
     Parameters
     ----------
@@ -94,7 +109,7 @@ def default_parent() -> Path:
 
 
 def put_aside(folder: Path) -> Path:
-    """Where a failed run is kept: out of memory, onto the disk (where it is, if that is full)."""
+    """Move a failed run out of memory onto the disk, unless that is full; return its place."""
     lock = _under_way.pop(folder, None)
     if folder.parent != MEMORY:
         release(folder, lock)
@@ -143,7 +158,8 @@ def _those_of_the_parent() -> None:
     _under_way.clear()
 
 
-os.register_at_fork(after_in_child=_those_of_the_parent)
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_those_of_the_parent)
 
 
 @contextmanager
@@ -165,3 +181,114 @@ def _undisturbed() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
         if came:
             signal.raise_signal(came[0])
+
+
+def claim(folder: Path) -> int | None:
+    """Lock a folder for this process; return the lock, to be closed in the end. None: no room."""
+    number = None
+    try:
+        number = os.open(folder / OWNER, os.O_RDWR | os.O_CREAT, 0o600)
+        with suppress(OSError):  # a file system without locks: the process's number will do
+            lock_descriptor(number, blocking=False)
+        os.write(number, "\n".join(_self()).encode())
+    except OSError as error:
+        log.info("%s: its owner cannot be written: %s", folder, error.strerror)
+    return number
+
+
+def release(folder: Path, lock: int | None) -> None:
+    """Give a folder up that is kept."""
+    with suppress(OSError):
+        (folder / OWNER).unlink(missing_ok=True)
+    if lock is not None:
+        os.close(lock)
+
+
+def clear(folder: Path) -> None:
+    """Remove a folder with what is in it, its owner last: what is cut off is still somebody's."""
+    with suppress(OSError):
+        for path in folder.iterdir():
+            if path.name == OWNER:
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def sweep(places: Iterable[Path]) -> list[Path]:
+    """Remove what processes that are gone have left in these places; return the folders.
+
+    Never a folder whose process lives, or that another machine may use, or of another user; nor
+    one that is kept.
+    """
+    gone = []
+    for place in dict.fromkeys(places):
+        with suppress(OSError):
+            for folder in place.glob(PATTERN):
+                if _left(folder):
+                    clear(folder)
+                    gone.append(folder)
+    for folder in gone:
+        log.info("%s was left by a process that is gone, and is removed", folder)
+    return gone
+
+
+def _left(folder: Path) -> bool:
+    """Return whether the process of a folder is gone."""
+    try:
+        about = folder.lstat()
+        if folder.is_symlink() or not folder.is_dir() or not _ours(about):
+            return False
+        old = time.time() - about.st_mtime > YOUNG
+        number = os.open(folder / OWNER, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    except FileNotFoundError:
+        # Killed before it was anybody's, or at the very end of its removal.
+        return old and folder.is_dir() and not any(folder.iterdir())
+    except OSError:
+        return False
+    try:
+        with suppress(OSError):  # no locks here
+            if not lock_descriptor(number, blocking=False):
+                return False
+        said = os.read(number, 1000).decode(errors="replace").split("\n")
+    finally:
+        os.close(number)
+    if len(said) != len(_self()):
+        return old  # cut off as it was written
+    (machine, boot, process, started), own = said, _self()
+    if boot != own[1]:
+        return machine == own[0]  # before a restart; or of another machine
+    return not (process.isdigit() and started == _started(int(process)))
+
+
+def _self() -> tuple[str, str, str, str]:
+    """Return the machine, its boot, the process, and when that started."""
+    return platform.node(), _boot(), str(os.getpid()), _started(os.getpid())
+
+
+def _ours(about: os.stat_result) -> bool:
+    return not hasattr(os, "getuid") or about.st_uid == os.getuid()
+
+
+@functools.cache
+def _boot() -> str:
+    try:
+        return _BOOT.read_text().strip()
+    except OSError:
+        return str(psutil.boot_time())
+
+
+def _started(process: int) -> str:
+    """Return what tells a process from a later one of the same number; "gone" without one."""
+    with suppress(OSError, IndexError):
+        # Ticks since the boot, which no clock that is set changes, after the program's name, which
+        # may hold anything.
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[19]
+    try:
+        return str(psutil.Process(process).create_time())
+    except psutil.NoSuchProcess:
+        return "gone"
+    except psutil.Error:  # of somebody else
+        return "there"

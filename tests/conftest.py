@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +23,11 @@ from .figure_checks import check_figure
 
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
 os.environ["BUBBLEFIT_PROGRAMS_FROM"] = os.sep
+
+# A shell that starts a job in the background (`make test &`) has it ignore SIGINT, and every
+# process of the job inherits that: tests that interrupt a command could not.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # A test that runs another program means the run; those of the cache of runs name a folder for it.
 os.environ[VARIABLE] = OFF

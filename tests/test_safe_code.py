@@ -44,12 +44,12 @@ def faults(source: str) -> list[str]:
     return found
 
 
-#: numpy's own reader of an example's own program (re.compile is no compile); and what a cluster's
-#: own processes send each other through Dask, which does no other (docs/reference/security.md).
+#: numpy's own reader of an example's own program (re.compile is no compile); and what our own
+#: processes send each other, by a pipe or through Dask (docs/reference/security.md).
 ALLOWED = {
     "examples/solver-adapter/bubblefit_homogeneous.py": ["calls np.loadtxt"],
     "runs/cluster.py": ["imports cloudpickle"],
-    "runs/cluster_worker.py": ["imports cloudpickle"],
+    "runs/executor.py": ["imports cloudpickle"],
 }
 
 

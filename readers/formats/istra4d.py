@@ -11,6 +11,7 @@ lost). The third components are named alike by inference. The unit is not in the
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """The one frame of a file."""
-    check_readable(path, lambda: _arrays(path))
+    check_readable(path, partial(_arrays, path))
     there = _arrays(path)
     mask = there.pop("mask", None)
     if not {"x deformed", "y deformed", "dx", "dy"} <= {*there}:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import shlex
 import shutil
 import subprocess
@@ -153,7 +154,7 @@ def material_library(cache: Path | None = None) -> Path:
     digest = hashlib.sha256(source)
     # The file's date and size stand for the compiler's version: asking for that takes a process.
     at = os.stat(command[0])
-    for part in (*command, *FLAGS, str(at.st_size), str(at.st_mtime_ns), os.uname().machine):
+    for part in (*command, *FLAGS, str(at.st_size), str(at.st_mtime_ns), platform.machine()):
         digest.update(b"\0" + part.encode())
     folder = (cache_folder() if cache is None else cache) / "calculix"
     library = folder / f"law-{digest.hexdigest()[:16]}" / LIBRARY_FILE

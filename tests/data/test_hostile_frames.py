@@ -14,14 +14,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.readers import hdf5_files, mat_version_5, mat_version_73, npz_files
+from bubblefit.readers import hdf5_files, mat_files, npz_files
 from bubblefit.readers.fields import read_fields
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.hdf5_files import array_of, check_readable, member, open_hdf5
-from bubblefit.readers.mat_files import is_mat, numbers_of, read_variables, variable_names
-from bubblefit.readers.mat_matrix import MatrixParts
-from bubblefit.readers.mat_version_5 import names_5, variables_5
-from bubblefit.readers.mat_version_73 import variables_73
+from bubblefit.readers.mat_files import (
+    MatrixParts,
+    is_mat,
+    numbers_of,
+    read_variables,
+    variable_names,
+)
 from bubblefit.readers.npz_files import array_names, read_arrays
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -502,7 +505,7 @@ def test_numbers_that_an_archive_can_hold(tmp_path):
 def test_packed_numbers(tmp_path, monkeypatch):
     """Up to 64 MiB always, beyond by what is packed, never more than 1 GiB."""
     assert (npz_files.LARGEST, npz_files.SMALL, npz_files.RATIO) == (2**30, 2**26, 100)
-    assert (mat_version_5.LARGEST, mat_version_5.SMALL, mat_version_5.RATIO) == (2**30, 2**26, 100)
+    assert (mat_files.LARGEST, mat_files.SMALL, mat_files.RATIO) == (2**30, 2**26, 100)
     zeros = archive(tmp_path / "a.npz", "(4096,)", b"\0" * 32768, packed=True)
     with zipfile.ZipFile(zeros) as packed:
         share = 32768 / packed.getinfo("a.npy").compress_size
@@ -647,10 +650,10 @@ def test_variables_in_turn(tmp_path):
     other = struct.pack("<II", 7, 5) + b"\0" * 8
     named = body.replace(b"X", b"Y")
     path.write_bytes(content + other + part(14, named) + b"\0" * 7)
-    assert names_5(path) == ["X", "Y"]
-    assert variables_5(path, ["Y"])["Y"].tolist() == [[2.5]]
+    assert variable_names(path, content) == ["X", "Y"]
+    assert read_variables(path, ["Y"])["Y"].tolist() == [[2.5]]
     path.write_bytes(content[:126] + b"XX" + content[128:])
-    assert complaint(names_5, path) == f"{path}: is not a MAT-file; is it damaged?"
+    assert complaint(read_variables, path, ["X"]) == f"{path}: is not a MAT-file; is it damaged?"
 
 
 def test_hdf5_members_and_sizes(tmp_path, monkeypatch):
@@ -711,7 +714,7 @@ def test_matlab_7_3_by_class_and_by_depth(tmp_path, monkeypatch):
             write(f"cell{k}", np.array([[inner]], dtype=h5py.ref_dtype), "cell")
             inner = file[f"cell{k}"].ref
     names = ["grid", "text", "truth", "none", "blank", "object", "cells", "inner", "deep", "x"]
-    found = variables_73(path, names)
+    found = mat_files._variables_73(path, names)
     assert "x" not in found
     assert found["grid"].tolist() == [[0, 2, 4], [1, 3, 5]]
     assert (found["text"], found["blank"], found["object"]) == ("ab", "", None)
@@ -723,14 +726,14 @@ def test_matlab_7_3_by_class_and_by_depth(tmp_path, monkeypatch):
     with h5py.File(path, "a") as file:
         file.move("deep", "top/deep")
     too_many = "has too many parts; is the file damaged?"
-    assert len(variables_73(path, ["cell15"])["cell15"]) == 1
-    assert complaint(variables_73, path, ["cell16"]) == f"{path}: cell16: {too_many}"
-    assert complaint(variables_73, path, ["top"]).endswith(too_many)
-    monkeypatch.setattr(mat_version_73, "MOST_PARTS", 3)
-    assert len(variables_73(path, ["cells"])["cells"]) == 2
+    assert len(mat_files._variables_73(path, ["cell15"])["cell15"]) == 1
+    assert complaint(mat_files._variables_73, path, ["cell16"]) == f"{path}: cell16: {too_many}"
+    assert complaint(mat_files._variables_73, path, ["top"]).endswith(too_many)
+    monkeypatch.setattr(mat_files, "MOST_PARTS", 3)
+    assert len(mat_files._variables_73(path, ["cells"])["cells"]) == 2
     for most in (2, 1):
-        monkeypatch.setattr(mat_version_73, "MOST_PARTS", most)
-        assert complaint(variables_73, path, ["cells"]) == f"{path}: cells: {too_many}"
+        monkeypatch.setattr(mat_files, "MOST_PARTS", most)
+        assert complaint(mat_files._variables_73, path, ["cells"]) == f"{path}: cells: {too_many}"
 
 
 # --- text ---

@@ -18,10 +18,10 @@ import bubblefit as bf
 import cloudpickle
 import pytest
 from bubblefit.errors import BubblefitError, InputError
-from bubblefit.runs import cluster_worker
+from bubblefit.runs import cluster
 from bubblefit.runs.executor import Executor, executor_of
 from bubblefit.runs.starts import StartRecord
-from bubblefit.solvers import licence_leases, licences
+from bubblefit.solvers import licences
 from bubblefit.solvers.base import Announcement, announce, hearing
 from bubblefit.solvers.process import run_process
 from bubblefit.solvers.scheduler import check
@@ -244,7 +244,7 @@ def test_a_task_ends_at_its_next_word_when_nobody_wants_it(scheduler: str, tmp_p
 
 
 def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) -> None:
-    ours = cluster_worker.version()
+    ours = cluster.version()
     others = {
         "bubblefit": (ours[0], "0.1.9", ours[2]),
         "Python": ("3.9.1", *ours[1:]),
@@ -256,7 +256,7 @@ def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) ->
         "code": "it has another code of bubblefit",
     }
     for what, other in others.items():
-        monkeypatch.setattr(cluster_worker, "version", lambda other=other: other)
+        monkeypatch.setattr(cluster, "version", lambda other=other: other)
         heard: list[Announcement] = []
         with hearing(heard.append):
             said = complaint(tasks, scheduler, lambda: None, 3)
@@ -272,15 +272,15 @@ def test_the_code_counts_by_content(tmp_path: Path, monkeypatch) -> None:
     for path in (*files.values(), tmp_path / "runs/__init__.py", tmp_path / "tests/__init__.py"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
-    monkeypatch.setattr(cluster_worker, "ROOT", tmp_path)
+    monkeypatch.setattr(cluster, "ROOT", tmp_path)
     counted = {}
     for name, path in files.items():
-        before = cluster_worker._code()
+        before = cluster._code()
         path.write_text("changed")
-        counted[name] = cluster_worker._code() != before
+        counted[name] = cluster._code() != before
     assert counted == {name: k < 3 for k, name in enumerate(files)}
     monkeypatch.undo()
-    assert cluster_worker.version()[2] == cluster_worker._code()
+    assert cluster.version()[2] == cluster._code()
 
 
 def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> None:
@@ -288,7 +288,7 @@ def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> 
         def __reduce__(self) -> Any:
             return __import__, ("no_such_module",)
 
-    monkeypatch.setattr(cluster_worker, "version", Elsewhere)
+    monkeypatch.setattr(cluster, "version", Elsewhere)
     said = complaint(tasks, scheduler, lambda: None, 3)
     assert "it has no bubblefit of this version (" in said
 
@@ -398,7 +398,7 @@ def test_no_licence_is_leased_where_nobody_answers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor is one kept from others on this machine; a scheduler that goes takes its leases along."""
-    monkeypatch.setattr(licence_leases, "CONNECT_S", 1.0)
+    monkeypatch.setattr(licences, "CONNECT_S", 1.0)
     distributed: Any = needs.library("distributed")
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
     options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}

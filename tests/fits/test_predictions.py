@@ -18,7 +18,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW
 from bubblefit.project.project import Project, chosen_cards, read_project
 from bubblefit.reports.style import NAMED
-from bubblefit.runs import executor, processes
+from bubblefit.runs import executor
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
 from matplotlib.figure import Figure
@@ -160,7 +160,7 @@ def test_processes(project: Project, monkeypatch, asked, said, some: int) -> Non
         yield None
         yield from (run(number, lambda _: None) for number in numbers)
 
-    monkeypatch.setattr(processes, "run_tasks", side_by_side)
+    monkeypatch.setattr(executor, "run_tasks", side_by_side)
     monkeypatch.setattr(executor, "cores", lambda: 7)
     predict(project.with_fit(jobs=said), ["high"], jobs=asked, progress=events.append)
     assert told == [(some, "runs")]

@@ -24,8 +24,7 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.runs.executor import Executor
-from bubblefit.runs.processes import run_tasks
+from bubblefit.runs.executor import Executor, run_tasks
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import run_process

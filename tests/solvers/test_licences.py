@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 from bubblefit.cli.progress import StudyProgress
 from bubblefit.errors import LicenceDenied, SolverFailure
-from bubblefit.runs.processes import run_tasks
-from bubblefit.solvers import licence_locks, licences
+from bubblefit.runs.executor import run_tasks
+from bubblefit.solvers import licences
 from bubblefit.solvers.base import (
     Announcement,
     BandedSolver,
@@ -29,11 +29,9 @@ from bubblefit.solvers.base import (
     announce,
     hearing,
 )
-from bubblefit.solvers.licence_locks import locked
-from bubblefit.solvers.licences import LicensedSolver, held, patiently
-from bubblefit.solvers.once import Once
+from bubblefit.solvers.licences import LicensedSolver, held, locked, patiently
 from bubblefit.solvers.registry import solver_named, solver_settings
-from bubblefit.solvers.run_cache import RunCache
+from bubblefit.solvers.run_cache import Once, RunCache
 from bubblefit.solvers.settings import LicenceSettings
 
 from ..complaints import complaint
@@ -156,7 +154,7 @@ def test_other_programs_and_folders_count_apart(tmp_path: Path) -> None:
 
 
 def test_the_machines_own_folder_is_everybodys(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(licence_locks, "FOLDER", tmp_path / "machine")
+    monkeypatch.setattr(licences, "FOLDER", tmp_path / "machine")
     old = os.umask(0o077)
     try:
         with locked("acme", 1, None, pytest.fail):
@@ -173,14 +171,14 @@ def test_a_file_that_was_tidied_away_is_no_lock(tmp_path: Path) -> None:
         (tmp_path / "acme-1.lock").unlink()
         with locked("acme", 1, tmp_path, pytest.fail) as other:
             assert not os.path.samestat(os.fstat(file), os.fstat(other))
-            assert licence_locks._any(tmp_path, "acme", 1) is None
+            assert licences._any(tmp_path, "acme", 1) is None
 
 
 def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Tidied away, and made again by somebody else, between opening and locking it."""
-    opened = licence_locks._opened
+    opened = licences._opened
 
     def replaced(path: Path) -> int:
         file = opened(path)
@@ -188,8 +186,8 @@ def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(
         path.touch()
         return file
 
-    monkeypatch.setattr(licence_locks, "_opened", replaced)
-    assert licence_locks._any(tmp_path, "acme", 1) is None
+    monkeypatch.setattr(licences, "_opened", replaced)
+    assert licences._any(tmp_path, "acme", 1) is None
     monkeypatch.undo()
     with locked("acme", 1, tmp_path, pytest.fail):
         pass
@@ -342,7 +340,7 @@ def test_a_run_that_is_in_the_cache_needs_no_licence(packages: Path, tmp_path: P
 def test_slopes_need_a_licence_too(tmp_path: Path) -> None:
     class Able(CountedSolver):
         def run_with_sensitivity(self, *_: Any) -> Any:
-            return licence_locks._any(tmp_path / "locks", "counted", 1)
+            return licences._any(tmp_path / "locks", "counted", 1)
 
     able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
     assert able.run_with_sensitivity(3, LAW) is None

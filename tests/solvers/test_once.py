@@ -22,8 +22,7 @@ from bubblefit.solvers.base import (
 )
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.marc.solver import MarcSolver
-from bubblefit.solvers.once import Once, with_cache
-from bubblefit.solvers.run_cache import RunCache
+from bubblefit.solvers.run_cache import Once, RunCache, with_cache
 
 from ..bars import BarModel
 from ..programs import program

@@ -17,8 +17,16 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
 from bubblefit.solvers.base import History
-from bubblefit.solvers.history_file import TITLE, Damaged, from_bytes, to_bytes
-from bubblefit.solvers.run_cache import LIMIT, VARIABLE, RunCache, run_cache
+from bubblefit.solvers.run_cache import (
+    LIMIT,
+    TITLE,
+    VARIABLE,
+    Damaged,
+    RunCache,
+    from_bytes,
+    run_cache,
+    to_bytes,
+)
 
 from ..commands import in_process
 

@@ -18,9 +18,8 @@ from bubblefit.materials.responses import biaxial_response
 from bubblefit.materials.tables import piece_constants
 from bubblefit.solvers.base import carries_load_ratios, check_carries
 from bubblefit.solvers.exports import FORMATS
-from bubblefit.solvers.once import Once
 from bubblefit.solvers.registry import solver_named
-from bubblefit.solvers.run_cache import RunCache
+from bubblefit.solvers.run_cache import Once, RunCache
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.solvers import process, scratch, scratch_owner
-from bubblefit.solvers.scratch import run_folder, sweep_left
-from bubblefit.solvers.scratch_owner import OWNER, claim, clear, sweep
+from bubblefit.solvers import process, scratch
+from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep, sweep_left
 
 from .. import needs
 
@@ -126,7 +125,7 @@ def test_what_is_kept_is_never_swept(tmp_path, monkeypatch) -> None:
 
 def left(place: Path, **said: str) -> Path:
     """A folder whose owner's file says what it says, locked by nobody."""
-    own = dict(zip(("machine", "boot", "process", "started"), scratch_owner._self(), strict=True))
+    own = dict(zip(("machine", "boot", "process", "started"), scratch._self(), strict=True))
     folder = place / f"bubblefit-t-{len(list(place.iterdir()))}"
     folder.mkdir()
     (folder / OWNER).write_text("\n".join({**own, **said}.values()))
@@ -191,7 +190,7 @@ def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch) -> None:
     (folder / "deep").mkdir(parents=True)
     (folder / "file").touch()
     lock = claim(folder)
-    monkeypatch.setattr(scratch_owner.shutil, "rmtree", lambda path, **_: None)  # cut off
+    monkeypatch.setattr(scratch.shutil, "rmtree", lambda path, **_: None)  # cut off
     clear(folder)
     assert [path.name for path in folder.iterdir() if path.is_file()] == [OWNER]
     os.close(lock)
