@@ -1,7 +1,7 @@
-"""Notes: what a reader of a result should know, each of a kind, told alike by every command.
+"""Notes: remarks on a result, each of a kind, presented alike by every command.
 
-Whoever knows something makes a `Note` of a `NoteKind`; commands collect them and lay them out by
-the functions here: `line` by line on the terminal and on the page, `rows` in result.json, and
+Any module makes a `Note` of a `NoteKind`; commands collect them and present them by the functions
+here: `line` by line on the terminal and on the page, `rows` in result.json, and
 notes.csv (`write_notes`). A run is marked in its tables by the kinds of its notes (`marks`).
 """
 
@@ -25,7 +25,11 @@ NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 
 
 class NoteKind(StrEnum):
-    """Every kind of note that there is, by the words that tables and result.json have for it."""
+    """Name a kind of note by the words that tables and result.json have for it.
+
+    The list is open: `NoteKind("creep")` is a kind of its own, which a solver or a reader of
+    another distribution declares where it says such notes.
+    """
 
     #: Of an analysis, by its solver.
     EARLY = "stopped early"
@@ -77,6 +81,15 @@ class NoteKind(StrEnum):
     LOSES = "loses"
     CONFIRM = "to confirm"
 
+    @classmethod
+    def _missing_(cls, value: object) -> NoteKind | None:
+        """Return a kind that is not in the list above; None where it is no words."""
+        if not (isinstance(value, str) and value.strip()):
+            return None
+        kind = str.__new__(cls, value)
+        kind._name_ = kind._value_ = value
+        return kind
+
 
 #: A run that has a note of these kinds is marked in the tables of runs.
 MARKS = (NoteKind.BEYOND_CARD, NoteKind.SNAP, NoteKind.UNSTABLE, NoteKind.EARLY)
@@ -103,7 +116,7 @@ GRAVEST = (
 
 
 class Note(str):
-    """A sentence, of which kind it is, and of what it is said ("" : of all)."""
+    """Hold a sentence, its kind, and what it is about ("" : everything)."""
 
     kind: NoteKind
     of: str
@@ -114,43 +127,43 @@ class Note(str):
         return note
 
     def __getnewargs__(self) -> tuple[NoteKind, str, str]:  # type: ignore[override]
-        """So that it comes whole out of another process."""
+        """Return the arguments that restore the note in another process."""
         return self.kind, str(self), self.of
 
     def about(self, name: str) -> Note:
-        """The same note, said of `name` (of a part of it, where it is said of something)."""
+        """Return the note about `name`, or about a part of `name`."""
         return Note(self.kind, str(self), f"{name}, {self.of}" if self.of else name)
 
     @property
     def line(self) -> str:
-        """With what it is said of."""
+        """Return the sentence with what it is about."""
         return f"{self.of}: {self}" if self.of else str(self)
 
 
 def as_note(words: str) -> Note:
-    """A note as it is; plain words, as solvers of other distributions say them, as a note."""
+    """Return a note as it is, and plain words of solvers of other distributions as a note."""
     return words if isinstance(words, Note) else Note(NoteKind.SOLVER, words)
 
 
 def marks(notes: Iterable[str]) -> list[str]:
-    """What a run is marked with in a table of runs, by its notes."""
+    """Return the marks of a run in a table of runs, from its notes."""
     kinds = {as_note(note).kind for note in notes}
     return [kind.value for kind in MARKS if kind in kinds]
 
 
 def foremost(notes: Iterable[Note]) -> Note | None:
-    """The note that matters most, the first of its kind; None where there is none."""
+    """Return the gravest note, the first of its kind; None where there is none."""
     rank = {kind: place for place, kind in enumerate(GRAVEST)}
     return min(notes, key=lambda note: rank.get(note.kind, len(rank)), default=None)
 
 
 def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
-    """The notes as plain values, for result.json and tables."""
+    """Return the notes as plain values, for result.json and tables."""
     return [{"of": note.of, "kind": note.kind.value, "note": str(note)} for note in notes]
 
 
 def lines(notes: Sequence[Note]) -> list[str]:
-    """The notes for the terminal.
+    """Return the notes as lines for the terminal.
 
     Notes that more than a few things share but for their numbers are one line; notes.csv has each.
     """

@@ -1,1 +1,1 @@
-"""One file a command: parse, call, print."""
+"""Commands of the terminal: parse the options, call the library, print the outcome."""

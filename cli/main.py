@@ -1,4 +1,4 @@
-"""The `bubblefit` command: one file a subcommand, imported only when called."""
+"""The `bubblefit` command: a table of commands, each imported only when it is called."""
 
 from __future__ import annotations
 
@@ -8,45 +8,50 @@ from typing import Any
 import click
 
 from ..files import __version__
-from .events import with_events
-from .examples import examples
-from .home import place_matplotlib
-from .logs import listen, with_verbose
-from .options import COMMAND_LINE
-from .usage import Suggesting, in_one_line
+from .terminal import (
+    COMMAND_LINE,
+    VERBOSE,
+    Suggesting,
+    examples,
+    in_one_line,
+    listen,
+    place_matplotlib,
+    with_common_options,
+)
 
+#: Module of each command, which defines NAME_command, and its line in the help.
 COMMANDS = {
-    "fit": ("fit", "Fit a material to all tests of a fabric together."),
-    "bubble": ("bubble", "Fit a material to bubble inflation tests only."),
-    "uniaxial": ("uniaxial", "Fit a material to warp, fill and bias strip tests only."),
-    "biaxial": ("biaxial", "Constants that a designer types in, from biaxial tests."),
-    "check": ("check", "Look at the data before anything is fitted."),
-    "bend": ("bend", "Inflate and bend cylinders with material cards."),
-    "validate": ("validate", "Does a fit foretell the test that it was not given?"),
-    "profile": ("profile", "Between what does a modulus lie? Its profile likelihood."),
-    "bootstrap": ("bootstrap", "How far do moduli scatter if the data are drawn again?"),
-    "plan": ("plan", "Which test next? Predicted uncertainty of tests that could be made."),
-    "compare": ("compare", "Which form of the moduli do the strip tests support?"),
-    "report": ("report", "The page of an output folder again, as PDF, or two side by side."),
-    "simulate": ("simulate", "One forward analysis with a material card."),
-    "gauge": ("gauge", "A virtual strain gauge through the DIC frames of a strip test."),
-    "dic": ("dic", "Is the camera right? A sphere through the points of its frames."),
-    "study": ("study", "What refinement, or nu12, changes in an analysis."),
-    "export": ("export", "A material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
-    "init": ("init", "Write a commented project: an example, or for your own tests."),
-    "docs": ("docs", "The documents of this version, page by page."),
-    "schema": ("schema", "The JSON Schema of the project file, for editors."),
-    "verify": ("verify", "Published and closed-form numbers beside this program's."),
-    "cache": ("cache", "Runs of other programs that are kept: how many, where; fewer."),
-    "doctor": ("doctor", "Which solvers are here, and do they carry the law?"),
+    "fit": ("fits", "Fit a material to all tests of a fabric together."),
+    "bubble": ("fits", "Fit a material to bubble inflation tests only."),
+    "uniaxial": ("fits", "Fit a material to warp, fill and bias strip tests only."),
+    "biaxial": ("cards", "Evaluate designers' linear constants from biaxial tests."),
+    "check": ("data", "Check the data before a fit."),
+    "bend": ("predict", "Inflate and bend cylinders with material cards."),
+    "validate": ("studies", "Cross-validate a fit: predict each test from the others."),
+    "profile": ("studies", "Compute profile-likelihood intervals of moduli."),
+    "bootstrap": ("studies", "Bootstrap the data: percentile bands of the moduli."),
+    "plan": ("studies", "Rank further tests by the predicted uncertainty of the moduli."),
+    "compare": ("studies", "Compare forms of the moduli by cross-validation."),
+    "report": (
+        "tools",
+        "Write the page of an output folder again, as PDF, or of two side by side.",
+    ),
+    "simulate": ("predict", "Run forward analyses with a material card."),
+    "gauge": ("data", "Follow a virtual strain gauge through the DIC frames of a strip test."),
+    "dic": ("data", "Test the camera: fit a sphere to the points of its frames."),
+    "study": ("studies", "Vary the mesh, the increments or nu12 in an analysis."),
+    "export": ("cards", "Write a material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
+    "init": ("start", "Write a commented project: an example, or one for your own tests."),
+    "docs": ("start", "Read the documents of this version."),
+    "schema": ("start", "Print the JSON Schema of the project file, for editors."),
+    "verify": ("tools", "Compare with published numbers and closed forms."),
+    "cache": ("tools", "Show or prune the cache of solver runs."),
+    "doctor": ("tools", "List the solvers found, and test that they can run the law."),
 }
 
 
 class LazyGroup(Suggesting):
-    """Imports a subcommand only when it runs: `bubblefit --help` stays quick.
-
-    What cannot be understood is one line, also below it.
-    """
+    """Import a command only when it is called, and print usage errors in one line."""
 
     def make_context(
         self,
@@ -72,7 +77,7 @@ class LazyGroup(Suggesting):
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
-        return with_events(with_verbose(module.command))
+        return with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -84,19 +89,15 @@ class LazyGroup(Suggesting):
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=examples(
-        "bubblefit init mine",
-        "bubblefit fit mine/project.toml",
-        "bubblefit fit --help",
+        "bubblefit init mine", "bubblefit fit mine/project.toml", "bubblefit fit --help"
     ),
 )
 @click.version_option(__version__, prog_name="bubblefit")
-@click.option(
-    "--verbose", is_flag=True, help="Tell each analysis, solver files and times, on stderr."
-)
+@click.option("--verbose", is_flag=True, help=VERBOSE)
 def main(verbose: bool) -> None:
-    """Test data in, validated material card of a coated fabric out.
+    """Identify the material law of a coated fabric from tests.
 
-    Exit codes: 0 fine, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
+    Exit codes: 0 success, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
     4 the solver failed, 130 interrupted.
     """
     listen(verbose)

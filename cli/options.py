@@ -1,31 +1,131 @@
-"""What commands make of their options: folders, projects with a solver, cards, numbers."""
+"""Arguments and options that several commands share, and the objects commands make of them."""
 
 from __future__ import annotations
 
+import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ..errors import InputError, OutputError
+from ..materials.card import MaterialCard, read_card
+from ..project.cards import usual_folder
+from ..project.project import Project, read_project
+from ..readers.frames import QUANTITIES
+from ..readers.sections import LENGTH_UNITS
+from ..solvers.registry import ANY
+from ..solvers.registry import command_line as solver_options
+from .terminal import COMMAND_LINE, FILE, Decorator
 
-if TYPE_CHECKING:
-    from ..materials.card import MaterialCard
-    from ..project.project import Project
+Command = Callable[..., Any]
 
-#: Where click keeps what was typed, while a command runs.
-COMMAND_LINE = "bubblefit.command_line"
+PROJECT: Decorator = click.argument("project", type=FILE)
+TESTS: Decorator = click.option(
+    "--test", "tests", multiple=True, help="A test by its name; several [all]."
+)
+DATA: Decorator = click.option(
+    "--data", multiple=True, metavar="[TEST=]DIR",
+    help="Folder of the measured data, of all tests or of one; several.",
+)  # fmt: skip
+TRUST: Decorator = click.option(
+    "--trust", multiple=True, metavar="NAME", help="Accept a doubt about the data; several."
+)
+CARD_OF_FIT: Decorator = click.option(
+    "--card", help="Card of the fit: a file or a name [that of the project's fit]."
+)
+JOBS: Decorator = click.option("--jobs", type=click.IntRange(min=1), help="Processes [all cores].")
+SCHEDULER: Decorator = click.option(
+    "--scheduler", envvar="BUBBLEFIT_SCHEDULER", metavar="ADDRESS",
+    help="Dask scheduler whose workers do the runs [this machine].",
+)  # fmt: skip
+OVERWRITE: Decorator = click.option(
+    "--overwrite", is_flag=True, help="Replace the results in the output folder."
+)
+AS_JSON: Decorator = click.option(
+    "--json", "as_json", is_flag=True, help="Print result.json on stdout."
+)
+QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
+
+
+def resume_option(words: str = "Keep the analyses that the output folder holds.") -> Decorator:
+    """Return --resume with its help."""
+    return click.option("--resume", is_flag=True, help=words)
+
+
+def fail_above_option(words: str) -> Decorator:
+    """Return --fail-above with its help."""
+    return click.option("--fail-above", type=float, metavar="E", help=words)
+
+
+def out_option(usual: str = "out/NAME") -> Decorator:
+    """Return --out, with the usual output folder in its help."""
+    return click.option("--out", type=FILE, help=f"Output folder [{usual}].")
+
+
+def with_options(command: Command, decorators: Sequence[Decorator]) -> Command:
+    """Return a command with options; its help lists them in this order."""
+    for decorate in reversed(decorators):
+        command = decorate(command)
+    return command
+
+
+def with_checks(command: Command, decorators: Sequence[Decorator]) -> Command:
+    """Return a command with options, where --resume, --overwrite and --fail-above are checked."""
+
+    @functools.wraps(command)
+    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
+        above = kwargs.get("fail_above")
+        if resume and overwrite:
+            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
+        if above is not None and not above >= 0:
+            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
+        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
+
+    return with_options(checked, decorators)
+
+
+def solver_choice(command: Command) -> Command:
+    """Add the options that pick a solver; the command receives them as a dict, `solver_given`."""
+    known = solver_options()
+
+    @functools.wraps(command)
+    def wrapped(
+        *args: Any, solver: str | None, solver_option: Sequence[str], cache: bool, **kwargs: Any
+    ) -> Any:
+        given = {"solver": solver, "settings": solver_option, "cache": cache}
+        given |= {one.name: kwargs.pop(one.name) for one in known}
+        return command(*args, solver_given=given, **kwargs)
+
+    decorators: list[Decorator] = [
+        click.option("--solver", metavar="NAME", help="Solver that runs the model."),
+        *(
+            click.option(
+                f"--{one.name}", metavar=one.metavar, type=FILE if one.path else str, help=one.what
+            )
+            for one in known
+        ),
+        click.option(
+            f"--{ANY}", metavar="KEY=VALUE", multiple=True,
+            help="A setting of the solver as in [solver.NAME]; may be given more than once.",
+        ),
+        click.option(
+            "--no-cache", "cache", flag_value=False, default=True,
+            help="Run the solver even where the run is in the cache (see `bubblefit cache`).",
+        ),
+    ]  # fmt: skip
+    return with_options(wrapped, decorators)
 
 
 def command_line() -> list[str]:
-    """What was typed: the program and its arguments, for the record of a run."""
+    """Return the program and the arguments as typed, for the record of a run."""
     return list(click.get_current_context().meta[COMMAND_LINE])
 
 
 def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
-    """Folders of measured data: one for all tests, or one by the name of a test ("NAME=DIR").
+    """Return the folder of measured data for all tests, or a folder by test ("NAME=DIR").
 
     Raises
     ------
@@ -43,9 +143,7 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 
 def folder_beside(project: Path, suffix: str) -> Path:
-    """The usual output folder of what is no fit: out/NAME-`suffix`."""
-    from ..project.cards import usual_folder
-
+    """Return the usual output folder of a command that does not fit: out/NAME-`suffix`."""
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")
 
@@ -53,7 +151,7 @@ def folder_beside(project: Path, suffix: str) -> Path:
 def result_folder(
     project: Path, suffix: str, out: Path | None, overwrite: bool, resume: bool = False
 ) -> Path:
-    """The output folder of one analysis or study: `out`, or out/NAME-`suffix`.
+    """Return the output folder of one analysis or study: `out`, or out/NAME-`suffix`.
 
     Raises
     ------
@@ -71,19 +169,17 @@ def read_with_solver(
     data: Path | Mapping[str, Path] | None = None,
     need_data: bool = True,
 ) -> Project:
-    """The project of a file, with the solver and the solver's options of the command line.
+    """Read a project; the solver and its options of the command line replace those of the file.
 
     Raises
     ------
     InputError : in the project, or an option of a solver that does not run.
     """
-    from ..project.project import read_project
-
     return with_solver(read_project(path, data, need_data), given)
 
 
 def read_to_refit(path: Path, options: Mapping[str, Any]) -> Project:
-    """The project of a file for a study that fits again: `read_with_solver`, jobs, scheduler.
+    """Read a project for a study that fits again, with solver, jobs and scheduler as given.
 
     options : of the command, by name.
 
@@ -96,7 +192,7 @@ def read_to_refit(path: Path, options: Mapping[str, Any]) -> Project:
 
 
 def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
-    """The project with the solver and the solver's options of the command line.
+    """Return the project with the solver and the solver's options of the command line.
 
     Raises
     ------
@@ -109,14 +205,12 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
 
 
 def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
-    """Cards by a name each: the card's own, else its file's, told apart where they agree.
+    """Read cards by name: the card's own, else its file's, with the path where two agree.
 
     Raises
     ------
-    InputError : what is no card; one that is given twice.
+    InputError : a file is no card, or is given twice.
     """
-    from ..materials.card import read_card
-
     named: dict[str, MaterialCard] = {}
     for path in cards:
         card = read_card(path)
@@ -130,7 +224,7 @@ def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Numbers with commas between them.
+    """Return the numbers of a text that has commas between them.
 
     Raises
     ------
@@ -141,3 +235,58 @@ def numbers(text: str, option: str) -> list[float]:
     except ValueError:
         problem = f"expected numbers with commas between them, got {text!r}"
         raise InputError(None, option, problem) from None
+
+
+# Files of DIC frames
+
+
+def frame_options(command: Command) -> Command:
+    """Add the options for reading frames: --format, --columns, --flag-column, --length-unit."""
+    units = click.Choice(list(LENGTH_UNITS))
+    decorators: list[Decorator] = [
+        click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
+        click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
+        click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
+        click.option("--length-unit", type=units, default="mm", help="Of the files [mm]."),
+    ]
+    return with_options(command, decorators)
+
+
+def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
+    """Check that a file may be written: not one that is read, nor one that exists.
+
+    Raises
+    ------
+    OutputError : it may not be written.
+    """
+    if out.resolve() in [file.resolve() for file in inputs if file is not None]:
+        raise OutputError(f"{out}: is one of the files to be read; choose another --out")
+    if out.exists() and not overwrite:
+        raise OutputError(f"{out}: is already there; use --overwrite or another --out")
+
+
+def columns_named(given: str | None) -> dict[str, str] | None:
+    """Return the columns of some of x, y, z, dx, dy, dz, given as in "x=X,dz=W".
+
+    Raises
+    ------
+    InputError : another form, an unknown quantity, one column for two quantities.
+    """
+    if given is None:
+        return None
+    names: dict[str, str] = {}
+    for part in given.split(","):
+        quantity, equals, name = (piece.strip() for piece in part.partition("="))
+        if not (equals and name):
+            problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
+            raise InputError(None, "columns", problem)
+        if quantity not in QUANTITIES:
+            problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
+            raise InputError(None, "columns", problem)
+        names[quantity] = name
+    for quantity, name in names.items():
+        first = next(other for other in names if names[other] == name)
+        if first != quantity:
+            problem = f"column {name!r} is named for {first} and for {quantity}"
+            raise InputError(None, "columns", problem)
+    return names

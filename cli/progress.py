@@ -1,37 +1,171 @@
-"""Progress of fits and of predictions: what is counted, and what is said beside the count."""
+"""Progress: a live line on a terminal, a plain line a minute elsewhere, and events for machines."""
 
 from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING
+from collections import Counter
+from contextlib import ExitStack
+from typing import Self
 
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
+
+from ..caching import kernels_are_compiled
+from ..runs.predictions import RunEvent
+from ..runs.simulation import Step
 from ..runs.starts import EvaluationRecord, Stage, StartRecord
-from .live_line import CountProgress
+from ..solvers.base import Announcement, hearing
+from .terminal import EVENTS
 
-if TYPE_CHECKING:
-    from ..runs.predictions import RunEvent
+PLAIN_EVERY_S = 60.0
+COMPILING = (
+    "compiling for this machine: the first run takes some tens of seconds more, later ones do not"
+)
+
+
+class LiveLine:
+    """Show a bar on a terminal, on stderr, so that stdout stays for results; elsewhere none.
+
+    Announcements meanwhile get a line of their own; a state (a process that waits for a licence)
+    is shown on the bar, and without a bar on a line, a minute apart.
+    """
+
+    def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
+        self.bar: Progress | None = None
+        self.quiet, self._hearing = quiet, ExitStack()
+        self._states: dict[str, str] = {}
+        self._stated: dict[str, float] = {}
+        if not quiet and sys.stderr.isatty():
+            self.bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                *more,
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+
+    def __enter__(self) -> Self:
+        if not self.quiet and not kernels_are_compiled():
+            print(COMPILING, file=sys.stderr, flush=True)
+        self._hearing.enter_context(hearing(self.heard))
+        if self.bar is not None:
+            self.bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._hearing.close()
+        if self.bar is not None:
+            self.bar.stop()
+
+    def heard(self, said: Announcement) -> None:
+        """Record a state, or print an announcement."""
+        if said.of:
+            self._states.pop(said.of, None)
+            if said.words:
+                self._states[said.of] = said.words
+            last = self._stated.get(said.words, -PLAIN_EVERY_S)
+            if time.monotonic() - last < PLAIN_EVERY_S:
+                return
+            self._stated[said.words] = time.monotonic()
+        if not said.words or (self.quiet and said.of):  # a state is progress
+            return
+        if self.bar is None:
+            print(said.words, file=sys.stderr, flush=True)
+        elif not said.of:
+            self.bar.console.print(said.words, markup=False, highlight=False, soft_wrap=True)
+
+    @property
+    def states(self) -> str:
+        """Return the states with their counts, as the end of a note; "" where there is none."""
+        return "".join(f", {n} {words}" for words, n in Counter(self._states.values()).items())
+
+
+class SeriesProgress(LiveLine):
+    """Show a few analyses in turn, with the increments of the one that runs."""
+
+    def __init__(self, quiet: bool) -> None:
+        super().__init__(quiet)
+        self.said = time.monotonic()
+        if self.bar is not None:
+            self.task = self.bar.add_task("", total=None)
+
+    def saw(self, step: Step) -> None:
+        """Show how far the current analysis is; without a terminal once a minute."""
+        words = f"analysis {step.analysis} of {step.analyses}, {step.part}{self.states}"
+        EVENTS.progress("increments", step.done, step.increments or None, words)
+        if self.bar is None and not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            of = f" of {step.increments}" if step.increments else ""
+            print(f"{words}: increment {step.done:g}{of}", file=sys.stderr, flush=True)
+        if self.bar is not None:
+            self.bar.update(
+                self.task, description=words, completed=step.done, total=step.increments or None
+            )
+
+
+class CountProgress(LiveLine):
+    """Show tasks done, a note and the time left."""
+
+    def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
+        super().__init__(quiet, TextColumn("{task.fields[note]}"))
+        self.what, self.total, self.done, self.already = what, total, done, done
+        self.begun = self.said = time.monotonic()
+        if self.bar is not None:
+            self.task = self.bar.add_task(what, total=total, completed=done, note="")
+
+    def show(self) -> None:
+        """Update the bar, or elsewhere print a plain line a minute; write events as they come."""
+        EVENTS.progress(self.what, self.done, self.total, self.note() + self.states)
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done, total=self.total,
+                            note=self.note() + self.states)  # fmt: skip
+        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            words = f"{self.done} of {self.total} {self.what}, {self.note()}{self.states}"
+            print(words, file=sys.stderr, flush=True)
+
+    def note(self) -> str:
+        """Return the words beside the count."""
+        return self.left()
+
+    def left(self) -> str:
+        """Return the time left, estimated from the tasks done so far."""
+        fresh = self.done - self.already
+        if not fresh:
+            return "time left not known yet"
+        each = (time.monotonic() - self.begun) / fresh
+        return f"{each * (self.total - self.done):.0f} s left"
 
 
 class NamedProgress(CountProgress):
-    """Things done, the one whose turn it is, time left."""
+    """Show how many are done, which one runs, and the time left."""
 
     def __init__(self, what: str, quiet: bool) -> None:
         super().__init__(what, 0, 0, quiet)
         self.now = ""
 
     def saw(self, done: int, total: int, name: str) -> None:
-        """Take note of how many are done, and of the one whose turn comes where it has a name."""
+        """Record how many are done, and which one begins where it has a name."""
         self.done, self.total, self.now = done, total, name or self.now
         self.show()
 
     def note(self) -> str:
-        """What is computed, and time left."""
+        """Return what is computed, and the time left."""
         return f"{self.now}, {self.left()}" if self.now else self.left()
 
 
 class StudyProgress(CountProgress):
-    """Starts done, best objective, time left."""
+    """Show starts done, best objective, and the time left."""
 
     def __init__(self, total: int, quiet: bool) -> None:
         super().__init__("starts", total, 0, quiet)
@@ -42,7 +176,7 @@ class StudyProgress(CountProgress):
         self.under_way: tuple[int, float | None] | None = None
 
     def saw(self, record: object) -> None:
-        """Take note of a record, of a stage that begins, or of time passing."""
+        """Record a stage that begins, an analysis or the end of a start; None: time passes."""
         if isinstance(record, Stage):
             self.begin(record)
         elif isinstance(record, EvaluationRecord):
@@ -56,21 +190,15 @@ class StudyProgress(CountProgress):
         self.show()
 
     def begin(self, stage: Stage) -> None:
-        """Count anew: objectives of another mesh are another sum."""
-        self.what, self.total, self.done, self.already, self.best = (
-            stage.what,
-            stage.total,
-            0,
-            0,
-            None,
-        )
-        self.under_way = None
+        """Begin a new count: objectives of another mesh are another sum."""
+        self.what, self.total = stage.what, stage.total
+        self.done, self.already, self.best, self.under_way = 0, 0, None, None
         self.begun = time.monotonic()
         if self.bar is not None:
             self.bar.update(self.task, description=stage.what)
 
     def note(self) -> str:
-        """Best objective so far, that of the start under way, analyses, time left."""
+        """Return the best objective, that of the current start, the analyses and the time left."""
         parts = [] if self.best is None else [f"best {self.best:.3g}"]
         if self.under_way is not None:
             start, value = self.under_way
@@ -82,9 +210,9 @@ class StudyProgress(CountProgress):
 
 
 class FitsProgress(StudyProgress):
-    """Several fits in turn: the words of the one whose turn it is, then its starts.
+    """Show several fits in turn: a line with the name of each, then its starts.
 
-    said : of the fit, with {} for its name.
+    said : the line, with {} for the name.
     """
 
     def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
@@ -92,7 +220,7 @@ class FitsProgress(StudyProgress):
         self.said_of_fit = said
 
     def saw(self, record: object) -> None:
-        """Take note of a fit that begins, of a start or a fold that ended, or of time passing."""
+        """Record a fit that begins (its name), or a record as `StudyProgress`."""
         if isinstance(record, str):
             self.begin(Stage("starts", self.starts))
             if not self.quiet:
@@ -101,14 +229,14 @@ class FitsProgress(StudyProgress):
 
 
 class RunsProgress(CountProgress):
-    """Runs done, how the last one ended, time left."""
+    """Show runs done, how the last one ended, and the time left."""
 
     def __init__(self, quiet: bool) -> None:
         super().__init__("runs", 0, 0, quiet)
         self.last = ""
 
     def saw(self, event: RunEvent | None) -> None:
-        """Take note of a run that ended, or of time passing."""
+        """Record a run that ended; None: time passes."""
         if event is not None:
             self.done, self.total = event.done, event.total
             self.already += event.again
@@ -121,5 +249,5 @@ class RunsProgress(CountProgress):
         self.show()
 
     def note(self) -> str:
-        """How the last run ended, and time left."""
+        """Return how the last run ended, and the time left."""
         return self.last + self.left()

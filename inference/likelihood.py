@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ..materials.forms.base import modulus_rows
 from .methods.descent import bounded_step
@@ -27,7 +27,7 @@ from .unknowns import Unknowns
 Array = NDArray[np.float64]
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
-THRESHOLD = float(chi2.ppf(LEVEL, 1))
+THRESHOLD = float(2 * gammaincinv(0.5, LEVEL))  # chi-square of one degree
 #: Roots of -2 log L from place to place, and places of a side.
 STEP, MOST_PLACES = 0.5, 16
 #: From one step to the next; a step that fails is halved so many times.

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.legendre import legval
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import f as fisher
+from scipy.special import chdtr, chdtrc, fdtri
 
 from ..notes import Note, NoteKind
 from .noise import Misfit, alike, alike_in, misfits
@@ -133,7 +132,7 @@ def discrepancy(
         return None
     steeper = float(np.exp(STEEPER * np.sqrt((1.0 - 1.0 / together) / independent)))
     ratio = (smooth[0] / free) / (following[0] / following[1])
-    largest = float(fisher.isf(FALSE_ALARMS, free, following[1])) * steeper
+    largest = float(fdtri(free, following[1], 1 - FALSE_ALARMS)) * steeper
     rms = np.sqrt(max(left - steeper * of_next, 0.0) / values)
     return Discrepancy(float(ratio), largest, float(rms), unit)
 
@@ -268,7 +267,7 @@ def alike_in_all(
         return None  # specimens that do not differ at all: nothing to test against
     square = specimens * float(mean @ np.linalg.solve(spread, mean))
     ratio = square * (specimens - count) / (count * (specimens - 1))
-    largest = float(fisher.isf(FALSE_ALARMS, count, specimens - count))
+    largest = float(fdtri(count, specimens - count, 1 - FALSE_ALARMS))
     return Discrepancy(ratio, largest, rms, unit, specimens=specimens)
 
 
@@ -324,12 +323,12 @@ class NoiseTest:
     @property
     def above(self) -> float:
         """How often such noise leaves as much, or more."""
-        return float(chi2.sf(self.square, self.free))
+        return float(chdtrc(self.free, self.square))
 
     @property
     def below(self) -> float:
         """How often it leaves as little, or less."""
-        return float(chi2.cdf(self.square, self.free))
+        return float(chdtr(self.free, self.square))
 
     @property
     def told(self) -> NoteKind | None:

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from . import needs
 from .bars import BarKind, BarSolver
 from .figure_checks import check_figure
+from .golden_files import Golden
 
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
 os.environ["BUBBLEFIT_PROGRAMS_FROM"] = os.sep
@@ -34,6 +35,17 @@ os.environ[VARIABLE] = OFF
 # The first call of a kernel compiles it, or reads it from the cache.
 settings.register_profile("bubblefit", deadline=None)
 settings.load_profile("bubblefit")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that writes tests/golden/."""
+    parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
+
+
+@pytest.fixture(scope="session")
+def golden(request: pytest.FixtureRequest) -> Golden:
+    """Compare the terminal output of a command with its file in tests/golden/."""
+    return Golden(request.config.getoption("--rewrite-golden"))
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 import pytest
-from bubblefit.cli.fit_words import lines_of
+from bubblefit.cli.fits import lines_of
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import Exhibit
 from bubblefit.notes import FEW, Note, NoteKind, lines

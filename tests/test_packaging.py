@@ -91,9 +91,19 @@ def test_versions_agree():
     assert f"## {bubblefit.__version__}" in (ROOT / "CHANGELOG.md").read_text()
 
 
+#: Libraries that take a tenth of a second or more to import, or are not there on every machine.
+HEAVY = {"numba", "scipy.optimize", "scipy.stats", "matplotlib", "pandas", "pydantic"} | {
+    "gmsh", "nlopt", "dask", "h5py", "jinja2"
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("module", "absent"),
-    [("cli.main", {"matplotlib", "numba", "gmsh"}), ("cli.bubble", {"gmsh"})],
+    [
+        ("cli.main", HEAVY),
+        ("cli.fits", {"gmsh", "scipy.stats", "dask", "h5py"}),
+        ("fits.project", HEAVY - {"numba", "nlopt", "pydantic", "jinja2"}),
+    ],
 )
 def test_start_up_loads_only_what_it_needs(module, absent):
     # gmsh needs X and GL libraries; the others make `bubblefit --help` slow.

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from bubblefit.documents import find_document, pages, title_of
+from bubblefit.cli.start import find_document, pages, title_of
 
 from .commands import in_process
 from .complaints import complaint

@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli import live_line
+from bubblefit.cli import progress
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.experiments.kinds import Exhibit
 from bubblefit.materials.card import MaterialCard, write_card
@@ -78,8 +78,9 @@ def study(tmp_path_factory: pytest.TempPathFactory):
     return folder / "out", done.stdout
 
 
-def test_the_files_of_a_study_agree(study) -> None:
+def test_the_files_of_a_study_agree(study, golden) -> None:
     out, text = study
+    golden("bend", text, out.parent)
     result = result_in(out)
     assert result["command"] == "predict" and result["solver"] == "formula"
     keys = [(r["test"], r["card"]) for r in result["runs"]]
@@ -106,12 +107,11 @@ def test_the_files_of_a_study_agree(study) -> None:
         np.testing.assert_allclose(amount, amount.iloc[0])
         stem = "-".join([*key[0].replace(",", "").split(), key[1]])
         assert (out / "beams" / f"{stem}.vtu").exists()
-    assert text.count(" N/mm") == 1 and "page: out/report.html" in text
     assert list(result["tests"]) == list(tests) and result["cards"] == list(cards)
 
 
 def test_errors_against_the_readings(study) -> None:
-    out, text = study
+    out, _ = study
     table = pd.read_csv(out / "runs.csv")
     readings = pd.read_csv(out / "measured.csv")
     assert set(readings["test"]) == {"150 mm, 90 kPa"} and readings["repetitions"].max() == 2
@@ -129,7 +129,6 @@ def test_errors_against_the_readings(study) -> None:
     assert table[table["test"] == "high"]["rms_N"].isna().all()
     result = result_in(out)
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
-    assert "error" in text.splitlines()[0]
 
 
 def test_the_folder_says_what_it_came_from(study) -> None:
@@ -306,7 +305,7 @@ def test_json_is_all_that_is_printed(tmp_path: Path) -> None:
 def test_progress_is_a_plain_line_where_there_is_no_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live_line, "PLAIN_EVERY_S", 0.0)
+    monkeypatch.setattr(progress, "PLAIN_EVERY_S", 0.0)
     done = bend(write_project(tmp_path), "--out", "out", "--jobs", 1, cwd=tmp_path)
     lines = [line for line in done.stderr.splitlines() if line.startswith("4 of 4 runs")]
     assert lines and "high with stiff: finished in" in lines[-1] and "0 s left" in lines[-1]
@@ -350,15 +349,16 @@ def card(tmp_path: Path) -> Path:
     return path
 
 
-def test_simulate_bend_on_the_membrane(tmp_path: Path, card: Path) -> None:
+def test_simulate_bend_on_the_membrane(tmp_path: Path, card: Path, golden) -> None:
     """Coarse and short: what is checked is that the command bends, not how well."""
     short = ("--element-size", 30, "--deflection", 12, "--frames", 3, "--seam-width", 30)
     bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured",
          write_readings(tmp_path / "a.csv").rename(tmp_path / "b.csv"), cwd=tmp_path,
          command=("simulate", "bend"), code=2)  # fmt: skip
     (tmp_path / "b.csv").write_text("deflection (mm),load (kg)\n0,0\n5,2\n10,4\n")
-    bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured", "b.csv",
-         cwd=tmp_path, command=("simulate", "bend"))  # fmt: skip
+    done = bend("--diameter", 150, "--pressure", 140, "--card", card, *short, "--measured", "b.csv",
+                cwd=tmp_path, command=("simulate", "bend"))  # fmt: skip
+    golden("simulate-bend", done.stdout, tmp_path)
     out = tmp_path / "out" / "bend-150mm-140kPa"
     result = result_in(out)
     run, stiff = result["runs"]

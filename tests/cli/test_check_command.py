@@ -42,9 +42,9 @@ def folder(tmp_path_factory):
     return place
 
 
-def test_good_data_are_said_to_be_fine(folder):
+def test_good_data_are_said_to_be_fine(folder, golden):
     done = in_process("check", "project.toml", cwd=folder)
-    assert "bubble: fine: nothing doubtful" in done.stdout
+    golden("check", done.stdout, folder)
     out = folder / "out" / f"{folder.name}-check"
     page = (out / "report.html").read_text()
     assert "The data are fit to be fitted." in page and "Equilibrium of the apex" in page

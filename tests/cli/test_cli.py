@@ -25,8 +25,9 @@ def study(tmp_path_factory):
     return folder, done.stdout
 
 
-def test_a_study_writes_everything_it_promises(study):
+def test_a_study_writes_everything_it_promises(study, golden):
     folder, text = study
+    golden("bubble", text, folder)
     out = folder / "out"
     result = json.loads((out / "result.json").read_text())
     for key in (
@@ -49,7 +50,6 @@ def test_a_study_writes_everything_it_promises(study):
     for name in ("optima.png", "moduli.png", "profiles.png", "heights.png", "report.html"):
         assert (out / name).stat().st_size > 1000, name
     assert (out / "bubble.pvd").read_text().count("<DataSet") == 7
-    assert "largest error of the moduli" in text
     assert not list(out.glob("*.part")) and not list(out.glob(".*"))
 
 
@@ -121,13 +121,13 @@ def test_nlopt_methods_by_command(tmp_path, method):
     assert all(s["analyses"] <= 62 for s in result["starts"])
 
 
-def test_simulate_with_a_card(study, tmp_path):
+def test_simulate_with_a_card(study, tmp_path, golden):
     folder, _ = study
     card = folder / "out" / "material.toml"
     done = bubblefit(
         "simulate", "bubble", folder / "project.toml", "--card", card, "--out", "sim", cwd=tmp_path
     )
-    assert re.search(r"300\.0 kPa\s+apex", done.stdout)
+    golden("simulate-bubble", done.stdout, tmp_path)
     result = json.loads((tmp_path / "sim/result.json").read_text())
     assert result["apex_mm"] == sorted(result["apex_mm"])
     table = pd.read_csv(tmp_path / "sim/displacement.csv")

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from matplotlib.figure import Figure
 
 from ..drawings import data
+from ..golden_files import Golden
 
 PROJECT = """
 [fabric]
@@ -56,7 +57,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def test_the_form_behind_the_data_is_found(
-    project: Path, tmp_path: Path, drawn: list[Figure]
+    project: Path, tmp_path: Path, drawn: list[Figure], golden: Golden
 ) -> None:
     out = tmp_path / "out"
     forms = ["--form", "constant", "--form", "linear", "--form", "cubic"]
@@ -92,6 +93,7 @@ def test_the_form_behind_the_data_is_found(
     (out / "result.json").unlink()
     again = CliRunner().invoke(main, [*arguments, "--resume"])
     assert again.exit_code == 0, again.output
+    golden("compare", again.stdout, tmp_path)
     assert (out / "linear" / "starts.jsonl").read_text() == before
     assert json.loads((out / "result.json").read_text()) == result
 

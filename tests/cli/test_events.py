@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bubblefit.cli import exits
-from bubblefit.cli.events import EVENTS, Events
-from bubblefit.cli.home import place_matplotlib
+from bubblefit.cli import terminal
 from bubblefit.cli.main import COMMANDS, main
+from bubblefit.cli.terminal import EVENTS, Events, place_matplotlib
 from click import Context, Group
 from click.testing import CliRunner
 
@@ -66,10 +65,10 @@ def test_every_end_is_told(tmp_path: Path) -> None:
 
         EVENTS.begin(path, "c")
         with pytest.raises((SystemExit, ValueError)):
-            exits.exits(fails)()
+            terminal.exits(fails)()
         assert told(path)[-1] == {**told(path)[-1], "exit_code": code, "error": words}
     before = path.read_text()
-    EVENTS.tell("late")
+    EVENTS.write("late")
     assert path.read_text() == before
 
 

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.cli.ending import written_to
-from bubblefit.cli.fit_words import lines_of, misfit_lines, modulus_lines, warning_lines
+from bubblefit.cli.fits import lines_of, misfit_lines, modulus_lines, warning_lines
+from bubblefit.cli.terminal import written_to
 from bubblefit.inference.noise import Misfit
 from bubblefit.notes import GRAVEST, Note, NoteKind, foremost
 from bubblefit.runs.result import Answer, answers
@@ -64,7 +64,7 @@ def test_the_table_of_the_moduli(fit: bf.Fit, monkeypatch: pytest.MonkeyPatch) -
         Answer("E1", 0.1073, 490.0, 396.9, 10.0, None, True),
         Answer("G12", 0.05, 13.972, 11.317),
     ]
-    monkeypatch.setattr("bubblefit.cli.fit_words.answers", lambda _: told)
+    monkeypatch.setattr("bubblefit.cli.fits.answers", lambda _: told)
     title, head, *rows = modulus_lines(fit)
     assert title == (
         f"{fit.project.title}: tangent moduli at logarithmic strains, with what noise and mesh "

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import click
 import pytest
-from bubblefit.cli.examples import HEAD, examples_in
 from bubblefit.cli.main import COMMANDS, main
-from bubblefit.cli.usage import every_command
+from bubblefit.cli.terminal import HEAD, every_command, examples_in
 from click.testing import CliRunner, Result
 
 from .. import needs
@@ -135,7 +134,7 @@ _bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
 @pytest.fixture
 def told(tmp_path: Path) -> Iterator[Path]:
     """A project, and the loggers as they were afterwards."""
-    from bubblefit.cli.logs import LOGGER, Stderr
+    from bubblefit.cli.terminal import LOGGER, Stderr
 
     before = LOGGER.level, list(LOGGER.handlers)
     yield small(tmp_path)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bubblefit.cli.fit import command
+from bubblefit.cli.fits import fit_command as command
 
 from .. import needs
 from ..places import ROOT

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import html
+import pickle
 from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fit_words import lines_of
+from bubblefit.cli.fits import lines_of
 from bubblefit.inference.assessment import certainty
 from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.notes import Note, NoteKind, foremost, marks, rows
 from bubblefit.project.project import read_project
 from bubblefit.reports.html import number
 from bubblefit.runs.setup import prepare_fit
@@ -75,3 +77,14 @@ def test_the_residual_stands_beside_the_noise(fitted) -> None:
     assert f"misfit of bubble: {left['rms']:.3g} mm RMS, {times}" in lines_of(fit, out)
     page = (out / "report.html").read_text()
     assert "Residual beside the noise" in page and f"<td>{number(left['rms'])}</td>" in page
+
+
+def test_kinds_of_notes_are_no_closed_list() -> None:
+    """A kind of another distribution is kept by name, also by copies from other processes."""
+    kind = NoteKind("creep")
+    note = pickle.loads(pickle.dumps(Note(kind, "the load fell by 3 %", "a strip")))
+    assert note.kind == kind and kind.value == "creep" and kind not in list(NoteKind)
+    assert rows([note]) == [{"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}]
+    assert foremost([note, Note(NoteKind.MESH, "m")]) == "m" and marks([note]) == []
+    with pytest.raises(ValueError, match="is not a valid NoteKind"):
+        NoteKind(" ")

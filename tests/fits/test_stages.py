@@ -11,7 +11,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fit_words import lines_of
+from bubblefit.cli.fits import lines_of
 from bubblefit.cli.progress import FitsProgress, StudyProgress
 from bubblefit.errors import InputError
 from bubblefit.experiments.kinds import Weighting

@@ -1,0 +1,354 @@
+"""`bubblefit check`, `gauge` and `dic`: commands that look at measured data before a fit."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..errors import InputError, OutputError
+from ..experiments.strips.gauge import (
+    GaugeTable,
+    PairedLoads,
+    loads_at_frames,
+    virtual_strain_gauge,
+)
+from ..notes import lines as note_lines
+from ..project.project import read_project
+from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
+from ..readers.sections import LENGTH_UNITS
+from ..readers.spheres import Sphere, fit_sphere, points_of
+from ..readers.tables import write_table
+from ..reports.sphere import plot_spheres
+from ..runs.check import check
+from ..writing import replacing
+from .options import (
+    DATA,
+    PROJECT,
+    TESTS,
+    TRUST,
+    check_out,
+    columns_named,
+    data_folders,
+    folder_beside,
+    frame_options,
+    out_option,
+)
+from .terminal import FILE, command, group, show, written_to
+
+DOUBTFUL = 2  # exit code, as for any bad input
+
+
+@command(
+    "check",
+    "bubblefit check project.toml",
+    "bubblefit check project.toml --test bubble --trust preload",
+)
+@PROJECT
+@TESTS
+@out_option("out/NAME-check")
+@DATA
+@TRUST
+@click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
+def check_command(
+    project: Path,
+    tests: tuple[str, ...],
+    out: Path | None,
+    data: tuple[str, ...],
+    trust: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Check the data of PROJECT.toml, as every fit does before it begins.
+
+    Finds common faults of measured data: wrong units, flipped or swapped axes, coordinates of
+    the deformed sheet, rejected points at zero, frames repeated or out of order, a frame that is
+    turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
+    the output folder. Exit code 2 where a fit would not begin.
+    """
+    found = check(read_project(project, data_folders(data)), tests or None, trust)
+    folder = out or folder_beside(project, "check")
+    found.report(folder)
+    show(found.result, [*found.lines(), written_to(folder)], as_json)
+    if not found.sound:
+        sys.exit(DOUBTFUL)
+
+
+# A virtual strain gauge
+
+#: Options about the loads, by the name of the argument.
+OF_LOADS = tuple(
+    "direction specimen load_column load_unit load_format decimal frame_times frame_time_column"
+    " frame_interval time_column time_offset".split()
+)
+#: Arguments that are options of the same name.
+ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit"])
+
+
+@command(
+    "gauge",
+    'bubblefit gauge "frames/*.csv" --lower 0 -50 --upper 0 50 --out gauge.csv',
+    "bubblefit gauge f1.csv f2.csv --lower 0 -50 --upper 0 50 --out warp.csv"
+    " --loads machine.csv --direction warp",
+)
+@click.argument("frames", nargs=-1, required=True)
+@click.option(
+    "--lower", type=float, nargs=2, required=True, metavar="X Y", help="One end, mm, undeformed."
+)
+@click.option(
+    "--upper", type=float, nargs=2, required=True, metavar="X Y", help="The other end, mm."
+)
+@click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
+@frame_options
+@click.option(
+    "--max-gap",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.35,
+    help="Longest edge between points, of the usual one [1.35]; 2.5 for scattered points.",
+)
+@click.option("--loads", type=FILE, help="The test machine's export.")
+@click.option("--direction", metavar="NAME", help="Of the loads: warp, fill or bias.")
+@click.option("--specimen", metavar="NAME", help="Of the loads [name of --out].")
+@click.option("--load-column", metavar="NAME", help="Where it is not found by itself.")
+@click.option("--load-unit", type=click.Choice(["N", "kN"]), help="Where the file names none.")
+@click.option("--load-format", metavar="NAME", help="Of the loads; found by their content.")
+@click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the loads and times.")
+@click.option("--frame-times", type=FILE, help="Table of the frames' times: pairs loads by time.")
+@click.option("--frame-time-column", metavar="NAME", help="Where it is not found by itself.")
+@click.option(
+    "--frame-interval",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="Between frames, the first at 0: pairs loads by time.",
+)
+@click.option(
+    "--time-offset", type=float, metavar="SECONDS", help="Machine's clock less the frames' [0]."
+)
+@click.option("--time-column", metavar="NAME", help="Of the loads, where not found by itself.")
+@click.option("--overwrite", is_flag=True, help="Replace the file of --out.")
+@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON on stdout.")
+def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
+    """Follow a virtual strain gauge through DIC FRAMES (CSV, in order; or a quoted pattern).
+
+    Writes length, elongation, strain and logarithmic strain of each frame. With the machine's
+    loads, one a frame or paired by time, a load curve that `strips.data.files` of a project
+    reads as it is; frames where correlation was lost, or without a load, are left out of it.
+    """
+    with _naming_options():
+        loads = _loads(options, out.stem)
+        files, note = frame_files(frames, "FRAMES")
+        check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
+        asked = FrameOptions(
+            QUANTITIES,
+            columns_named(options["columns"]),
+            options["flag_column"],
+            length_scale=LENGTH_UNITS[options["length_unit"]],
+            planar=True,
+        )
+        read = read_frames(files, asked, options["format"])
+        lower, upper = options["lower"], options["upper"]
+        record = virtual_strain_gauge(read, lower, upper, options["max_gap"])
+        names = [frame.path.name if frame.path else "" for frame in read]
+        table = GaugeTable(names, lower, upper, record, note=note)
+        # Before the loads, whose error may have this cause.
+        for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
+            click.echo(f"note: {words}", err=True)
+        said = table.notes
+        for one in said:
+            click.echo(f"warning: {one.line}", err=True)
+        if loads is not None:
+            table = replace(table, curve=loads_at_frames(record, loads))
+    table.write(out)
+    result = {"command": "gauge", "out": str(out), **table.numbers()}
+    more = [note for note in table.notes if note not in said]
+    show(
+        result, [*_gauge_lines(result), *note_lines(more), f"written to {out}"], options["as_json"]
+    )
+
+
+def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
+    """Return the loads of the options, None without --loads. `name` : of the specimen."""
+    given = {key: options[key] for key in OF_LOADS if options[key] is not None}
+    if options["loads"] is None:
+        for key in sorted(given):
+            raise InputError(None, key, "means nothing without --loads")
+        return None
+    if "direction" not in given:
+        problem = "this option is missing; a load curve needs it: warp, fill or bias"
+        raise InputError(None, "direction", problem)
+    given["format"] = given.pop("load_format", None)
+    return PairedLoads(options["loads"], **{"specimen": name, **given})
+
+
+@contextmanager
+def _naming_options() -> Iterator[None]:
+    """Let errors within the block name options instead of arguments."""
+    try:
+        yield
+    except InputError as error:
+        field, problem = error.field, error.problem
+        if error.path is None and re.fullmatch(rf"({ARGUMENTS})(, ({ARGUMENTS}))*", field):
+            field = re.sub(ARGUMENTS, _option, field)
+        problem = re.sub(r"\b(frame_times|frame_interval|\w+_column)\b", _option, problem)
+        raise InputError(error.path, field, problem) from None
+
+
+def _option(found: re.Match[str]) -> str:
+    return f"--{found[0].replace('_', '-')}"
+
+
+def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
+    """Return the lines for the terminal."""
+    end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
+    lines = [
+        f"gauge length {length} mm; {result['frames']} frames, lost in {len(result['lost'])}",
+        f"elongation up to {end['elongation_mm']:.5g} mm: strain {end['strain']:.4g},"
+        f" log strain {end['log_strain']:.4g}",
+    ]
+    if result["lost"]:
+        lines.append(f"correlation lost: {_few(result['lost'])}")
+    if "points" in result:
+        lines.append(f"{result['points']} points, loads up to {result['largest_load_N']:.5g} N")
+        lines.append(
+            f"in a project: [strips.{result['direction']}] gauge_length = {length}, and"
+            f" [strips.data] files = [{Path(result['out']).name!r}]"
+        )
+    return lines
+
+
+def _few(names: Sequence[str], most: int = 8) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+# Spheres: the error of the camera itself
+
+#: Quantities that a frame must hold; its displacements, where it has any, are added.
+PLACES = ("x", "y", "z")
+
+
+@group("dic", 'bubblefit dic sphere "ball/*.csv" --radius 50.02')
+def dic_command() -> None:
+    """Test the camera of an image correlation itself."""
+
+
+@command(
+    "sphere",
+    'bubblefit dic sphere "ball/*.csv" --radius 50.02',
+    "bubblefit dic sphere ball1.csv ball2.csv --out sphere.csv",
+)
+@click.argument("frames", nargs=-1, required=True)
+@click.option(
+    "--radius",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Of the ball, mm; the deviation from it is printed.",
+)
+@frame_options
+@click.option("--out", type=FILE, help="Table to write (CSV), and beside it a picture.")
+@click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
+@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON on stdout.")
+def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **options: Any) -> None:
+    """Fit a sphere to the points of each of the FRAMES (any format of DIC, or a quoted pattern).
+
+    Minimises the squared distances without points farther off than 4 robust standard deviations.
+    Prints radius and centre with standard errors, the RMS distance, and with --radius the
+    deviation from the radius of the ball.
+    """
+    files, note = frame_files(frames, "FRAMES")
+    if out is not None:
+        if out.suffix.lower() == ".png":
+            raise OutputError(f"{out}: the table is a CSV; the picture is written beside it")
+        for target in (out, out.with_suffix(".png")):
+            check_out(target, files, options["overwrite"])
+    try:
+        asked = FrameOptions(
+            PLACES,
+            columns_named(options["columns"]),
+            options["flag_column"],
+            length_scale=LENGTH_UNITS[options["length_unit"]],
+        )
+        read = read_frames(files, asked, options["format"])
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise InputError(None, f"--{error.field.replace('_', '-')}", error.problem) from None
+    names = [frame.path.name if frame.path else "" for frame in read]
+    if len(read) > len(files):
+        names = [f"{name}, frame {k + 1}" for k, name in enumerate(names)]
+    found = [fit_sphere(points_of(frame), frame.path) for frame in read]
+    rows = [_row(name, one, options["radius"]) for name, one in zip(names, found, strict=True)]
+    result: dict[str, Any] = {"command": "dic sphere", "frames": rows}
+    if options["radius"] is not None:
+        off = np.array([row["deviation_percent"] for row in rows])
+        result["radius_mm"] = options["radius"]
+        result["mean_deviation_percent"] = float(np.abs(off).mean())
+        result["worst_deviation_percent"] = float(off[np.argmax(np.abs(off))])
+    # Notes of the reader appear once, not for every frame.
+    words = dict.fromkeys(str(one) for frame in read for one in frame.source.notes)
+    for said in [*words, *([] if note is None else [str(note)])]:
+        click.echo(f"note: {said}", err=True)
+    if out is not None:
+        _write(out, rows, names, found)
+        result["out"] = [str(out), str(out.with_suffix(".png"))]
+    show(result, _sphere_lines(result), as_json)
+
+
+def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "frame": name,
+        "points": int(one.kept.sum()),
+        "left_out": one.left_out,
+        "radius_mm": one.radius,
+        "radius_error_mm": one.radius_error,
+        **{f"{axis}_mm": float(v) for axis, v in zip("xyz", one.centre, strict=True)},
+        **{f"{axis}_error_mm": float(v) for axis, v in zip("xyz", one.centre_error, strict=True)},
+        "rms_mm": one.rms,
+    }
+    if radius is not None:
+        row["deviation_percent"] = 100 * (one.radius / radius - 1)
+    return row
+
+
+def _sphere_lines(result: dict[str, Any]) -> list[str]:
+    """Return a table for the terminal."""
+    known = "radius_mm" in result
+    head = ["frame", "points", "left out", "radius, mm", "+-", "centre, mm", "RMS, mm"]
+    cells = [[*head, *(["off, %"] if known else [])]]
+    for row in result["frames"]:
+        centre = ", ".join(f"{row[f'{axis}_mm']:.2f}" for axis in "xyz")
+        line = [row["frame"], str(row["points"]), str(row["left_out"]), f"{row['radius_mm']:.4f}"]
+        line += [f"{row['radius_error_mm']:.2g}", centre, f"{row['rms_mm']:.2g}"]
+        cells.append([*line, *([f"{row['deviation_percent']:+.2f}"] if known else [])])
+    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
+    if known:
+        lines.append(
+            f"radius {result['radius_mm']:g} mm: off by {result['mean_deviation_percent']:.2f} % on"
+            f" average, {result['worst_deviation_percent']:+.2f} % at worst"
+        )
+    if "out" in result:
+        lines.append(f"written to {' and '.join(result['out'])}")
+    return lines
+
+
+def _write(
+    out: Path, rows: Sequence[dict[str, Any]], names: Sequence[str], found: Sequence[Sphere]
+) -> None:
+    with replacing(out) as path:
+        write_table(path, list(rows[0]), [list(row.values()) for row in rows])
+    plot_spheres(
+        out.with_suffix(".png"),
+        [
+            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
+            for name, one in zip(names, found, strict=True)
+        ],
+    )
+
+
+dic_command.add_command(dic_sphere)

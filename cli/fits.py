@@ -1,0 +1,261 @@
+"""`bubblefit fit`, `bubble` and `uniaxial`: options of every fit, and the summary it prints."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..errors import InputError
+from ..inference.posterior import LEVEL
+from ..notes import NOTES, Note, foremost
+from ..notes import lines as note_lines
+from ..project.cards import usual_folder
+from ..project.project import Project
+from ..reports.fit_page import sigma_words
+from ..reports.html import percent
+from ..runs.fit import fit
+from ..runs.result import Fit, answers
+from ..runs.starts import timed
+from . import options as given
+from .options import command_line, data_folders, read_with_solver
+from .progress import StudyProgress
+from .terminal import FILE, WORSE, Decorator, command, resumable, show, verbose, written_to
+
+#: Words for the modulus in the table of the terminal.
+WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
+
+
+def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add PROJECT and the options of every fit; the command receives them by name."""
+    decorators: list[Decorator] = [
+        given.PROJECT,
+        given.TESTS,
+        given.out_option(),
+        given.DATA,
+        click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
+        click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
+        click.option(
+            "--starts-from", type=click.Choice(["random", "sobol", "proposed"]),
+            help="Where starts begin: drawn, spread evenly, or by an earlier fit.",
+        ),
+        click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
+        given.JOBS,
+        given.SCHEDULER,
+        click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
+        given.solver_choice,
+        given.fail_above_option("Exit 1 when more than E is left of the objective."),
+        given.TRUST,
+        given.resume_option("Continue an interrupted fit."),
+        given.OVERWRITE,
+        given.AS_JSON,
+        given.QUIET,
+    ]  # fmt: skip
+    return given.with_checks(function, decorators)
+
+
+@command(
+    "fit",
+    "bubblefit fit project.toml",
+    "bubblefit fit project.toml --test bubble --test strips --out out/both",
+    "bubblefit fit project.toml --solver calculix --starts 1 --verbose",
+)
+@fit_options
+def fit_command(**options: Any) -> None:
+    """Fit the moduli of PROJECT.toml to all its tests together, or to those named.
+
+    Writes result.json, material.toml, moduli.csv, residuals.csv, history.csv, figures, report.html
+    and the files of each test into the output folder, and lists what each test determines.
+    """
+    run_fit(options)
+
+
+@command(
+    "bubble",
+    "bubblefit bubble project.toml",
+    "bubblefit bubble project.toml --starts 4 --jobs 2",
+    "bubblefit bubble project.toml --data measured --resume",
+)
+@fit_options
+def bubble_command(**options: Any) -> None:
+    """Fit the moduli of PROJECT.toml to its bubble inflation tests only.
+
+    Writes what `bubblefit fit` writes, with surfaces.csv, cuts, heights and bubble.pvd.
+    """
+    run_fit(options, "bubble")
+
+
+@command(
+    "uniaxial",
+    "bubblefit uniaxial project.toml --starts 2",
+    "bubblefit uniaxial project.toml --test warp-and-fill --fail-above 0.05",
+)
+@fit_options
+def uniaxial_command(**options: Any) -> None:
+    """Fit the moduli of PROJECT.toml to its strip tests only.
+
+    Writes what `bubblefit fit` writes, with the load curves and the deformed bias strip.
+    """
+    run_fit(options, "strips")
+
+
+def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
+    """Return the project with starts, optimiser and workers as the command line has them."""
+    names = ("seed", "method", "jobs", "starts_from")
+    chosen = {name: options[name] for name in names}
+    earlier: Path | None = options["earlier"]
+    chosen["earlier"] = None if earlier is None else str(earlier.absolute())
+    return project.with_fit(**chosen).with_scheduler(options["scheduler"])
+
+
+def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
+    """Read the project, fit the chosen tests (of a kind), write the folder and print the summary.
+
+    Raises
+    ------
+    InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    KeyboardInterrupt : after naming --resume.
+    """
+    path: Path = options["project"]
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    project = settings_given(project, options)
+    folder: Path = options["out"] or usual_folder(path)
+    quiet = options["quiet"] or options["as_json"]
+    starts = options["starts"] or project.fit.starts
+    with resumable(folder), StudyProgress(starts, quiet) as progress:
+        result = fit(
+            project,
+            _tests(options["tests"], kind, project.tests, path),
+            starts=options["starts"],
+            trust=options["trust"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress.saw,
+            command_line=command_line(),
+        )
+    with timed(f"card, tables and figures in {folder}"):
+        result.report(folder)
+    _end(result, folder, options["fail_above"], options["as_json"])
+
+
+def _tests(
+    names: Sequence[str], kind: str | None, tests: Any, path: Path
+) -> Sequence[str] | str | None:
+    """Return the tests that a command fits: those named, else those of its kind, else all."""
+    for name in names:
+        if kind is not None and name in tests and tests[name].kind != kind:
+            problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
+            raise InputError(path, "--test", problem)
+    return names or kind
+
+
+def _end(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
+    """Print the outcome; exit 1 when the best fit is worse than asked for."""
+    show(fit.result, lines_of(fit, folder, every=verbose()), as_json)
+    if fail_above is not None and fit.objective > fail_above:
+        said = f"{fit.objective:.4g} is left of the objective, above {fail_above:g}"
+        click.echo(f"bubblefit: --fail-above: {said}", err=True)
+        sys.exit(WORSE)
+
+
+def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
+    """Return the summary, moduli first, the page last; with `every`, all notes instead of one."""
+    return [
+        *modulus_lines(fit),
+        *misfit_lines(fit),
+        *test_lines(fit),
+        *sure_lines(fit),
+        *start_lines(fit),
+        *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
+        written_to(folder),
+    ]
+
+
+def modulus_lines(fit: Fit) -> list[str]:
+    """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
+    sure = fit.best.certainty
+    of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
+    lines = [
+        f"{fit.project.title}: tangent moduli at logarithmic strains, with what {of} leave open "
+        f"within the bounds; kN/m: times {fit.thickness:.4g} mm",
+        f"{'':18}{'strain':>8}{'MPa':>10}{'1 sigma':>10}"
+        f"{f'{percent(LEVEL)} band, MPa':>20}{'kN/m':>10}",
+    ]
+    before = ""
+    for one in answers(fit):
+        name = f"{one.modulus}, {WORDS[one.modulus]}" if one.modulus != before else ""
+        before = one.modulus
+        sigma = "not known" if one.sigma is None else sigma_words(one.sigma)
+        band = "not known" if one.band is None else "{:.4g} to {:.4g}".format(*one.band)
+        lines.append(
+            f"{name:18}{100 * one.strain:>6.3g} %{one.value:>10.4g}{sigma:>10}{band:>20}"
+            f"{one.per_width:>10.4g}{'  (the end)' if one.end else ''}"
+        )
+    return lines
+
+
+def misfit_lines(fit: Fit) -> list[str]:
+    """Return the RMS misfit of every comparison beside the noise of its data."""
+    lines = []
+    for name, m in fit.misfits.items():
+        times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
+        beside = times if m.noise > 0 else "no noise to compare with"
+        lines.append(f"misfit of {name}: {m.rms:.3g} {m.unit} RMS, {beside}")
+    return lines
+
+
+def test_lines(fit: Fit) -> list[str]:
+    """Return the findings of each test."""
+    several = len(fit.findings) > 1
+    return [
+        f"{name}: {line}" if several else line
+        for name, findings in fit.findings.items()
+        for line in findings.lines
+    ]
+
+
+def sure_lines(fit: Fit) -> list[str]:
+    """Return the unknowns beside the moduli, and one sigma of the moduli from each test."""
+    lines = [
+        f"{verdict.name}: {verdict.words}"
+        for verdict in fit.verdicts
+        if verdict.shared or verdict.prior is None
+    ]
+    for source, sigmas in fit.result.get("pinned", {}).items():
+        parts = ", ".join(
+            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
+            for name, s in sigmas.items()
+        )
+        lines.append(f"1 sigma from {source}: {parts}")
+    return lines
+
+
+def start_lines(fit: Fit) -> list[str]:
+    """Return the count of starts, the objective, the analyses and the time."""
+    result, best = fit.result, fit.best
+    runs, cached = result["external_runs"], result["cached_runs"]
+    kept = f", {cached} from the cache" if cached else ""
+    external = f" ({runs} of {result['solver']}{kept})" if runs or cached else ""
+    middle = float(np.median([r.objective for r in best.ranked if r.objective is not None]))
+    lines = [
+        f"{len(best.ranked)} of {len(best.records)} starts ended with a fit; "
+        f"{result['objective_is']}: best {fit.objective:.3g}, median {middle:.3g}; "
+        f"{result['analyses']} analyses{external}, {result['wall_s']:.0f} s"
+    ]
+    return [*lines, f"coarse to fine: {fit.stages}"] if fit.stages else lines
+
+
+def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
+    """Return the gravest note, and where the others are."""
+    first = foremost(notes)
+    if first is None:
+        return []
+    more = len(notes) - 1
+    where = f"{folder / NOTES} (or --verbose)"
+    further = [f"{more} further note{'s' * (more > 1)}: {where}"] if more else []
+    return [f"warning: {first.line}", *further]

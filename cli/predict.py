@@ -1,0 +1,349 @@
+"""`bubblefit bend` and `simulate`: forward analyses of tests with material cards."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from pydantic import ValidationError
+
+from ..errors import InputError, SolverFailure
+from ..experiments.kinds import Fabric, Place, Scales
+from ..experiments.registry import kind_named
+from ..materials.card import MaterialCard
+from ..project.cards import usual_folder
+from ..project.project import Project, chosen_cards, read_project
+from ..project.schema import FitSection, LawSection
+from ..readers.sections import first_error
+from ..runs.folder import KeptAnalyses
+from ..runs.predictions import Predictions, measured_tests, predict
+from ..runs.simulation import simulate_cards
+from ..solvers.registry import solver_settings
+from . import options as given
+from .options import command_line, data_folders, folder_beside, result_folder, with_solver
+from .progress import RunsProgress, SeriesProgress
+from .terminal import FILE, WORSE, Decorator, command, group, resumable, show, written_to
+
+CYLINDER = "cylinder"
+#: Stands for the project's file of `simulate bend`, in the current folder.
+HERE = Path("simulate bend")
+SHAPE = (
+    "length", "span", "support_diameter", "seam_width", "element_size", "symmetry", "deflection",
+    "frames",
+)  # fmt: skip
+
+
+def prediction_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of every series of predictions; the command receives them by name."""
+    decorators: list[Decorator] = [
+        given.out_option(),
+        click.option(
+            "--samples", type=click.IntRange(min=0), metavar="N",
+            help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
+        ),
+        given.JOBS,
+        given.SCHEDULER,
+        given.solver_choice,
+        given.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
+        given.resume_option("Keep the runs that the output folder holds."),
+        given.OVERWRITE,
+        given.AS_JSON,
+        given.QUIET,
+    ]  # fmt: skip
+    return given.with_checks(function, decorators)
+
+
+def run_predictions(
+    project: Project,
+    folder: Path,
+    options: Mapping[str, Any],
+    tests: Sequence[str] | None = None,
+    cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
+) -> None:
+    """Predict, write the folder and print the outcome.
+
+    Raises
+    ------
+    InputError, OutputError, SolverFailure : as `bubblefit.predict`; --fail-above without any
+        measurement.
+    KeyboardInterrupt : after naming --resume.
+    """
+    project = with_solver(project, options["solver_given"])
+    if options["fail_above"] is not None and not measured_tests(project, tests):
+        problem = "no test has measured loads to compare with; leave it out"
+        raise InputError(project.path, "--fail-above", problem)
+    quiet = options["quiet"] or options["as_json"]
+    with resumable(folder), RunsProgress(quiet) as progress:
+        predictions = predict(
+            project,
+            tests,
+            cards,
+            samples=options["samples"],
+            jobs=options["jobs"],
+            scheduler=options["scheduler"],
+            out=folder,
+            resume=options["resume"],
+            overwrite=options["overwrite"],
+            progress=progress.saw,
+            command_line=command_line(),
+        )
+    predictions.report(folder)
+    _end(predictions, folder, options["fail_above"], options["as_json"])
+
+
+def _end(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
+    """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
+    lines = [*predictions.lines(), written_to(folder)]
+    show(predictions.result, lines, as_json)
+    failed = predictions.failed()
+    if failed:
+        run = predictions.each[failed[0]]
+        words = f"{len(failed)} of {len(predictions.each)} runs failed ({run.title}: "
+        words += f"{run.record.failure}); --resume tries again"
+        click.echo(f"bubblefit: {words}", err=True)
+    if fail_above is not None:
+        _compare(predictions, fail_above)
+    if failed:
+        sys.exit(SolverFailure.exit_code)
+
+
+def _compare(predictions: Predictions, fail_above: float) -> None:
+    """Exit 1 when a run is further from its measurement than `fail_above`, or has no error."""
+    words, worst, silent = "", predictions.worst, predictions.silent()
+    if worst is not None and worst > fail_above:
+        words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
+    elif silent:
+        run = predictions.each[silent[0]]
+        words = f"{run.title} gave nothing to compare"
+    if words:
+        click.echo(f"bubblefit: {words} (--fail-above)", err=True)
+        sys.exit(WORSE)
+
+
+@command(
+    "bend",
+    "bubblefit bend fabric.toml",
+    "bubblefit bend fabric.toml --card out/fabric/material.toml --samples 0",
+    'bubblefit bend fabric.toml --test "150 mm, 140 kPa" --resume',
+)
+@given.PROJECT
+@given.DATA
+@click.option(
+    "--test", "--case", "tests", multiple=True, help="A cylinder by its name; several [all]."
+)
+@click.option(
+    "--card", "cards", multiple=True,
+    help="A card by its name, or a card's file; several [all, else the one just fitted].",
+)  # fmt: skip
+@prediction_options
+def bend_command(
+    project: Path,
+    data: tuple[str, ...],
+    tests: tuple[str, ...],
+    cards: tuple[str, ...],
+    **options: Any,
+) -> None:
+    """Inflate and bend every cylinder of PROJECT.toml with every material card.
+
+    Without a card in the project or by --card, the card that `bubblefit fit` wrote is taken.
+    Writes result.json, load_deflection.csv, runs.csv, figures, the bent beams for ParaView and
+    report.html into the output folder. A run that fails is named and left out, everything else is
+    written, the exit code is 4, and --resume tries it again.
+    """
+    settings = read_project(project, data_folders(data))
+    folder = options["out"]
+    if folder is None:
+        # Beside the folder of the project's fits, where it has any.
+        alone = all(test.kind == CYLINDER for test in settings.tests.values())
+        folder = usual_folder(project) if alone else folder_beside(project, "bend")
+    run_predictions(settings, folder, options, tests or [CYLINDER], cards)
+
+
+@group(
+    "simulate",
+    "bubblefit simulate bubble project.toml --card out/project/material.toml",
+    "bubblefit simulate bend --diameter 150 --pressure 140 --card material.toml",
+)
+def simulate_command() -> None:
+    """Run forward analyses with material cards, one or several side by side."""
+
+
+def card_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add PROJECT, cards and the options of every simulation."""
+    decorators: list[Decorator] = [
+        given.PROJECT,
+        click.option(
+            "--card", "cards", multiple=True, required=True,
+            help="A material card's file, or a card of the project; several side by side.",
+        ),
+        given.TESTS,
+        given.out_option("out/NAME-simulated"),
+        given.DATA,
+        given.solver_choice,
+        click.option(
+            "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
+        ),
+        given.resume_option(),
+        given.OVERWRITE,
+        given.AS_JSON,
+    ]  # fmt: skip
+    return given.with_checks(function, decorators)
+
+
+def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
+    """Read the project, run its tests (of a kind, or those named) with the cards, print."""
+    path: Path = options["project"]
+    data = data_folders(options["data"])
+    project = given.read_with_solver(path, options["solver_given"], data, need_data=False)
+    tests = project.chosen(options["tests"] or kind)
+    cards = chosen_cards(project, options["cards"])
+    resume = options["resume"]
+    folder = result_folder(path, "simulated", options["out"], options["overwrite"], resume)
+    kept = KeptAnalyses(folder, resume)
+    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
+        done = simulate_cards(
+            project, tests, cards, folder, options["within_range"], progress.saw, command, kept
+        )
+    show(done.numbers, [*done.lines, written_to(folder)], options["as_json"])
+
+
+@command(
+    "test",
+    "bubblefit simulate test project.toml --card out/project/material.toml",
+    "bubblefit simulate test project.toml --test bubble --card one.toml --card two.toml",
+)
+@card_options
+def simulate_test(**options: Any) -> None:
+    """Run the tests of PROJECT.toml with the materials of one or several cards.
+
+    Measurements are drawn beside them where they are there. A card whose analysis fails in a test
+    is named and left out there; when nothing ends well the exit code is 4.
+    """
+    run_simulation("simulate test", options)
+
+
+@command(
+    "bubble",
+    "bubblefit simulate bubble project.toml --card material.toml",
+    "bubblefit simulate bubble project.toml --card material.toml --within-range",
+)
+@card_options
+def simulate_bubble(**options: Any) -> None:
+    """Inflate the bubbles of PROJECT.toml with the materials of one or several cards."""
+    run_simulation("simulate bubble", options, "bubble")
+
+
+@command(
+    "uniaxial",
+    "bubblefit simulate uniaxial project.toml --card material.toml",
+    "bubblefit simulate uniaxial project.toml --card a.toml --card b.toml --out out/both",
+)
+@card_options
+def simulate_uniaxial(**options: Any) -> None:
+    """Pull the strips of PROJECT.toml with the materials of one or several cards.
+
+    Measured curves are drawn beside them where they are there. A card whose analysis fails on a
+    strip is named and left out there; when nothing ends well the exit code is 4.
+    """
+    run_simulation("simulate uniaxial", options, "strips")
+
+
+@command(
+    "bend",
+    "bubblefit simulate bend --diameter 150 --pressure 140 --card material.toml",
+    "bubblefit simulate bend --diameter 200 --pressure 70 --card material.toml --places 50,100",
+)
+@click.option("--diameter", type=float, required=True, metavar="MM", help="Before inflation.")
+@click.option("--pressure", type=float, required=True, metavar="KPA", help="Gauge pressure.")
+@click.option(
+    "--card", "cards", type=FILE, multiple=True, required=True,
+    help="A material card; several are drawn in one figure.",
+)  # fmt: skip
+@click.option("--length", type=float, metavar="MM", help="Before inflation [3000].")
+@click.option("--span", type=float, metavar="MM", help="Between the supports [2000].")
+@click.option("--support-diameter", type=float, metavar="MM", help="[100]")
+@click.option(
+    "--collar", type=(float, float), metavar="MM MM",
+    help="Inner diameter and length [240 145; above 200 mm of diameter 295 147].",
+)  # fmt: skip
+@click.option("--seam-width", type=float, metavar="MM", help="0 for none [40].")
+@click.option("--element-size", type=float, metavar="MM", help="[25]")
+@click.option(
+    "--symmetry", type=click.Choice(["quarter", "full"]), help="What is meshed [quarter]."
+)
+@click.option("--deflection", type=float, metavar="MM", help="Of the collar [240].")
+@click.option("--frames", type=int, metavar="N", help="Equal steps of it [60].")
+@click.option(
+    "--places", metavar="MM,MM,...", help="Where loads are listed [1/4, 1/2 and 1 diameter]."
+)
+@click.option(
+    "--measured", type=FILE, multiple=True,
+    help="Measured loads, columns deflection and load with their units; several.",
+)  # fmt: skip
+@prediction_options
+def simulate_bend(
+    diameter: float,
+    pressure: float,
+    cards: tuple[Path, ...],
+    measured: tuple[Path, ...],
+    **options: Any,
+) -> None:
+    """Inflate a cylinder and bend it with the materials of one or several cards.
+
+    Writes what `bubblefit bend` writes; a project file (`bubblefit init --example bend`) takes
+    several cylinders and sensors in volts.
+    """
+    collar, places = options.pop("collar"), options.pop("places")
+    shape = {name: options.pop(name) for name in SHAPE}
+    section: dict[str, Any] = {key: value for key, value in shape.items() if value is not None}
+    section |= {"diameter": diameter, "pressure": pressure}
+    section["name"] = f"{diameter:g} mm, {pressure:g} kPa"
+    if collar is not None:
+        section["collar"] = {"inner_diameter": collar[0], "length": collar[1]}
+    if places is not None:
+        section["places"] = given.numbers(places, "--places")
+    for path in measured:
+        if not path.is_file():
+            raise InputError(path, "--measured", "no such file")
+    if measured:
+        section["measured"] = {"files": [str(path) for path in measured]}
+    named = given.named_cards(cards)
+    project = _project(section, named)
+    folder = options["out"] or Path("out") / f"bend-{diameter:g}mm-{pressure:g}kPa"
+    run_predictions(project, folder, options, None, named)
+
+
+def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Project:
+    """Return a project of one cylinder; errors name the option instead of a key."""
+    kind = kind_named(CYLINDER)
+    fabric = Fabric("Inflated cylinder in bending", next(iter(cards.values())).thickness)
+    place = Place(HERE, "", fabric, Scales(pressure_unit="kPa"))
+    try:
+        test = kind.read(kind.section.model_validate(section), place, section["name"])
+    except ValidationError as errors:
+        error = first_error(HERE, errors, kind.section)
+    except InputError as found:
+        error = found
+    else:
+        return Project(
+            path=HERE,
+            fabric=fabric,
+            scales=place.scales,
+            tests={test.name: test},
+            law=LawSection(),
+            fit=FitSection(),
+            cards={},
+            solver_options=solver_settings(HERE, {}),
+        )
+    if error.path != HERE:
+        raise error
+    field = error.field.lstrip(".")
+    raise InputError(None, f"--{field.split('[')[0].replace('_', '-')}", error.problem)
+
+
+for one in (simulate_test, simulate_bubble, simulate_uniaxial, simulate_bend):
+    simulate_command.add_command(one)
+simulate_command.add_command(simulate_uniaxial, "strips")

@@ -1,0 +1,261 @@
+"""`bubblefit init`, `schema` and `docs`: a first project, its schema, and the documents."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.markdown import Markdown
+
+from ..errors import InputError, OutputError
+from ..project.new_project import writable_kinds, write_project
+from ..project.schema import schema_text
+from ..writing import write_text
+from .options import numbers
+from .terminal import FILE, command
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+#: Folders of pages; of two pages with one name the first is meant.
+FOLDERS = ("how-to", "reference", "", "validation", "reference/api")
+EXAMPLES = ROOT / "examples"
+#: By name: the folder of the example, and what to type next (in the folder that was written).
+KINDS = {
+    "known": ("bubble-known-solution", "bubblefit bubble {} --starts 4", "project.toml"),
+    "measured": ("bubble-valmex7318", "bubblefit bubble {} --data DIR", "test1-linear.toml"),
+    "uniaxial": ("uniaxial-valmex7318", "bubblefit uniaxial {}", "project.toml"),
+    "biaxial": ("biaxial-computed", "bubblefit biaxial {}", "project.toml"),
+    "bend": ("bend-valmex7318", "bubblefit bend {}", "project.toml"),
+    "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
+}
+PROJECT = "project.toml"
+SCHEMA = ROOT / "templates" / "project" / "project.schema.json"
+#: First line of an example, where it lies and where it is copied to: editors find the schema by it.
+FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
+COUNT = click.IntRange(0, 99)
+
+
+@command(
+    "init",
+    "bubblefit init mine",
+    "bubblefit init mine --example uniaxial",
+    "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
+)
+@click.argument("folder", type=FILE)
+@click.option(
+    "--example",
+    type=click.Choice(list(KINDS)),
+    help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
+    " test; bending; bubble and strips together. [known]",
+)
+@click.option(
+    "--own",
+    is_flag=True,
+    help="A project for your own tests, by the options below or, on a terminal, by questions.",
+)
+@click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
+@click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
+@click.option("--biaxial", type=COUNT, metavar="N", help="Biaxial tests of a cruciform.")
+@click.option("--cylinder", type=COUNT, metavar="N", help="Inflated cylinders to predict.")
+@click.option("--name", help="Of the fabric.")
+@click.option("--thickness", type=float, metavar="MM", help="Of the fabric [0.8].")
+@click.option("--form", metavar="NAME", help="Of the moduli: cubic, spline, ... [cubic].")
+@click.option("--radius", type=float, metavar="MM", help="Of the bubbles [100].")
+@click.option("--pressures", metavar="KPA,...", help="Of the bubbles [20,60,...,300].")
+@click.option("--diameter", type=float, metavar="MM", help="Of the cylinders [150].")
+@click.option("--pressure", type=float, metavar="KPA", help="In the cylinders [100].")
+def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> None:
+    """Write a commented project into FOLDER: an example, or (--own) one for your own tests.
+
+    Nothing there is written over.
+    """
+    said = {key: value for key, value in given.items() if value is not None}
+    if own and example is not None:
+        raise InputError(None, "--example, --own", "give one of them, not both")
+    if said and not own:
+        option = next(iter(said))
+        raise InputError(None, f"--{option}", "means nothing without --own")
+    if own:
+        _write_own(folder, said)
+    else:
+        _copy(folder, example or "known")
+
+
+def _write_own(folder: Path, said: dict[str, Any]) -> None:
+    path = folder / PROJECT
+    _free(path)
+    kinds = writable_kinds()
+    if not said and on_a_terminal():
+        said = _asked()
+    tests = {kind: said.pop(kind, 0) for kind in kinds}
+    if "pressures" in said:
+        said["pressures"] = numbers(said["pressures"], "--pressures")
+    write_project(path, tests, **said)
+    write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
+    click.echo(f"wrote {path}: read it, put the measured files where it says, then")
+    fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
+    then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
+    click.echo(f"next: bubblefit {then}")
+
+
+def on_a_terminal() -> bool:
+    """Return True where questions can be answered on a terminal."""
+    return sys.stdin.isatty()
+
+
+def _asked() -> dict[str, Any]:
+    """Return the options of --own from questions on the terminal."""
+    said: dict[str, Any] = {
+        "name": click.prompt("Name of the fabric", default="My fabric"),
+        "thickness": click.prompt("Thickness before the test, mm", type=float),
+        "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
+    }
+    if said["bubble"]:
+        said["radius"] = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
+        said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
+    said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
+    said["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
+    said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
+    if said["cylinder"]:
+        said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
+        said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
+    if said["bubble"] or said["strips"] or said["biaxial"]:
+        said["form"] = click.prompt("Form of the moduli", default="cubic")
+    return said
+
+
+def _free(path: Path) -> None:
+    if path.exists():
+        raise InputError(path, "", "is already there; name another folder")
+
+
+def _copy(folder: Path, example: str) -> None:
+    name, advice, project = KINDS[example]
+    files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
+    for file in (*files, SCHEMA):
+        _free(folder / file.name)
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in files:
+            written.append(folder / file.name)
+            written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
+        written.append(folder / SCHEMA.name)
+        written[-1].write_bytes(SCHEMA.read_bytes())
+    except OSError as error:
+        for path in written:  # half an example would be in the way of the next attempt
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+        raise OutputError(
+            f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
+        ) from None
+    click.echo(f"wrote {', '.join(f.name for f in files)} to {folder}")
+    click.echo(f"next: {advice.format(folder / project)}")
+
+
+@command("schema", "bubblefit schema", "bubblefit schema --out project.schema.json")
+@click.option("--out", type=FILE, help="File to write [print it].")
+def schema_command(out: Path | None) -> None:
+    """Print or write the JSON Schema of the project file, plug-ins' kinds of test included.
+
+    Editors complete and check a project whose first line names it: #:schema project.schema.json
+    """
+    if out is None:
+        click.echo(schema_text(), nl=False)
+        return
+    write_text(out, schema_text())
+    click.echo(f"written to {out}")
+
+
+# Documents
+
+
+def pages() -> dict[str, Path]:
+    """Return every page by its name below docs/ without .md ("how-to/marc"), or "changelog"."""
+    found = {}
+    for folder in FOLDERS:
+        for path in sorted((DOCS / folder).glob("*.md")):
+            found[path.relative_to(DOCS).with_suffix("").as_posix()] = path
+    for path in sorted(ROOT.glob("*.md")):
+        found[path.stem.lower()] = path
+    return found
+
+
+def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]]:
+    """Return the name of the page that is meant, and others of the same name.
+
+    Parameters
+    ----------
+    topic : "marc", "how-to/marc" or "docs/how-to/marc.md". known : as `pages` gives them.
+
+    Raises
+    ------
+    InputError : there is none.
+    """
+    wanted = topic.removeprefix("docs/").removesuffix(".md")
+    if wanted in known:
+        return wanted, []
+    named = [name for name in known if name.rpartition("/")[2] == wanted.lower()]
+    if named:
+        return named[0], named[1:]
+    names = [*known, *(name.rpartition("/")[2] for name in known)]
+    near = difflib.get_close_matches(wanted.lower(), names, n=1, cutoff=0.5)
+    meant = f"; did you mean {near[0]!r}?" if near else ""
+    raise InputError(None, topic, f"no such page{meant} (`bubblefit docs` lists every page)")
+
+
+def title_of(page: Path) -> str:
+    """Return the first heading of a page."""
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if line.startswith("# "):
+            return line.removeprefix("# ")
+    return page.stem
+
+
+@command(
+    "docs",
+    "bubblefit docs",
+    "bubblefit docs own-bubble-test",
+    "bubblefit docs how-to/marc",
+    "bubblefit docs project-file --path",
+)
+@click.argument("topic", required=False)
+@click.option("--path", is_flag=True, help="Print where the page is, instead of the page.")
+def docs_command(topic: str | None, path: bool) -> None:
+    """Read a page of the documents, or list them all.
+
+    TOPIC is the name of a page, with its folder where two have one name. On a terminal the page is
+    laid out and paged; elsewhere the Markdown is printed.
+    """
+    known = pages()
+    if topic is None:
+        click.echo("\n".join(_listed(known)))
+        return
+    name, others = find_document(topic, known)
+    if others:
+        click.echo(f"note: there is also {', '.join(others)}", err=True)
+    if path:
+        click.echo(str(known[name]))
+    elif sys.stdout.isatty():
+        _show(known[name])
+    else:
+        click.echo(known[name].read_text(encoding="utf-8"), nl=False)
+
+
+def _listed(known: Mapping[str, Path]) -> list[str]:
+    """Return one line a page: its name and title."""
+    wide = max(map(len, known)) + 2
+    return [f"{name:<{wide}}{title_of(path)}" for name, path in known.items()]
+
+
+def _show(page: Path) -> None:
+    """Show a page, laid out, in the terminal's pager."""
+    console = Console()
+    with console.pager(styles=True):
+        console.print(Markdown(page.read_text(encoding="utf-8")))

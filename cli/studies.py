@@ -1,0 +1,450 @@
+"""Study commands: profile, bootstrap, plan, compare, validate, and `study mesh`, `study nu12`.
+
+Each reads the project, calls one function of `studies` and ends with `_finish`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from ..errors import InputError
+from ..notes import Note
+from ..notes import lines as note_lines
+from ..project.project import Project, chosen_cards
+from ..reports.law_page import lines_of
+from ..runs import compare as laws
+from ..runs import validation, weights
+from ..runs.bootstrap import bootstrap
+from ..runs.folder import KeptAnalyses
+from ..runs.plan import plan
+from ..runs.poisson import NU12, vary_nu12
+from ..runs.profile import profile
+from ..runs.refinement import refine
+from . import options as given
+from .fits import fit_options, settings_given
+from .options import (
+    command_line,
+    data_folders,
+    folder_beside,
+    numbers,
+    read_to_refit,
+    read_with_solver,
+    result_folder,
+)
+from .progress import FitsProgress, NamedProgress, SeriesProgress
+from .terminal import Decorator, command, group, resumable, show, written_to
+
+What = Literal["elements", "increments"]
+
+
+def _finish(
+    study: Any, folder: Path, options: Mapping[str, Any], notes: Sequence[Note] = ()
+) -> None:
+    """Write the folder of a study and print its lines, or result.json with --json."""
+    study.write(folder)
+    lines = [*study.lines(), *note_lines(notes), written_to(folder)]
+    show(study.result, lines, options["as_json"])
+
+
+def _quiet(options: Mapping[str, Any]) -> bool:
+    return bool(options["quiet"] or options["as_json"])
+
+
+# Studies of one fit: derivatives at its optimum, or further fits from there
+
+
+def study_options(
+    name: str, *own: Decorator, refits: bool = True, resumes: bool = False
+) -> Decorator:
+    """Add PROJECT, a study's own options and those of every study, output in out/NAME-`name`.
+
+    refits : the study fits again, by --jobs and --scheduler. resumes : it has --resume.
+    """
+    decorators: list[Decorator] = [given.PROJECT, *own]
+    decorators += [given.TESTS, given.out_option(f"out/NAME-{name}"), given.DATA]
+    decorators += [given.solver_choice]
+    decorators += [given.JOBS, given.SCHEDULER] if refits else []
+    if resumes:
+        decorators.append(given.resume_option("Continue the study in the output folder."))
+    decorators += [given.OVERWRITE, given.AS_JSON, given.QUIET]
+    return lambda function: given.with_options(function, decorators)
+
+
+@command(
+    "profile",
+    "bubblefit profile fabric.toml",
+    "bubblefit profile fabric.toml --modulus G12=0.02,0.05 --modulus E1=0",
+    "bubblefit profile fabric.toml --modulus G12 --strain 0.05 --card other/material.toml",
+)
+@study_options(
+    "profile",
+    click.option(
+        "--modulus", "moduli", multiple=True, metavar="NAME[=STRAINS]",
+        help="E1, E2 or G12, and at which strains; several [all, at half the strain reached].",
+    ),
+    click.option(
+        "--strain", metavar="STRAINS", help="Of every --modulus that has none of its own."
+    ),
+    given.CARD_OF_FIT,
+)  # fmt: skip
+def profile_command(
+    moduli: tuple[str, ...], strain: str | None, card: str | None, **options: Any
+) -> None:
+    """Compute profile-likelihood intervals (95 %) of moduli.
+
+    Holds a modulus of the fit of PROJECT.toml away from its optimum, fits everything else again,
+    and continues until the data contradict or a bound is reached. Writes profile.csv, profile.png,
+    report.html and result.json.
+    """
+    path: Path = options["project"]
+    project = read_to_refit(path, options)
+    asked = _strains_by_modulus(moduli, strain)
+    folder = result_folder(path, "profile", options["out"], options["overwrite"])
+    with NamedProgress("sides", _quiet(options)) as progress:
+        found = profile(project, asked, card, options["tests"] or None, progress=progress.saw)
+    _finish(found, folder, options)
+
+
+def _strains_by_modulus(moduli: Sequence[str], strain: str | None) -> dict[str, list[float]] | None:
+    """Return strains by modulus; a modulus that is named twice has those of both."""
+    common = [] if strain is None else numbers(strain, "--strain")
+    if common and not moduli:
+        raise InputError(None, "--strain", "goes with --modulus NAME")
+    asked: dict[str, list[float]] = {}
+    for text in moduli:
+        name, equals, strains = text.partition("=")
+        own = numbers(strains, "--modulus") if equals else common
+        asked.setdefault(name, []).extend(own)
+    return asked or None
+
+
+@command(
+    "bootstrap",
+    "bubblefit bootstrap fabric.toml --over frames",
+    "bubblefit bootstrap fabric.toml --over specimens --samples 400 --jobs 4",
+    "bubblefit bootstrap fabric.toml --over tests --resume",
+)
+@study_options(
+    "bootstrap",
+    click.option(
+        "--over", required=True, metavar="SORT",
+        help="What is drawn: frames, specimens, tests, directions or ratios.",
+    ),
+    click.option(
+        "--samples", type=click.IntRange(min=2), default=100, show_default=True,
+        help="Number of draws.",
+    ),
+    click.option("--seed", type=click.IntRange(min=0), help="Of the draws [the project's]."),
+    given.CARD_OF_FIT,
+    resumes=True,
+)  # fmt: skip
+def bootstrap_command(
+    over: str, samples: int, seed: int | None, card: str | None, **options: Any
+) -> None:
+    """Compute percentile bands of the moduli by a bootstrap of the data.
+
+    Draws frames, specimens or tests of PROJECT.toml with replacement and fits each draw from the
+    optimum of the fit. Writes percentile bands of the moduli beside those of the fit:
+    bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
+    """
+    path: Path = options["project"]
+    project = read_to_refit(path, options)
+    folder: Path = options["out"] or folder_beside(path, "bootstrap")
+    with resumable(folder), NamedProgress("samples", _quiet(options)) as progress:
+        done = bootstrap(
+            project, over, samples, card, options["tests"] or None, seed=seed, out=folder,
+            resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
+        )  # fmt: skip
+    _finish(done, folder, options)
+
+
+@command(
+    "plan",
+    "bubblefit plan fabric.toml",
+    "bubblefit plan fabric.toml --card out/fabric/material.toml --rank G12",
+    "bubblefit plan fabric.toml --specimens 5 --noise strips=20 --strain 0.1,0.1,0.05",
+)
+@study_options(
+    "plan",
+    click.option(
+        "--card", help="The present optimum: a card's file or name [that of the project's fit]."
+    ),
+    click.option(
+        "--strain", metavar="WARP,FILL,SHEAR",
+        help="Strains up to which moduli are wanted [the card's valid range].",
+    ),
+    click.option(
+        "--rank", metavar="NAME", default="worst", show_default=True,
+        help="By E1, E2, G12, or the least certain of them.",
+    ),
+    click.option(
+        "--specimens", type=click.IntRange(min=1),
+        help="Of every candidate [1 bubble, 3 strips].",
+    ),
+    click.option(
+        "--noise", "noises", multiple=True, metavar="KIND=VALUE",
+        help="Of measured values, mm or N [that of the project's own test]; several.",
+    ),
+    refits=False,
+)  # fmt: skip
+def plan_command(
+    card: str | None, strain: str | None, rank: str, noises: tuple[str, ...], **options: Any
+) -> None:
+    """Rank tests that could be made next by the predicted uncertainty of the moduli.
+
+    Predicts one standard deviation of E1, E2 and G12 for each candidate beside the tests of
+    PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
+    """
+    path: Path = options["project"]
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    folder = result_folder(path, "plan", options["out"], options["overwrite"])
+    with NamedProgress("tests", _quiet(options)) as progress:
+        made = plan(
+            project, card, options["tests"] or None,
+            strain=None if strain is None else numbers(strain, "--strain"),
+            rank=rank, specimens=options["specimens"], noise=dict(map(_noise, noises)),
+            progress=progress.saw,
+        )  # fmt: skip
+    _finish(made, folder, options)
+
+
+def _noise(given: str) -> tuple[str, float]:
+    kind, _, value = given.partition("=")
+    try:
+        return kind, float(value)
+    except ValueError:
+        problem = f"expected KIND=VALUE, such as strips=20, got {given!r}"
+        raise InputError(None, "--noise", problem) from None
+
+
+# Studies that fit from random starts
+
+
+@command(
+    "compare",
+    "bubblefit compare project.toml",
+    "bubblefit compare project.toml --form cubic --form spline:6 --folds 4",
+)
+@click.option(
+    "--form", "forms", multiple=True, metavar="NAME",
+    help="Form of the moduli, spline:8 with its number of knots; several [all].",
+)  # fmt: skip
+@click.option(
+    "--folds", type=click.IntRange(min=2), default=5, show_default=True, help="Of the validation."
+)
+@click.option(
+    "--fold-starts", type=click.IntRange(min=1), default=2, show_default=True, help="Of each fold."
+)
+@fit_options
+def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any) -> None:
+    """Fit every form of the moduli to the tests of PROJECT.toml and cross-validate it.
+
+    Each form from a few starts [5]; the error at specimens that were left out of the fit shows
+    whether more coefficients pay. Writes comparison.csv, figures, report.html and result.json, and
+    a folder for each form, into the output folder.
+    """
+    path: Path = options["project"]
+    folder: Path = options["out"] or folder_beside(path, "compared")
+    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    starts = options["starts"] or laws.STARTS
+    with FitsProgress(starts, _quiet(options), "{} moduli") as progress:
+        comparison = laws.compare_laws(
+            settings_given(project, options), options["tests"] or None, forms, folds=folds,
+            starts=starts, fold_starts=fold_starts, out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+        )  # fmt: skip
+    comparison.report(folder)
+    lines = [*lines_of(comparison.result), *note_lines(comparison.notes), written_to(folder)]
+    show(comparison.result, lines, options["as_json"])
+
+
+@command(
+    "validate",
+    "bubblefit validate project.toml --form cubic --form spline:6",
+    "bubblefit validate project.toml --leave frames",
+    "bubblefit validate project.toml --weights strips",
+    "bubblefit validate project.toml --card out/project/material.toml",
+)
+@click.option(
+    "--form",
+    "forms",
+    multiple=True,
+    metavar="NAME",
+    help="Of the moduli; several.  [the project's]",
+)
+@click.option(
+    "--card", "cards", multiple=True, metavar="CARD", help="Judge it instead of a fit; several."
+)
+@click.option(
+    "--leave", metavar="SORT",
+    help="Left out in turn: tests, frames, specimens, directions or ratios.  [tests]",
+)  # fmt: skip
+@click.option(
+    "--weights", "counted", metavar="KIND",
+    help="Instead: moduli and errors over the weight of a kind of test (strips), or of one test.",
+)  # fmt: skip
+@fit_options
+def validate_command(
+    forms: tuple[str, ...],
+    cards: tuple[str, ...],
+    leave: str | None,
+    counted: str | None,
+    **options: Any,
+) -> None:
+    """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
+
+    With --leave single frames of bubbles, specimens or directions of strips, or ratios of biaxial
+    tests instead; with --card cards at the tests, without a fit. Writes validation.csv and
+    result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
+    over the weight of a kind of test: weights.csv, weights.png, result.json.
+    """
+    path: Path = options["project"]
+    _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
+    if counted is not None:
+        _one_of(path, {"--form": forms, "--weights": counted})
+    name = "validated" if counted is None else "weights"
+    folder: Path = options["out"] or folder_beside(path, name)
+    project, tests = _project(options), options["tests"] or None
+    if cards:
+        folder = result_folder(path, name, options["out"], options["overwrite"])
+        judged = validation.judge_cards(project, chosen_cards(project, cards), tests)
+        _finish(judged, folder, options, judged.notes)
+        return
+    starts = options["starts"] or (validation if counted is None else weights).STARTS
+    study: Any
+    with resumable(folder), FitsProgress(starts, _quiet(options)) as progress:
+        common: dict[str, Any] = {
+            "starts": starts, "out": folder, "resume": options["resume"],
+            "overwrite": options["overwrite"], "progress": progress.saw,
+            "command_line": command_line(),
+        }  # fmt: skip
+        if counted is not None:
+            study = weights.weight_study(project, counted, tests, **common)
+        else:
+            leave = leave or validation.TESTS
+            study = validation.validate(project, tests, forms, leave=leave, **common)
+    _finish(study, folder, options, study.notes)
+
+
+def _project(options: Mapping[str, Any]) -> Project:
+    data = data_folders(options["data"])
+    project = read_with_solver(options["project"], options["solver_given"], data)
+    trusted = [*project.fit.trust, *options["trust"]]
+    return settings_given(project, options).with_fit(trust=trusted)
+
+
+def _one_of(path: Path, given: Mapping[str, object]) -> None:
+    """Check that at most one of the options is given."""
+    several = [name for name, value in given.items() if value]
+    if len(several) > 1:
+        raise InputError(path, ", ".join(several), "give one of them")
+
+
+# Studies of an analysis with a card
+
+
+@group(
+    "study",
+    "bubblefit study mesh project.toml --card out/project/material.toml",
+    "bubblefit study nu12 project.toml --card out/project/material.toml",
+)
+def study_command() -> None:
+    """Vary the mesh, the increments or nu12 in the analyses of a project."""
+
+
+def card_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add PROJECT, --card and the options of every study of a card."""
+    decorators: list[Decorator] = [
+        given.PROJECT,
+        click.option(
+            "--card", required=True,
+            help="The material card's file, or the name of a card of the project.",
+        ),
+        click.option(
+            "--test", "--case", "tests", multiple=True,
+            help="A test by its name, or a kind of tests; several [all].",
+        ),
+        given.out_option("out/NAME-STUDY"),
+        given.DATA,
+        given.solver_choice,
+        given.resume_option(),
+        given.OVERWRITE,
+        given.AS_JSON,
+    ]  # fmt: skip
+    return given.with_checks(function, decorators)
+
+
+def run_study(name: str, study: Callable[..., Any], options: dict[str, Any]) -> None:
+    """Read the project, run the study of a card, write its folder and print its lines."""
+    path: Path = options["project"]
+    data, resume = data_folders(options["data"]), options["resume"]
+    project = read_with_solver(path, options["solver_given"], data, need_data=False)
+    folder = result_folder(path, name, options["out"], options["overwrite"], resume)
+    kept = KeptAnalyses(folder, resume)
+    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
+        done = study(
+            project, options["card"], tests=options["tests"], progress=progress.saw, kept=kept
+        )
+    _finish(done, folder, options)
+
+
+@command(
+    "mesh",
+    "bubblefit study mesh project.toml --card out/project/material.toml",
+    "bubblefit study mesh project.toml --card material.toml --what increments --levels 3",
+)
+@card_options
+@click.option(
+    "--what", type=click.Choice(["elements", "increments"]), default="elements", show_default=True,
+    help="What is refined.",
+)  # fmt: skip
+@click.option(
+    "--levels", type=click.IntRange(2, 8), default=4, show_default=True,
+    help="Number of levels.",
+)  # fmt: skip
+@click.option(
+    "--factor", type=click.IntRange(2, 10), default=2, show_default=True,
+    help="Between levels: edges, or increments, are divided by it.",
+)  # fmt: skip
+@click.option(
+    "--coarser", type=click.IntRange(min=0),
+    help="Levels coarser than the project's own [1 of elements, 0 of increments].",
+)  # fmt: skip
+def study_mesh(what: What, levels: int, factor: int, coarser: int | None, **options: Any) -> None:
+    """Run PROJECT.toml with a card on finer and finer meshes (or increments).
+
+    Reports the quantities of interest and the cost of each level, the observed order of
+    convergence and Richardson's limit. A level whose analysis fails is named and left out; when
+    fewer than two end well the exit code is 4.
+    """
+    study = functools.partial(refine, what=what, levels=levels, factor=factor, coarser=coarser)
+    run_study(what if what == "increments" else "mesh", study, options)
+
+
+@command(
+    "nu12",
+    "bubblefit study nu12 project.toml --card material.toml",
+    "bubblefit study nu12 project.toml --card material.toml --nu12 0.1 --nu12 0.4",
+)
+@card_options
+@click.option(
+    "--nu12", "values", type=float, multiple=True,
+    help="A value to run; may be given more than once [0.05 0.15 0.25 0.35 0.45].",
+)  # fmt: skip
+def study_nu12(values: tuple[float, ...], **options: Any) -> None:
+    """Run PROJECT.toml with a card whose Poisson's ratio is varied at unchanged moduli.
+
+    Reports every response relative to that at the card's own nu12 and relative to the mean of the
+    values. A value whose analysis fails is named and left out; when the card's own fails, or all
+    others do, the exit code is 4.
+    """
+    run_study("nu12", functools.partial(vary_nu12, values=values or NU12), options)
+
+
+for one in (study_mesh, study_nu12):
+    study_command.add_command(one)

@@ -1,0 +1,363 @@
+"""The terminal's side of every command: usage errors, exit codes, events, logs and the outcome.
+
+A command is declared with `command` (or `group`) and its body is called within `exits`; it ends
+with `show`. `--events` and `--verbose` belong to every command and are added by `main`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import json
+import logging
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import click
+
+from ..errors import BubblefitError, OutputError
+from ..files import __version__
+from ..writing import telling
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+FILE = click.Path(path_type=Path)
+PAGE = "report.html"
+#: Where click keeps the words that were typed, while a command runs.
+COMMAND_LINE = "bubblefit.command_line"
+
+# Commands and their examples
+
+HEAD = "Examples:"
+
+
+def command(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Command]:
+    """Declare the command `name` with example lines below its help; see `exits` for its errors."""
+
+    def declare(function: Callable[..., Any]) -> click.Command:
+        return click.command(name, epilog=examples(*lines))(exits(function))
+
+    return declare
+
+
+def group(name: str, *lines: str) -> Callable[[Callable[..., Any]], click.Group]:
+    """Declare a group of commands with example lines below its help."""
+    return click.group(name, cls=Suggesting, epilog=examples(*lines))
+
+
+def examples(*lines: str) -> str:
+    """Return the epilog of a command: one example a line, not wrapped by click."""
+    typed = "".join(f"  {line}\n" for line in lines)
+    return f"\b\n{HEAD}\n{typed}"
+
+
+def examples_in(epilog: str | None) -> list[str]:
+    """Return the lines of an epilog that `examples` wrote."""
+    _, head, typed = (epilog or "").partition(f"{HEAD}\n")
+    return [line.strip() for line in typed.splitlines() if line.strip()] if head else []
+
+
+# How a command ends
+
+INTERRUPTED = 130
+WORSE = 1  # exit code of --fail-above
+
+
+def exits(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Turn our errors into one line on stderr and their exit code, Ctrl-C into exit code 130."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        code, said = 1, None
+        try:
+            done = command(*args, **kwargs)
+            code = 0
+            return done
+        except BubblefitError as error:
+            code, said = error.exit_code, str(error)
+            click.echo(f"bubblefit: {error}", err=True)
+            sys.exit(error.exit_code)
+        except KeyboardInterrupt:
+            code, said = INTERRUPTED, "interrupted"
+            click.echo("bubblefit: interrupted", err=True)
+            sys.exit(INTERRUPTED)
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+            raise
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            EVENTS.end(code, said)
+
+    return wrapped
+
+
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Name --resume on an interruption of work that is kept in `folder`, and let it pass."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
+        raise
+
+
+def written_to(folder: Path) -> str:
+    """Return the line that names the page to open where there is one, else the folder."""
+    page = folder / PAGE
+    if page.exists():
+        return f"page: {page} (tables and figures beside it)"
+    return f"written to {folder}"
+
+
+def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
+    """Print the lines, or with --json the content of result.json."""
+    click.echo(json.dumps(result, indent=1) if as_json else "\n".join(lines))
+
+
+# Usage errors
+
+#: Shows the whole help instead of a line, in the versions of click that have it.
+HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
+#: "Option '--starts' requires an argument.": click names the option in the words only.
+NAMED = re.compile(r"^Option '(--?[\w-]+)' (.*?)\.?$", re.DOTALL)
+
+
+class UsageLine(click.ClickException):
+    """Show an error of click's in our form: where, what, what to do."""
+
+    exit_code = 2
+
+    def show(self, file: Any = None) -> None:
+        """Print one line on stderr."""
+        click.echo(f"bubblefit: {self.message}", err=True)
+
+
+@contextmanager
+def in_one_line() -> Iterator[None]:
+    """Turn usage errors of click within the block into one line.
+
+    Raises
+    ------
+    UsageLine : instead of click.UsageError.
+    """
+    try:
+        yield
+    except click.UsageError as error:
+        if isinstance(error, HELP):
+            raise
+        raise UsageLine(line_of(error)) from None
+
+
+def line_of(error: click.UsageError) -> str:
+    """Return which option or argument is wrong, in what, and which help to read."""
+    command = "" if error.ctx is None else error.ctx.command_path
+    where, problem = _parts(error, command or "bubblefit")
+    look = f" ({command} --help tells what it takes)" if command else ""
+    return f"{where and f'{where}: '}{' '.join(problem.rstrip('.').split())}{look}"
+
+
+def _parts(error: click.UsageError, command: str) -> tuple[str, str]:
+    if isinstance(error, click.NoSuchOption):
+        meant = did_you_mean(error.option_name, error.possibilities or ())
+        return error.option_name, f"no such option of {command}{meant}"
+    if isinstance(error, click.MissingParameter):
+        return _name(error.param), "is missing"
+    if isinstance(error, click.BadParameter):
+        return _name(error.param), error.message
+    if (named := NAMED.match(error.message)) is not None:
+        return named[1], named[2]
+    return "", error.message[:1].lower() + error.message[1:]
+
+
+def _name(param: click.Parameter | None) -> str:
+    """Return the long name of an option, or an argument in capitals, as the help has it."""
+    if param is None:
+        return ""
+    if isinstance(param, click.Option):
+        return max((*param.opts, *param.secondary_opts), key=len)
+    return (param.metavar or param.name or "").upper()
+
+
+def did_you_mean(typed: str, known: Sequence[str]) -> str:
+    """Return a question with the nearest known name; "" where none is near."""
+    near = difflib.get_close_matches(typed, known, n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+class Suggesting(click.Group):
+    """Suggest the nearest command where a name is unknown."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return what click returns.
+
+        Raises
+        ------
+        UsageLine : there is no such command; names the nearest one.
+        """
+        name = args[0]
+        known = self.list_commands(ctx)
+        if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
+            words = f"no such command{did_you_mean(name, known)}"
+            raise UsageLine(f"{name}: {words} ({ctx.command_path} --help lists every command)")
+        return super().resolve_command(ctx, args)
+
+
+def every_command(group: click.Group) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    """Yield every command below a group, groups included, with the words that are typed."""
+    ctx = click.Context(group)
+    for name in group.list_commands(ctx):
+        command = group.get_command(ctx, name)
+        assert command is not None
+        yield (name,), command
+        if isinstance(command, click.Group):
+            for path, below in every_command(command):
+                yield (name, *path), below
+
+
+# --events: one JSON object a line, as it happens
+#
+#   {"event": "begin", "seconds": 0.0, "command": "bubblefit fit", "version": "0.2.0"}
+#   {"event": "progress", "seconds": 3.1, "what": "starts", "done": 2, "total": 8, "note": "..."}
+#   {"event": "end", "seconds": 9.8, "exit_code": 0, "error": null}
+#
+# The last line is always an end, unless the process was killed. The file may be a pipe.
+
+#: Seconds between two lines of progress that report the same count.
+EVERY_S = 1.0
+
+
+class Events:
+    """Write events to a file; do nothing unless one is open."""
+
+    def __init__(self) -> None:
+        self._file: IO[str] | None = None
+        self._begun = self._written = 0.0
+        self._last: Any = None
+
+    def begin(self, path: Path, command: str) -> None:
+        """Open the file and write the first event; a file outside /dev is replaced.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        with telling(path):
+            # A device or a redirected stdout is appended to.
+            mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
+            self._file = open(path, mode, encoding="utf-8")
+        self._begun, self._last = time.monotonic(), None
+        self.write("begin", command=command, version=__version__)
+
+    def write(self, event: str, **facts: Any) -> None:
+        """Write one line; stop for good where the reader has gone."""
+        if self._file is None:
+            return
+        seconds = round(time.monotonic() - self._begun, 3)
+        try:
+            self._file.write(json.dumps({"event": event, "seconds": seconds, **facts}) + "\n")
+            self._file.flush()
+        except OSError:
+            self._file = None
+
+    def progress(self, what: str, done: float, total: float | None, note: str) -> None:
+        """Write one line where the count has changed or a second has passed."""
+        now = time.monotonic()
+        if self._last == (what, done, total) and now - self._written < EVERY_S:
+            return
+        self._written, self._last = now, (what, done, total)
+        self.write("progress", what=what, done=done, total=total, note=note)
+
+    def end(self, exit_code: int, error: str | None = None) -> None:
+        """Write the last line and close the file."""
+        self.write("end", exit_code=exit_code, error=error)
+        if self._file is not None:
+            self._file.close()
+        self._file = None
+
+
+EVENTS = Events()
+
+
+def _begin(ctx: click.Context, _: click.Parameter, path: Path | None) -> None:
+    if path is None or ctx.resilient_parsing:
+        return
+    try:
+        EVENTS.begin(path, ctx.command_path)
+    except OutputError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+# Log records on stderr
+
+LOGGER = logging.getLogger("bubblefit")
+WARNING = logging.Formatter("warning: %(message)s")
+TIMED = logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S")
+#: Help of --verbose.
+VERBOSE = "Report each analysis, solver files and times, on stderr."
+
+
+class Stderr(logging.Handler):
+    """Write to the stderr of the moment, so that a live line of progress stays below."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one line a record."""
+        own = WARNING if record.levelno >= logging.WARNING else TIMED
+        print(own.format(record), file=sys.stderr, flush=True)
+
+
+def listen(verbose: bool = False) -> None:
+    """Print warnings of the library; with `verbose`, also on a second call, everything it logs."""
+    if not any(isinstance(handler, Stderr) for handler in LOGGER.handlers):
+        LOGGER.addHandler(Stderr())
+    LOGGER.setLevel(logging.INFO if verbose else logging.WARNING)
+
+
+def verbose() -> bool:
+    """Return True where everything that is logged is printed."""
+    return LOGGER.isEnabledFor(logging.INFO)
+
+
+def _louder(ctx: click.Context, _: click.Parameter, verbose: bool) -> None:
+    if verbose and not ctx.resilient_parsing:
+        listen(True)
+
+
+def with_common_options(command: click.Command) -> click.Command:
+    """Add --verbose and --events to a command, or to each command of a group.
+
+    Both are eager callbacks; the command's function does not receive them.
+    """
+    if isinstance(command, click.Group):
+        for below in command.commands.values():
+            with_common_options(below)
+    elif not any(param.name == "events" for param in command.params):
+        command.params += [
+            click.Option(["--verbose"], is_flag=True, expose_value=False, callback=_louder,
+                         help=VERBOSE),
+            click.Option(["--events", "events"], type=FILE, metavar="FILE", expose_value=False,
+                         callback=_begin, help="Write progress to FILE, one JSON object a line."),
+        ]  # fmt: skip
+    return command
+
+
+def place_matplotlib() -> None:
+    """Let matplotlib keep its list of fonts in BUBBLEFIT_CACHE where the home cannot be written.
+
+    Otherwise every process warns on stderr that it keeps none.
+    """
+    cache = os.environ.get("BUBBLEFIT_CACHE")
+    if not cache or "MPLCONFIGDIR" in os.environ or os.access(os.path.expanduser("~"), os.W_OK):
+        return
+    folder = Path(cache).absolute() / "matplotlib"
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        os.environ["MPLCONFIGDIR"] = str(folder)

@@ -1,0 +1,278 @@
+"""`bubblefit cache`, `doctor`, `report` and `verify`: the upkeep of runs, solvers and pages."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import InputError
+from ..reports.beside import beside
+from ..reports.html import PAGE, write_page
+from ..reports.pdf import print_page
+from ..reports.unfinished import page_of_folder
+from ..runs.verification import SUBJECTS, numbers
+from ..runs.verification.number import Number
+from ..solvers.bars import diagnose
+from ..solvers.base import Diagnosis
+from ..solvers.registry import command_line, solver_names
+from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
+from .options import AS_JSON
+from .terminal import FILE, WORSE, command, show
+
+BYTES = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
+
+
+@command(
+    "cache", "bubblefit cache", "bubblefit cache --older 8w --prune 2GB", "bubblefit cache --clear"
+)
+@click.option("--folder", type=FILE, help="Of the runs, where a project names one of its own.")
+@click.option("--clear", is_flag=True, help="Drop all runs.")
+@click.option(
+    "--prune", "size", metavar="SIZE", help="Drop what was used longest ago until SIZE is left."
+)
+@click.option("--older", metavar="AGE", help="Drop what was not used for so long: 12h, 30d, 8w.")
+@click.option("--limit", metavar="SIZE", help="From now on drop runs beyond SIZE: 500MB, 5GB.")
+@AS_JSON
+def cache_command(
+    folder: Path | None,
+    clear: bool,
+    size: str | None,
+    older: str | None,
+    limit: str | None,
+    as_json: bool,
+) -> None:
+    """Show or prune the cache of runs of CalculiX, Marc and solvers of plug-ins.
+
+    A run that ended well is not repeated, in any project, where law, model, solver, settings,
+    program and templates have the same content. The folder is bubblefit's own cache folder, [fit]
+    cache of a project, or BUBBLEFIT_RUNS, which also turns the cache off: BUBBLEFIT_RUNS=off.
+    """
+    cache = run_cache() if folder is None else RunCache(folder)
+    if cache is None:
+        raise InputError(None, VARIABLE, f"is {OFF!r}: no runs are kept, name a folder instead")
+    gone = []
+    if limit is not None:
+        before = cache.entries()
+        cache.set_limit(_bytes("--limit", limit))
+        left = {entry.path for entry in cache.entries()}
+        gone += [entry for entry in before if entry.path not in left]
+    if clear or size is not None or older is not None:
+        least = 0 if clear else None if size is None else _bytes("--prune", size)
+        gone += cache.prune(least, None if older is None else _seconds(older))
+    entries = cache.entries()
+    state: dict[str, Any] = {
+        "folder": str(cache.folder),
+        "runs": len(entries),
+        "bytes": sum(entry.size for entry in entries),
+        "limit": cache.limit,
+        "dropped": len(gone),
+        "dropped_bytes": sum(entry.size for entry in gone),
+        "used_first": entries[0].used if entries else None,
+        "used_last": entries[-1].used if entries else None,
+    }
+    show(state, _cache_lines(state), as_json)
+
+
+def _cache_lines(state: dict[str, Any]) -> list[str]:
+    runs, size, limit = state["runs"], _words(state["bytes"]), _words(state["limit"])
+    lines = [f"{state['folder']}: {runs} runs, {size} of at most {limit}"]
+    if runs:
+        first, last = (_ago(state[name]) for name in ("used_first", "used_last"))
+        lines.append(f"last used between {first} and {last} ago")
+    if state["dropped"]:
+        lines.append(f"dropped: {state['dropped']} runs, {_words(state['dropped_bytes'])}")
+    return lines
+
+
+def _words(size: int) -> str:
+    unit = next((u for u in ("GB", "MB", "kB") if size >= BYTES[u.upper()]), "B")
+    return f"{size / BYTES[unit.upper()]:.3g} {unit}"
+
+
+def _ago(used: float) -> str:
+    seconds = max(0.0, time.time() - used)
+    for unit, words in (("w", "weeks"), ("d", "days"), ("h", "hours")):
+        if seconds >= 2 * SECONDS[unit]:
+            return f"{seconds / SECONDS[unit]:.0f} {words}"
+    return f"{seconds / 60:.0f} minutes"
+
+
+def _bytes(option: str, text: str) -> int:
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([kKMGT]?B?)", text.strip())
+    unit = "" if found is None else found[2].upper()
+    if found is None or (unit and unit != "B" and not unit.endswith("B")):
+        raise InputError(None, option, f"expected a size such as 500MB or 2GB, got {text!r}")
+    return int(float(found[1]) * BYTES[unit])
+
+
+def _seconds(text: str) -> float:
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([hdw])", text.strip())
+    if found is None:
+        raise InputError(None, "--older", f"expected an age such as 12h, 30d or 8w, got {text!r}")
+    return float(found[1]) * SECONDS[found[2]]
+
+
+# Solvers
+
+UNUSABLE = 4  # exit code
+
+
+def _programs(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add an option for each solver that has a program, to test that program."""
+    for one in reversed(command_line()):
+        if one.look:
+            command = click.option(f"--{one.name}", metavar=one.metavar, help=one.look)(command)
+    return command
+
+
+@command("doctor", "bubblefit doctor", "bubblefit doctor --ccx /opt/ccx/bin/ccx --json")
+@_programs
+@click.option("--solver", metavar="NAME", help="A solver, such as a plug-in, that has to work.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings on stdout as JSON.")
+def doctor_command(solver: str | None, as_json: bool, **programs: str | None) -> None:
+    """List every solver found and prove each with bars whose end stresses are published.
+
+    Exit code 0 when the embedded solver works and so does every other one that was named (--ccx,
+    BUBBLEFIT_CCX, --marc, BUBBLEFIT_MARC, --solver) or built (make calculix); 4 otherwise. A ccx
+    or Marc that merely lies on the PATH, or a plug-in that is installed, is reported, but does not
+    count.
+    """
+    if solver is not None and solver not in (names := solver_names()):
+        raise InputError(None, "--solver", f"{solver!r} is not one of: {', '.join(names)}")
+    found = diagnose(**programs)
+    good = all(one.usable for one in found if one.expected)
+    if solver is not None:
+        good = good and any(one.usable for one in found if one.name == solver)
+    if as_json:
+        solvers = [{**asdict(one), "path": _text(one.path)} for one in found]
+        click.echo(json.dumps({"ok": good, "solvers": solvers}, indent=1))
+    else:
+        for one in found:
+            click.echo(_solver_line(one))
+            if one.advice:
+                click.echo(f"{'':10}  {one.advice}")
+        if not any(one.name == "calculix" and one.usable for one in found):
+            click.echo("Fits work without CalculiX; it is the reference to check them against.")
+    if not good:
+        sys.exit(UNUSABLE)
+
+
+def _solver_line(one: Diagnosis) -> str:
+    state = "ok" if one.usable else "NOT USABLE"
+    where = f"{one.path} ({one.origin})" if one.path else one.origin
+    words = [f"{one.name:10}  {state}", f"version {one.version}" if one.version else "", where]
+    words.append(one.remark)
+    if one.difference is not None:
+        words.append(f"bars within {100 * one.difference:.4f} % of Marc")
+    return "  ".join(word for word in words if word)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+@command(
+    "report",
+    "bubblefit report out/fabric",
+    "bubblefit report out/fabric --format pdf",
+    "bubblefit report out/cubic out/spline --out both.html",
+)
+@click.argument("folders", type=FILE, nargs=-1, required=True, metavar="FOLDER [OTHER]")
+@click.option(
+    "--format", "kind", type=click.Choice(["html", "pdf"]), default="html", show_default=True,
+    help="pdf: printed by a browser, where there is one.",
+)  # fmt: skip
+@click.option(
+    "--out", type=FILE, help="The file.  [FOLDER/report.html; of two: FOLDER-beside-OTHER.html]"
+)
+def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> None:
+    """Make the page of an output folder again, or one of two folders side by side.
+
+    The page is computed from the files of the folder alone: the same bytes but for the date. For
+    a run that is not finished it shows the records so far.
+    """
+    if len(folders) > 2:
+        raise InputError(None, "FOLDER", f"give one folder or two, not {len(folders)}")
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(folder, "", "there is no such folder")
+    reports = [page_of_folder(folder) for folder in folders]
+    if len(folders) == 1:
+        base, report, usual = folders[0], reports[0], folders[0] / PAGE
+    else:
+        base = Path(os.path.commonpath([folder.resolve() for folder in folders]))
+        names = [folder.resolve().relative_to(base).as_posix() for folder in folders]
+        if "." in names or names[0] == names[1]:
+            raise InputError(folders[1], "", "give two folders, neither within the other")
+        report = beside((names[0], reports[0]), (names[1], reports[1]))
+        plain = [folder.resolve().name for folder in folders]
+        usual = Path(f"{plain[0]}-beside-{plain[1]}.html")
+    path = out or (usual if kind == "html" else usual.with_suffix(".pdf"))
+    if kind == "html":
+        write_page(base, report, path)
+    else:
+        with tempfile.TemporaryDirectory() as place:
+            print_page(write_page(base, report, Path(place) / PAGE), path)
+    click.echo(f"page: {path}")
+
+
+COLUMNS = f"{'':58}{'ours':>12}  {'theirs':>12}       {'off':>10}  {'allowed':>9}  source"
+
+
+@command("verify", "bubblefit verify", "bubblefit verify --subject bars --subject hencky")
+@click.option("--subject", "subjects", multiple=True, metavar="NAME",
+              help=f"One of: {', '.join(SUBJECTS)}.  [all]")  # fmt: skip
+@click.option("--data", type=Path, metavar="FOLDER",
+              help="Measured strips (valmex7318_load_gauge.csv), for Table 3.1's R^2.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the numbers on stdout as JSON.")
+def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) -> None:
+    """Compare with published numbers and closed forms. Takes a few minutes.
+
+    Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
+    part where `bubblefit doctor` finds a usable one.
+    """
+    found: list[tuple[str, Number]] = []
+    for subject, some in numbers(subjects or SUBJECTS, data):
+        if not (as_json or found):
+            click.echo(COLUMNS)
+        found += [(subject, one) for one in some]
+        if as_json:
+            continue
+        for one in some:
+            click.echo(_number_line(one))
+        if not some:
+            click.echo(f"{subject}: not here (bubblefit doctor says why), nothing compared")
+    missed = [one for _, one in found if not one.met]
+    if as_json:
+        rows = [{"subject": subject, **one.row} for subject, one in found]
+        click.echo(json.dumps({"ok": not missed, "numbers": rows}, indent=1))
+    else:
+        click.echo(_summary(len(found), missed))
+    if missed:
+        sys.exit(WORSE)
+
+
+def _number_line(one: Number) -> str:
+    factor, unit = (1.0, one.unit) if one.absolute else (100.0, "%")
+    return (
+        f"{one.what:58}{one.ours:12.6g}  {one.theirs:12.6g} {one.unit:5}"
+        f"{factor * one.deviation:+10.4f} {unit:2}{factor * one.allowed:8.4g}  {one.source}"
+        f"{'' if one.met else '   MISSED'}"
+    )
+
+
+def _summary(count: int, missed: Sequence[Number]) -> str:
+    if not missed:
+        return f"all {count} numbers are met"
+    return f"{len(missed)} of {count} missed: {'; '.join(one.what for one in missed)}"

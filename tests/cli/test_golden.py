@@ -1,0 +1,61 @@
+"""Terminal output of the commands that no other file of this folder runs: tests/golden/."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from bubblefit.cli.main import main
+from bubblefit.cli.terminal import every_command
+
+from ..commands import in_process
+from ..golden_files import FOLDER, Golden
+from ..projects import constant_strips
+
+CARD = ("--card", "out/material.toml")
+TWO = (*CARD, "--test", "two", "--quiet")
+#: By the name of the file: what is typed, in the folder of a fit of constant strips.
+COMMANDS = {
+    "help": ("--help",),
+    "profile": ("profile", "project.toml", "--modulus", "E1=0", *TWO),
+    "bootstrap": (
+        "bootstrap", "project.toml", "--over", "specimens", "--samples", 3, "--jobs", 1, *TWO
+    ),
+    "plan": ("plan", "project.toml", "--rank", "E1", *TWO),
+    "validate": ("validate", "project.toml", *TWO),
+    "simulate-test": ("simulate", "test", "project.toml", *CARD, "--test", "two"),
+    "export": ("export", "out/material.toml", "--format", "constants"),
+    "report": ("report", "out"),
+    "verify": ("verify", "--subject", "bars"),
+    "cache": ("cache", "--folder", "runs"),
+    "docs": ("docs", "changelog", "--path"),
+    "schema": ("schema", "--out", "s.json"),
+    "init": ("init", "mine"),
+    "init-own": ("init", "own", "--own", "--bubble", 1, "--thickness", 0.8),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project of strips with constant moduli, and the folder of its fit."""
+    folder = tmp_path_factory.mktemp("golden")
+    constant_strips(folder)
+    in_process("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1, cwd=folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_prints_its_golden_file(name: str, folder: Path, golden: Golden) -> None:
+    golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
+
+
+def test_doctor_lists_the_embedded_solver(golden: Golden, tmp_path: Path) -> None:
+    """The first line; the others depend on the machine."""
+    golden("doctor", in_process("doctor", cwd=tmp_path).stdout.splitlines()[0], tmp_path)
+
+
+def test_every_command_has_a_golden_file() -> None:
+
+    names = {"-".join(path) for path, _ in every_command(main)}
+    groups = {"simulate", "simulate-strips", "study", "dic"}  # strips: another name of uniaxial
+    assert names - groups <= {path.stem for path in FOLDER.iterdir()}

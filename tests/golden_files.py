@@ -1,0 +1,49 @@
+"""The terminal output of each command, kept in tests/golden/ and compared where it runs.
+
+`pytest --rewrite-golden` writes the files anew. Numbers stay as printed; what differs from place
+to place and from day to day is replaced.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from .places import ROOT
+
+FOLDER = Path(__file__).parent / "golden"
+REPLACED = (
+    (r"\d{4}-\d\d-\d\d", "DATE"),
+    (r"\d\d:\d\d(:\d\d)?\b", "TIME"),
+    (r"\b\d+(\.\d+)? s\b", "N s"),
+    (r"\b\d+(\.\d+)? ?(s|ms)(?= left)", "N s"),
+    (r"\b\d+ analys(e|i)s", "N analyses"),
+    (r"version \d[\w.+-]*", "version V"),
+    # Left over of a fit that is exact: rounding.
+    (r"\b\d+(\.\d+)?e-(0[5-9]|[1-9]\d)\b", "0"),
+)
+
+
+def normalised(text: str, folder: Path) -> str:
+    """Return the text without paths, dates, times, versions and digits of rounding."""
+    for place, name in ((folder, "FOLDER"), (folder.name, "NAME"), (ROOT, "ROOT")):
+        text = text.replace(str(place), name)
+    for pattern, words in REPLACED:
+        text = re.sub(pattern, words, text)
+    return "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+
+
+class Golden:
+    """Compare texts with their files, or write the files."""
+
+    def __init__(self, rewrite: bool) -> None:
+        self.rewrite = rewrite
+
+    def __call__(self, name: str, text: str, folder: Path) -> None:
+        """Assert that a command run in `folder` printed what NAME.txt holds."""
+        path, said = FOLDER / f"{name}.txt", normalised(text, folder)
+        if self.rewrite:
+            FOLDER.mkdir(exist_ok=True)
+            path.write_text(said)
+        assert path.exists(), f"there is no {path.name}: pytest --rewrite-golden writes it"
+        assert said == path.read_text()
