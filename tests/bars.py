@@ -73,12 +73,9 @@ class BarSolver:
         if self.progress is not None:
             self.progress(SimpleNamespace(time=float(model.increments)))
         return History(
-            load,
-            np.zeros((len(load), len(model.mesh.points), 3)),
-            np.zeros(3),
-            np.array([strain[-1], 0.0, 0.0]),
-            iterations=len(load),
-        )
+            load, np.zeros((len(load), len(model.mesh.points), 3)), np.zeros(3),
+            np.array([strain[-1], 0.0, 0.0]), iterations=len(load),
+        )  # fmt: skip
 
 
 def end_load(model: BarModel, history: History) -> dict[str, float]:
@@ -88,12 +85,15 @@ def end_load(model: BarModel, history: History) -> dict[str, float]:
 class BarKind:
     name, title, fitted, predicted = "bars", "bars that are pulled", False, None
     studied = Studied(
-        steps=lambda model: range(model.increments),
-        quantities=end_load,
-        responses=end_load,
+        steps=lambda model: range(model.increments), quantities=end_load, responses=end_load,
         response="load",
         curve=lambda model, history: (np.arange(1.0, model.increments + 1), history.load),
-    )
+    )  # fmt: skip
+
+    @property
+    def report(self) -> Any:
+        """Return what writes the results of a simulation: the kind itself."""
+        return self
 
     def simulate(
         self, test: BarTest, cards: Mapping[str, Any], runs: Mapping[tuple[str, str], CardRun],
@@ -119,11 +119,8 @@ def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
 
     return Project(
         path=Path("bars.toml"),
-        fabric=SimpleNamespace(name="", thickness=0.5, thickness_change="constant"),
-        scales=None,
-        tests={test.name: test for test in tests},
-        law=None,
-        fit=FitSection(solver="bars"),
+        fabric=SimpleNamespace(name="", thickness=0.5, thickness_change="constant"), scales=None,
+        tests={test.name: test for test in tests}, law=None, fit=FitSection(solver="bars"),
         cards={name: SimpleNamespace(card=card) for name, card in (cards or {}).items()},
         solver_options={},
-    )
+    )  # fmt: skip

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
+from bubblefit.experiments.bubble import KIND
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -31,7 +32,7 @@ def camera_project(
     path.write_text(text.replace('symmetry = "quarter"', 'symmetry = "full"'))
     project = bf.read_project(path)
     test = project.tests["bubble"]
-    computed = test.prepare(law_of(project, [test.reach]), MembraneSolver)
+    computed = KIND.prepare(test, law_of(project, [test.reach]), MembraneSolver)
     files = [f"frame_{k}_{1e3 * f.pressure:.6g}kPa.csv" for k, f in enumerate(computed.fields)]
     for name, field in zip(files, computed.fields, strict=True):
         flat = np.column_stack([field.points, np.zeros(len(field.points))])

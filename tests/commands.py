@@ -32,10 +32,7 @@ ROOMS = ("cli", "data", "experiments", "fits", "materials", "reports", "solvers"
 
 
 def bubblefit(
-    *arguments: object,
-    cwd: Path,
-    code: int = 0,
-    preexec_fn: Callable[[], None] | None = None,
+    *arguments: object, cwd: Path, code: int = 0, preexec_fn: Callable[[], None] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run the command; assert its exit code; return the finished process.
 

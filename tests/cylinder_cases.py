@@ -67,16 +67,11 @@ class Formula:
         gas = model.gas.closed_in(model.pressure, float(volume[0]))
         pressure = [gas.pressure(float(v)) for v in volume]
         return History(
-            load,
-            u,
-            np.zeros(3),
-            np.array([0.1 * hoop, hoop, 0.0]),
-            cavity_pressure=np.array(pressure),
-            cavity_volume=volume,
-            wrinkled=0.05 + 0.002 * np.maximum(way - 50.0, 0.0),
-            remarks=("made up",),
+            load, u, np.zeros(3), np.array([0.1 * hoop, hoop, 0.0]),
+            cavity_pressure=np.array(pressure), cavity_volume=volume,
+            wrinkled=0.05 + 0.002 * np.maximum(way - 50.0, 0.0), remarks=("made up",),
             early="the run stopped early: so asked" if e1 == STOPS else "",
-        )
+        )  # fmt: skip
 
 
 #: Ends of a band, as a solver gives them.

@@ -62,24 +62,18 @@ def tecplot(folder: Path, frames: Frames) -> list[Path]:
         rows = [_row([*row, 1.0], " ") for row in np.hstack([x, u])]
         rows.append("1.0 2.0 3.0 4.0 5.0 6.0 0")
         head = [
-            f'TITLE = "B{k:05d}"',
-            "VARIABLES = " + " ".join(f'"{name}"' for name in names),
-            f'ZONE T="Snapshot {k:04d}"',
-            f"STRANDID=1, SOLUTIONTIME={k}",
-            f"I={len(rows)}, J=1, K=1, ZONETYPE = Ordered",
-            "DATAPACKING = POINT",
-        ]
+            f'TITLE = "B{k:05d}"', "VARIABLES = " + " ".join(f'"{name}"' for name in names),
+            f'ZONE T="Snapshot {k:04d}"', f"STRANDID=1, SOLUTIONTIME={k}",
+            f"I={len(rows)}, J=1, K=1, ZONETYPE = Ordered", "DATAPACKING = POINT",
+        ]  # fmt: skip
         files.append(_lines(folder / f"B{k:05d}.dat", head + rows, "latin-1"))
     return files
 
 
 def vic3d(folder: Path, frames: Frames) -> list[Path]:
     names = [f"{a} [mm]" for a in "XYZUVW"] + [
-        "exx [1]",
-        "Sigma_X [mm]",
-        "sigma [pixel]",
-        "x [pixel]",
-    ]
+        "exx [1]", "Sigma_X [mm]", "sigma [pixel]", "x [pixel]",
+    ]  # fmt: skip
     files = []
     for k, (x, u) in enumerate(frames):
         rows = [_row([*row, 0.01, 0.002, 0.02, 512.0]) for row in np.hstack([x, u])]
@@ -112,11 +106,8 @@ def aramis(folder: Path, frames: Frames) -> list[Path]:
         rows = [f"{i};{_row(row, ';', ',')}" for i, row in enumerate(np.hstack([x, u]))]
         rows.insert(1, "9999;1,5;2,5;0,5;;;")
         head = [
-            "ZEISS Correlate 2023",
-            f"Stufe {k}; Flächenkomponente 1",
-            "",
-            ";".join(["ID", *names]),
-        ]
+            "ZEISS Correlate 2023", f"Stufe {k}; Flächenkomponente 1", "", ";".join(["ID", *names]),
+        ]  # fmt: skip
         files.append(
             _lines(folder / f"stage_{k}.csv", [*head, ";mm;mm;mm;mm;mm;mm", *rows], "cp1252")
         )
@@ -239,18 +230,10 @@ def ncorr(folder: Path, frames: Frames) -> list[Path]:
 
 #: Writers by the name of the format that is to be found, and of the case.
 EXPORTS: dict[str, tuple[str, Callable[[Path, Frames], list[Path]]]] = {
-    "plain": ("csv", plain),
-    "german": ("csv", german),
-    "davis": ("davis", davis),
-    "tecplot": ("tecplot", tecplot),
-    "vic3d": ("vic3d", vic3d),
-    "vic3d-mat": ("vic3d-mat", vic3d_mat),
-    "aramis": ("aramis", aramis),
-    "matchid 2024": ("matchid", matchid_2024),
-    "matchid 2023": ("matchid", matchid_2023),
-    "dice": ("dice", dice),
-    "istra4d": ("istra4d", istra4d),
-    "multidic": ("multidic", multidic),
-    "pyaldic": ("pyaldic", pyaldic),
-    "pyaldic csv": ("pyaldic", pyaldic_csv),
-}
+    "plain": ("csv", plain), "german": ("csv", german), "davis": ("davis", davis),
+    "tecplot": ("tecplot", tecplot), "vic3d": ("vic3d", vic3d),
+    "vic3d-mat": ("vic3d-mat", vic3d_mat), "aramis": ("aramis", aramis),
+    "matchid 2024": ("matchid", matchid_2024), "matchid 2023": ("matchid", matchid_2023),
+    "dice": ("dice", dice), "istra4d": ("istra4d", istra4d), "multidic": ("multidic", multidic),
+    "pyaldic": ("pyaldic", pyaldic), "pyaldic csv": ("pyaldic", pyaldic_csv),
+}  # fmt: skip

@@ -25,13 +25,9 @@ REAL "$@"; sed -i '$d' job.sta; echo " *ERROR: increment size smaller than minim
 }
 #: The stand-in's own faults.
 MARC = {
-    "inside out": "inside out",
-    "killed": "killed",
-    "time-out": "hanging",
-    "disk full": "disk full",
-    "no licence": "licence",
-    "collapse": "3015",
-}
+    "inside out": "inside out", "killed": "killed", "time-out": "hanging", "disk full": "disk full",
+    "no licence": "licence", "collapse": "3015",
+}  # fmt: skip
 
 
 def failing_ccx(folder: Path, real: Path) -> Path:

@@ -102,10 +102,7 @@ starts = 2
 seed = 7
 """
 #: MPa, of two specimens a direction.
-MODULI = {
-    "one": {"warp": (300.0, 360.0), "fill": (200.0, 180.0)},
-    "two": {"warp": (330.0, 410.0)},
-}
+MODULI = {"one": {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}, "two": {"warp": (330.0, 410.0)}}
 ELONGATION = np.linspace(0.2, 3.0, 12)
 
 

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from bubblefit import caching
 
 #: Compiles one kernel that calls another file's functions, and prints what it computes.
@@ -32,7 +31,7 @@ def run(cache: Path, package: Path | None = None) -> str:
     return done.stdout
 
 
-def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_cache_is(monkeypatch):
     monkeypatch.setenv("BUBBLEFIT_CACHE", "/x")
     assert caching.cache_folder() == Path("/x")
     monkeypatch.delenv("BUBBLEFIT_CACHE")
@@ -49,8 +48,7 @@ def _compiles(file: Path) -> bool:
     return any("compiled" in ast.unparse(decorator) for decorator in decorators)
 
 
-def test_every_file_with_compiled_functions_is_among_the_kernels() -> None:
-    """One left out would keep code that was compiled before its edit."""
+def test_every_file_with_compiled_functions_is_among_the_kernels():
     outside = {"tests", "benchmarks", "build", "out"}
     files = (file.relative_to(caching.ROOT) for file in caching.ROOT.rglob("*.py"))
     ours = [f for f in files if f.parts[0] not in outside and not f.parts[0].startswith(".")]
@@ -60,14 +58,14 @@ def test_every_file_with_compiled_functions_is_among_the_kernels() -> None:
     assert len(caching.KERNELS) == len(with_kernels)
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path):
     (tmp_path / "file").write_text("in the way")
     kept = run(tmp_path / "cache")
     assert list((tmp_path / "cache").glob("kernels-*/*/*.nbi"))
     assert run(tmp_path / "file" / "cache") == kept
 
 
-def test_an_edit_reaches_code_compiled_from_another_file(tmp_path: Path) -> None:
+def test_an_edit_reaches_code_compiled_from_another_file(tmp_path):
     package = tmp_path / "copy" / "bubblefit"
     shutil.copytree(
         caching.ROOT,

@@ -1,18 +1,25 @@
 """The wheel: everything the commands need, nothing else, and it works outside the repository."""
 
+from __future__ import annotations
+
+import ast
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
+from email.message import Message
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from . import needs
+from .places import PUBLISHED, ROOT
 from .scripts import script
 
-ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 #: Folders of the repository that are no part of the package.
 OUTSIDE = {"tests", "benchmarks", "docs", "examples", "out", "build", "dist"}
@@ -53,7 +60,7 @@ def shipped() -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(tmp_path_factory):
     """Built from a copy of the working tree, so that nothing is left in the repository."""
     place = tmp_path_factory.mktemp("wheel")
     source = place / "source"
@@ -102,7 +109,7 @@ HEAVY = {"numba", "scipy.optimize", "scipy.stats", "matplotlib", "pandas", "pyda
     [
         ("cli.main", HEAVY),
         ("cli.fits", {"gmsh", "scipy.stats", "dask", "h5py"}),
-        ("fits.project", HEAVY - {"numba", "nlopt", "pydantic", "jinja2"}),
+        ("project.project", HEAVY - {"numba", "nlopt", "pydantic", "jinja2"}),
     ],
 )
 def test_start_up_loads_only_what_it_needs(module, absent):
@@ -176,7 +183,7 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path):
     # path: the editable install of bubblefit that hangs on a .pth over there is not read.
     (site_packages(python) / "borrowed.pth").write_text(f"{site_packages(sys.executable)}\n")
 
-    def run(*arguments: Path | str) -> str:
+    def run(*arguments):
         done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         return done.stdout
@@ -192,3 +199,192 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path):
     project.write_text(text.replace("elements = 800", "elements = 48"))
     run(command, "bubble", project, "--starts", "1", "--jobs", "1")
     assert (tmp_path / "out" / "mine" / "report.html").exists()
+
+
+@pytest.fixture(scope="module")
+def licences():
+    return script(".ci/licences.py")
+
+
+def installed(name: str, licence: str, *requires: str) -> SimpleNamespace:
+    about = Message()
+    about["License-Expression"] = licence
+    return SimpleNamespace(version="1", metadata=about, requires=requires, name=name)
+
+
+def found(licences, monkeypatch, tmp_path, direct, **there) -> list[str]:
+    def distribution(name):
+        if name not in there:
+            raise licences.PackageNotFoundError(name)
+        return there[name]
+
+    monkeypatch.setattr(licences, "distribution", distribution)
+    project = {"dependencies": direct, "optional-dependencies": {"dev": ["absent>=1"]}}
+    return licences.problems(project, tmp_path)
+
+
+def test_ours_are_in_order(licences):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert licences.problems(project, ROOT) == []
+
+
+def test_what_is_wrong_is_a_line(licences, monkeypatch, tmp_path):
+    there = {"a": installed("a", "MIT", "b>=1", 'c>=1; extra == "x"'), "b": installed("b", "AGPL")}
+    (line,) = found(licences, monkeypatch, tmp_path, ["a>=1"], **there)
+    assert line == "b 1: licence 'AGPL' is none of those in .ci/licences.py"
+    there["b"] = installed("b", "BSD-3-Clause")
+    assert found(licences, monkeypatch, tmp_path, ["a>=1"], **there) == []
+    for text in ("a", "a<2", "a; python_version > '3'"):
+        (line,) = found(licences, monkeypatch, tmp_path, [text], **there)
+        assert "has no lower bound" in line
+    there["a"] = installed("a", "")
+    (line,) = found(licences, monkeypatch, tmp_path, ["a>=1"], **there)
+    assert "'nothing'" in line
+
+
+def test_a_file_of_somebody_elses_has_to_be_named(licences, monkeypatch, tmp_path):
+    path = tmp_path / "templates" / "plot.js"
+    path.parent.mkdir()
+    path.write_text("/*! plot.js v1 Copyright (c) Somebody */")
+    (line,) = found(licences, monkeypatch, tmp_path, [])
+    assert line == "templates/plot.js: is somebody else's file; name it in VENDORED"
+    monkeypatch.setitem(licences.VENDORED, "templates/plot.js", "MIT")
+    assert found(licences, monkeypatch, tmp_path, []) == []
+
+
+def test_lint_runs_it():
+    lint = Path(ROOT / "Makefile").read_text().split("\nlint:")[1].split("\n\n")[0]
+    assert ".ci/licences.py" in lint
+
+
+SCRIPT = ROOT / ".ci" / "run"
+
+
+@pytest.fixture
+def house(tmp_path):
+    """A copy of the script, with a `make` that writes down what it is asked for."""
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(SCRIPT, tmp_path / ".ci" / "run")
+    make = tmp_path / "bin" / "make"
+    make.parent.mkdir()
+    make.write_text('#!/bin/sh\necho "CI=$CI $*"\n[ "$1" != "$FAULT" ]\n')
+    make.chmod(0o755)
+    return tmp_path
+
+
+def run(house: Path, fault: str = "") -> tuple[int, list[str]]:
+    """Exit code, and what was made."""
+    environment = {name: value for name, value in os.environ.items() if name != "CI"}
+    path = f"{house / 'bin'}:{os.environ['PATH']}"
+    done = subprocess.run(
+        [house / ".ci" / "run"], env={**environment, "PATH": path, "FAULT": fault},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    return done.returncode, done.stdout.splitlines()
+
+
+def test_it_lints_and_tests_with_ci_set(house):
+    code, made = run(house)
+    assert code == 0
+    assert made == ["CI=1 lint", "CI=1 test", "CI=1 mutants CHANGED=1 MINUTES=3"]
+
+
+@pytest.mark.parametrize("target", ["lint", "test"])
+def test_it_ends_with_the_first_failure(house, target):
+    code, made = run(house, target)
+    assert code != 0 and made[-1] == f"CI=1 {target}"
+
+
+def test_mutants_fail_nothing(house):
+    code, made = run(house, "mutants")
+    assert code == 0 and made[-1] == "mutants: not tried to the end"
+
+
+def gfortran(folder: Path) -> subprocess.CompletedProcess[str]:
+    script = ROOT / ".ci" / "gfortran"
+    return subprocess.run(
+        ["/bin/sh", script], env={"PATH": str(folder)}, capture_output=True, text=True
+    )
+
+
+def test_gfortran_is_there_or_is_installed_or_named(tmp_path):
+    for name in ("dirname", "id", "env"):
+        (tmp_path / name).symlink_to(shutil.which(name) or name)
+    without = gfortran(tmp_path)
+    assert without.returncode == 1
+    assert "apt-get install gfortran" in without.stderr
+    apt = tmp_path / "apt-get"
+    apt.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\n')
+    apt.chmod(0o755)
+    if os.geteuid() == 0:
+        assert gfortran(tmp_path).returncode == 0
+        assert " gfortran " in (tmp_path / "asked").read_text()
+        (tmp_path / "asked").unlink()
+    (tmp_path / "gfortran").symlink_to(shutil.which("true") or "true")
+    with_it = gfortran(tmp_path)
+    assert with_it.returncode == 0 and not with_it.stderr
+    assert not (tmp_path / "asked").exists()
+
+
+#: What leaves a test out, or lets it fail.
+WORDS = {"skip", "skipif", "skipIf", "skipUnless", "SkipTest", "importorskip", "xfail"}
+
+
+def left_out(path: Path) -> list[str]:
+    """file:line of every name in WORDS that the code of a file uses."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        imported = [alias.name for alias in getattr(node, "names", []) if hasattr(alias, "name")]
+        for name in [getattr(node, "attr", ""), *imported]:
+            if name in WORDS:
+                found.append(f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)} {name}")
+    return found
+
+
+def test_nothing_else_leaves_a_test_out():
+    files = sorted((ROOT / "tests").rglob("*.py"))
+    assert len(files) > 150
+    found = [line for path in files for line in left_out(path)]
+    own = ["tests/needs.py", "tests/test_packaging.py"]  # that place, and the check of it below
+    assert [line.split(":")[0] for line in found] == own, found
+
+
+@pytest.fixture
+def bare(monkeypatch, tmp_path):
+    """A machine without any program, and without measured data."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path))
+    for name in ("CC", "BUBBLEFIT_CCX"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(needs, "SHARED", tmp_path / "shared" / "data")
+
+
+WANTS = {
+    "install gfortran": needs.fortran, "install gcc": needs.c_compiler, "ccx": needs.calculix,
+    "no measured data": needs.measured_data,
+    "no_such_library cannot be loaded": lambda: needs.library("no_such_library"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WANTS)
+def test_what_is_missing_skips_here_and_fails_in_ci(words, bare, monkeypatch):
+    monkeypatch.delenv("CI", raising=False)
+    with pytest.raises(pytest.skip.Exception, match=words):
+        WANTS[words]()
+    monkeypatch.setenv("CI", "1")
+    with pytest.raises(pytest.fail.Exception, match=words):
+        WANTS[words]()
+
+
+def test_every_table_has_a_source_and_says_its_units():
+    described = (PUBLISHED / "README.md").read_text()
+    tables = sorted(PUBLISHED.glob("*.csv"))
+    assert len(tables) == 4
+    for table in tables:
+        assert f"| `{table.name}` |" in described
+        assert table.read_text().startswith("# ")
+
+
+def test_they_are_those_of_the_data_folder(shared_data):
+    there = {path.name: path.read_bytes() for path in (shared_data / "benchmarks").glob("*.csv")}
+    assert {path.name: path.read_bytes() for path in PUBLISHED.glob("*.csv")} == there

@@ -1,12 +1,30 @@
 """The loader of plug-ins, for all groups: names without imports, faults in one line each."""
 
-import shutil
-import sys
+from __future__ import annotations
 
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import bubblefit
+import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.errors import PlugInFailure
 from bubblefit.files import names_with, plug_in_named, plug_ins
+from bubblefit.materials.forms.base import Form, pieces_of
+from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from bubblefit.solvers.registry import solver_named
 
+from .complaints import complaint
+from .places import ROOT
 from .plug_ins import install
 
 GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers")
@@ -68,3 +86,298 @@ def test_one_of_our_names_adds_none(packages):
     install(packages, "cubic", "raise RuntimeError")
     assert names_with("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
     assert names_with("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
+
+
+#: Slow to import, or not wanted until a figure or a table is asked for.
+LATER = {"numba", "scipy", "matplotlib", "pandas", "pydantic", "gmsh", "nlopt", "jinja2", "click"}
+
+
+def modules_after(code: str) -> set[str]:
+    """Names of all modules that are there when the code has run."""
+    code = f"import sys\n{code}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_importing_is_quick():
+    modules = modules_after("import bubblefit")
+    assert not LATER & modules
+    assert len([name for name in modules if name.split(".")[0] == "bubblefit"]) < 15
+
+
+def test_result_files_of_other_programs_are_read_by_meshio():
+    code = """
+import bubblefit, meshio
+known = meshio.extension_to_filetypes
+assert ".frd" in known and ".t19" in known, known
+"""
+    assert "meshio" in modules_after(code)
+
+
+def test_a_project_is_read_without_figures():
+    known = "examples/bubble-known-solution/project.toml"
+    code = f"""
+import bubblefit, pathlib
+bubblefit.read_project(pathlib.Path(bubblefit.__file__).parent / "{known}")
+"""
+    assert not {"matplotlib", "gmsh", "click"} & modules_after(code)
+
+
+def test_every_name_is_there():
+    assert set(bubblefit.__all__) <= set(dir(bubblefit))
+    for name in bubblefit.__all__:
+        thing = getattr(bubblefit, name)
+        assert thing.__name__ == name and thing.__doc__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = bubblefit.nothing
+
+
+def test_the_interface_knows_no_terminal():
+    code = "import bubblefit\nfor name in bubblefit.__all__: getattr(bubblefit, name)"
+    assert not {"click", "bubblefit.cli"} & modules_after(code)
+
+
+TEXT = (ROOT / "docs" / "adding.md").read_text()
+EXTRAS = ROOT / "examples" / "plug-in" / "bubblefit_extras"
+COBYLA = ROOT / "inference" / "methods" / "cobyla.py"
+
+
+def test_the_code_is_that_of_the_example():
+    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", TEXT, re.DOTALL)
+    paths = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", COBYLA]
+    sources = [plain(path.read_text()) for path in paths]
+    assert len(blocks) > 8
+    for block in blocks:
+        assert any(plain(block) in source for source in sources), block
+
+
+def plain(text):
+    """Lines without their indent, and without empty ones: formatters of documents change both."""
+    return "\n".join(line.strip() for line in text.splitlines() if line.strip())
+
+
+def test_the_lines_of_the_example_are_counted():
+    said = {name: int(lines) for name, lines in re.findall(r"(\w+\.py), (\d+) \|", TEXT)}
+    assert said == {
+        path.name: len(path.read_text().splitlines())
+        for path in EXTRAS.glob("*.py")
+        if path.name != "__init__.py"
+    }
+
+
+@pytest.mark.slow
+def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
+    house = tmp_path / "bubblefit"
+    skip = shutil.ignore_patterns(".*", "tests", "docs", "examples", "benchmarks", "__pycache__")
+    shutil.copytree(ROOT, house, ignore=skip, symlinks=True)
+    before = {path: path.read_bytes() for path in house.rglob("*") if path.is_file()}
+    put(
+        house / "materials/forms/saturating.py",
+        "saturating.py",
+        "from bubblefit.materials.forms.registry import register_form\n\nregister_form(SATURATING)",
+    )
+    put(
+        house / "readers/formats/riglog.py",
+        "riglog.py",
+        "from bubblefit.readers.registry import register_format\n\nregister_format(RIGLOG)",
+    )
+    put(house / "experiments/datasheet/__init__.py", "datasheet.py", "")
+    files = {path for path in house.rglob("*") if path.is_file()}
+    assert len(files - before.keys()) == 3  # and none was changed
+    code = f"""if True:
+        import bubblefit as bf
+        from bubblefit.readers.registry import format_of
+        from bubblefit.runs.setup import law_of
+        assert bf.__file__.startswith({str(house)!r})
+        project = bf.read_project({str(ROOT / "examples/plug-in/project.toml")!r})
+        assert list(project.tests) == ["supplier", "strips"], list(project.tests)
+        print(law_of(project, list(project.tests.values())).form.name)
+        print(format_of("machine table", {str(ROOT / "examples/plug-in/warp.rig")!r}).name)
+        """
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path,
+        env={"PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["saturating", "riglog"]
+
+
+def put(path, name, last):
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"{(EXTRAS / name).read_text()}\n{last}\n")
+
+
+PLUG_IN = Path(__file__).resolve().parents[1] / "examples" / "plug-in"
+#: What the example's files were computed from: G12, E2 and E1, at rest and far away, MPa.
+BETA = np.array([20.0, 5.0, 300.0, 150.0, 900.0, 400.0])
+SCALE = {"warp": 0.03, "fill": 0.06, "shear": 0.15}
+ENDS = (0.25, 0.25, 0.8)
+
+
+@pytest.fixture(scope="session")
+def plug_in(tmp_path_factory):
+    """A folder for PYTHONPATH with the example installed from a copy of it, by pip."""
+    place = tmp_path_factory.mktemp("plug-in")
+    shutil.copytree(PLUG_IN, place / "source", ignore=shutil.ignore_patterns("__pycache__"))
+    subprocess.run(
+        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
+         "--no-build-isolation", "--target", place / "site", place / "source"],
+        check=True,
+    )  # fmt: skip
+    return place / "site"
+
+
+@pytest.fixture
+def here(plug_in, monkeypatch):
+    """The plug-in in this process."""
+    monkeypatch.syspath_prepend(str(plug_in))
+    yield
+    for name in [name for name in sys.modules if name.startswith("bubblefit_extras")]:
+        del sys.modules[name]
+
+
+def run(plug_in, *command):
+    """Run Python beside a copy of the example's project, where only the installed plug-in is."""
+    cwd = plug_in.parent / "work"
+    if not cwd.is_dir():
+        cwd.mkdir()
+        for file in (*PLUG_IN.glob("*.rig"), PLUG_IN / "project.toml"):
+            shutil.copy(file, cwd)
+    path = os.pathsep.join([str(plug_in), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, *map(str, command)], cwd=cwd, capture_output=True, text=True,
+        timeout=300, env={**os.environ, "PYTHONPATH": path},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
+    run(plug_in, "-m", "bubblefit.cli", "fit", "project.toml", "--starts", 1, "--out", tmp_path)
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["objective"] < 1e-3
+    card = (tmp_path / "material.toml").read_text()
+    assert 'form = "saturating"' in card and "[scale]" in card
+    residuals = pd.read_csv(tmp_path / "residuals.csv")
+    assert set(residuals.test) == {"strips", "supplier"}
+    # Both are read back by whoever has the plug-in.
+    out = run(plug_in, "-c", f"""if True:
+        import numpy as np
+        import bubblefit as bf
+        card = bf.read_card({str(tmp_path / "material.toml")!r})
+        print(card.law.form.name, *np.round(card.law.beta, 1).tolist())
+        """)  # fmt: skip
+    name, *beta = out.split()
+    assert name == "saturating"
+    np.testing.assert_allclose(np.array(beta, dtype=float), BETA, rtol=0.02)
+    # The card in both kinds of test, by the plug-in's solver.
+    simulated = tmp_path / "simulated"
+    out = run(plug_in, "-m", "bubblefit.cli", "simulate", "test", "project.toml", "--card",
+              tmp_path / "material.toml", "--solver", "bar", "--out", simulated)  # fmt: skip
+    assert "bias: takes strips along warp or fill only" in out
+    assert "611.4 N, stated 611.4 N" in out
+    tests = json.loads((simulated / "result.json").read_text())["tests"]
+    ((_, strips),) = tests["strips"]["cards"].items()
+    assert strips["directions"]["fill"]["rms_N"] < 2.0  # of 720: the polynomial is 0.3 off itself
+
+
+@pytest.mark.slow
+def test_the_python_interface_fits_by_its_solver(plug_in):
+    out = run(plug_in, "-c", """if True:
+        import bubblefit as bf
+        project = bf.read_project("project.toml").with_fit(solver="bar")
+        fit = bf.fit(project, tests="datasheet", starts=1, jobs=1)
+        (row,) = fit.residuals().itertuples()
+        print(fit.objective, row.quantity, row.measured, row.modelled)
+        """)  # fmt: skip
+    objective, quantity, measured, modelled = out.split()
+    assert float(objective) < 1e-6 and quantity == "load"
+    assert float(measured) == pytest.approx(611.4)
+    assert float(modelled) == pytest.approx(611.4, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_doctor_pulls_bars_with_the_solver(plug_in):
+    out = run(plug_in, "-m", "bubblefit.cli", "doctor")
+    assert "bar         ok  version 1.0  plug-in of bubblefit-extras 1.0  bars within 0.0" in out
+
+
+def law(thickness_change="constant"):
+    form = form_named("saturating", {"scale": SCALE}, ENDS)
+    return HypoelasticLaw(BETA, 0.24, np.array(ENDS), thickness_change, form)
+
+
+def test_the_law_is_a_form_close_to_its_exponential(here):
+    form = law().form
+    assert isinstance(form, Form) and hash(form) == hash(law().form)
+    assert pieces_of(form, BETA, ENDS).shape == (3, 9, 5)
+    for name, scale, (rest, far) in (
+        ("G12", 0.15, (20.0, 5.0)), ("E2", 0.06, (300.0, 150.0)), ("E1", 0.03, (900.0, 400.0)),
+    ):  # fmt: skip
+        x = np.linspace(0.0, 0.25, 200)
+        exact = far + (rest - far) * np.exp(-x / scale)
+        np.testing.assert_allclose(law().modulus(name, x), exact, atol=3e-3 * (rest - far))
+    # Values at rest and at the end of the range make beta again.
+    values = [m for n, e in zip(("G12", "E2", "E1"), ENDS[::-1], strict=True)
+              for m in law().modulus(n, np.array([0.0, e]))]  # fmt: skip
+    np.testing.assert_allclose(form.from_values(ENDS) @ values, BETA, rtol=3e-3)
+
+
+def test_the_laws_settings_are_checked(here):
+    words = "scale: a saturating law needs scale = { warp = ..., fill = ..., shear = ... }"
+    assert complaint(form_named, "saturating", {}, ENDS) == words
+    wrong = {"scale": {**SCALE, "fill": -1.0}}
+    assert "scale.fill: expected a strain above 0" in complaint(
+        form_named, "saturating", wrong, ENDS
+    )
+
+
+@pytest.mark.parametrize("direction", ["warp", "fill"])
+@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
+def test_the_solver_agrees_with_the_membrane(here, direction, thickness_change):
+    model = straight_strip(direction, 20.0, 22.0, 0.81, increments=7)
+    theirs, ours = (
+        s.run(model, law(thickness_change)) for s in (solver_named("bar"), MembraneSolver())
+    )
+    np.testing.assert_allclose(theirs.load, ours.load, rtol=1e-8)
+    np.testing.assert_allclose(theirs.displacement, ours.displacement, atol=1e-7)
+    np.testing.assert_allclose(theirs.strain_max, ours.strain_max, atol=1e-9)
+    for name, force in theirs.reactions.items():
+        np.testing.assert_allclose(force, ours.reactions[name], atol=1e-5)
+
+
+def test_the_solver_refuses_what_it_cannot_do(here):
+    from bubblefit.errors import SolverFailure
+
+    with pytest.raises(SolverFailure, match="bar: takes strips along warp or fill only"):
+        solver_named("bar").run(bias_strip(20.0, 25.0, 0.81), law())
+
+
+def test_the_reader_is_found_by_content(here, tmp_path):
+    from bubblefit.readers.curves import read_load_curves
+    from bubblefit.readers.registry import format_names, format_of
+
+    path = PLUG_IN / "warp.rig"
+    assert format_of("machine table", path).name == "riglog"
+    assert "riglog" in format_names("machine table")
+    (curve,) = read_load_curves(path, direction="warp")
+    assert curve.load[-1] == pytest.approx(1385.603) and curve.elongation[-1] == 3.0
+    broken = tmp_path / "broken.rig"
+    broken.write_text("RIGLOG 1\nchannel Extension mm\nchannel Force kN\n0 0\n1\n")
+    message = complaint(read_load_curves, broken, direction="warp")
+    assert message == f"{broken}: line 5: expected 2 numbers, found 1"
+    broken.write_text("RIGLOG 1\n0 0\n")
+    assert "expected lines 'channel NAME UNIT'" in complaint(
+        read_load_curves, broken, direction="warp", format="riglog"
+    )
+
+
+def test_the_example_is_what_its_files_say(here):
+    from bubblefit.readers.curves import read_load_curves
+
+    for direction, final in (("warp", 23.0), ("fill", 24.0)):
+        (curve,) = read_load_curves(PLUG_IN / f"{direction}.rig", direction=direction)
+        model = straight_strip(direction, 20.0, final, 0.81, increments=60)
+        load = solver_named("bar").run(model, law()).load
+        np.testing.assert_allclose(curve.load[1:], load[2::3], atol=2e-3)

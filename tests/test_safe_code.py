@@ -3,11 +3,29 @@
 from __future__ import annotations
 
 import ast
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from bubblefit.errors import InputError
+from bubblefit.experiments.kinds import Output
+from bubblefit.materials.card import MaterialCard, read_card, write_card
+from bubblefit.project.project import read_project
+from bubblefit.readers.names import number_in_name
+from bubblefit.readers.sections import PRESSURE_UNITS
+from bubblefit.reports.charts import Chart, Charts, Series
+from bubblefit.reports.content import Download, Facts, Listing, Report, Section, Table, Words
+from bubblefit.reports.html import write_report
+from bubblefit.solvers.decks import render
+from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.registry import solver_settings
+from bubblefit.solvers.settings import PROGRAMS_FROM
 
-from .places import ROOT
+from .complaints import complaint, complaint_with
+from .places import EXAMPLES, ROOT
+from .plug_ins import install
+from .projects import changed
 
 ROOMS = ("tests", "benchmarks", "out", "build")
 SOURCES = sorted(
@@ -53,7 +71,7 @@ ALLOWED = {
 }
 
 
-def test_no_shell_no_pickle_no_evaluated_text() -> None:
+def test_no_shell_no_pickle_no_evaluated_text():
     assert len(SOURCES) > 300
     found = {str(path.relative_to(ROOT)): faults(path.read_text()) for path in SOURCES}
     assert {path: what for path, what in found.items() if what} == ALLOWED
@@ -67,11 +85,194 @@ def test_no_shell_no_pickle_no_evaluated_text() -> None:
         "archive.extractall()", "jinja2.Environment()",
     ],
 )  # fmt: skip
-def test_such_faults_are_seen(source: str) -> None:
+def test_such_faults_are_seen(source):
     assert faults(source)
 
 
-def test_ruff_looks_for_the_rest() -> None:
+def test_ruff_looks_for_the_rest():
     text = (Path(ROOT) / "pyproject.toml").read_text()
     line = next(line for line in text.splitlines() if line.startswith("select = "))
     assert '"S"' in line
+
+
+HOSTILE = "a\nb\x00<script>alert(1)</script>\n*INCLUDE, INPUT=/etc/passwd\n include /etc/passwd"
+STARTED = [
+    ("marc", "executable", "/tmp/evil"), ("marc", "executable", "evil"),
+    ("marc", "arguments", ["-u", "evil.f"]), ("marc", "environment", {"LD_PRELOAD": "evil.so"}),
+    ("marc", "modules", ["evil"]), ("calculix", "ccx", "./evil"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("solver", "key", "value"), STARTED)
+def test_a_project_says_what_is_run_only_where_it_may(monkeypatch, tmp_path, solver, key, value):
+    path, table = tmp_path / "home" / "project.toml", {solver: {key: value}}
+    monkeypatch.delenv(PROGRAMS_FROM)
+    option = {"marc": "--marc", "calculix": "--ccx"}[solver]
+    words = [f"{path}: solver.{solver}.{key}: says what is run", option, f"={path.parent} lets"]
+    complaint_with(words, solver_settings, path, table)
+    monkeypatch.setenv(PROGRAMS_FROM, str(tmp_path / "hom"))
+    complaint(solver_settings, path, table)
+    monkeypatch.setenv(PROGRAMS_FROM, f"/nowhere:{tmp_path / 'home'}")
+    assert solver_settings(path, table)[solver][key] is not None
+    complaint(solver_settings, tmp_path / "home" / ".." / "project.toml", table)
+
+
+@pytest.mark.parametrize("name", ["ccx_2.20", "ccx"])
+def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path, name):
+    monkeypatch.delenv(PROGRAMS_FROM)
+    path = tmp_path / "project.toml"
+    assert solver_settings(path, {"calculix": {"ccx": name}})["calculix"]["ccx"] == name
+    complaint(solver_settings, path, {"calculix": {"ccx": f"{name}/../evil"}})
+    own = {"marc": {"executable": "run_marc2023"}}
+    assert solver_settings(path, own)["marc"]["executable"] == "run_marc2023"
+
+
+def test_a_link_to_a_project_is_where_the_file_is(monkeypatch, tmp_path):
+    real, home = tmp_path / "real", tmp_path / "home"
+    real.mkdir(), home.mkdir()
+    (real / "project.toml").write_text("")
+    (home / "project.toml").symlink_to(real / "project.toml")
+    monkeypatch.setenv(PROGRAMS_FROM, str(home))
+    complaint(solver_settings, home / "project.toml", {"calculix": {"ccx": "./evil"}})
+
+
+def test_a_plug_in_says_which_of_its_options_are_programs(monkeypatch, packages, tmp_path):
+    code = "class THING:\n    started = ('program',)\n    def __init__(self, **options): ...\n"
+    install(packages, "bars", code, group="bubblefit.solvers")
+    monkeypatch.delenv(PROGRAMS_FROM)
+    path = tmp_path / "project.toml"
+    assert solver_settings(path, {"bars": {"n": 2}})["bars"] == {"n": 2}
+    words = ["solver.bars.program: says what is run"]
+    complaint_with(words, solver_settings, path, {"bars": {"program": "evil"}})
+
+
+def deck(folder: Path, text: str, **context) -> str:
+    (folder / "a.j2").write_text(text)
+    return render("calculix", "a.j2", context, folder)
+
+
+REACHES = [
+    "{{ ''.__class__.__mro__[1].__subclasses__() }}", "{{ self.__init__.__globals__ }}",
+    "{{ cycler.__init__.__globals__.os.popen('id') }}", "{{ '{0.__class__}'.format(1) }}",
+    "{{ ('{0.' ~ '__class__}') | format(1) | attr('__class__') ~ x.append.__self__ }}",
+    "{{ x | attr('__class__') | attr('__init__') }}", "{{ x.append(1) }}",
+    "{% set _ = x.clear() %}", "{{ d.update({'a': 2}) }}", "{% include '/etc/passwd' %}",
+    "{% include '../secret' %}", "{% include '../../../../../etc/passwd' %}",
+    "{% import 'os' as os %}",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", REACHES)
+def test_a_template_reaches_nothing_but_its_values(tmp_path, text):
+    (tmp_path / "secret").write_text("secret")
+    (tmp_path / "t").mkdir()
+    x, d = [1], {"a": 1}
+    complaint(deck, tmp_path / "t", text, x=x, d=d)
+    assert x == [1] and d == {"a": 1}
+
+
+LEAVES = [
+    "*INCLUDE, INPUT=/etc/passwd", " * include , input = ../../secret",
+    "*INCLUDE,\n INPUT=/etc/passwd", "*RESTART, READ,\nFILE=a/b", "*MATERIAL, NAME=@/tmp/evil_F",
+    "include /etc/passwd", "INCLUDE ../secret", 'Include "~/secret"', "include ..\\secret",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", LEAVES)
+def test_no_line_of_a_deck_names_a_file_elsewhere(tmp_path, text):
+    complaint_with(["a.j2: line ", "names a file elsewhere"], deck, tmp_path, f"** deck\n{text}\n")
+    # Not by a value either.
+    complaint_with(["names a file elsewhere"], deck, tmp_path, "{{ name }}", name=f"a\n{text}")
+
+
+def test_what_lies_in_the_runs_folder_may_be_named(tmp_path):
+    text = "** a/b = ../c\n*INCLUDE, INPUT=mesh.inp\n*NODE\n1, 1/2\ninclude cavity.dat\n$ a = /b\n"
+    assert deck(tmp_path, text) == text
+
+
+@pytest.mark.parametrize(
+    "name", ["../../evil", "/etc/passwd", "a\nb", "-rf", "a" * 300, "ä" * 300, "..", ".", "\0", "~"]
+)
+def test_the_files_of_a_test_stay_in_their_folder(tmp_path, name):
+    path = Output.of(tmp_path, name, True).path("loads.png")
+    assert path.parent == tmp_path and path.name.endswith("-loads.png")
+    assert path.name[0] not in "-." and len(path.name.encode()) < 200 and "\n" not in path.name
+    path.write_text("")
+
+
+def test_names_that_look_alike_as_files_stay_apart(tmp_path):
+    names = ["a/b", "a-b", "a:b", "a" * 200, "a" * 201]
+    files = [Output.of(tmp_path, name, True).prefix for name in names]
+    assert len(set(files)) == len(names) and files[1] == "a-b-"
+    assert Output.of(tmp_path, "bubble 1", True).prefix == "bubble-1-"
+
+
+BRACES = ["{index.__class__}", "{index:999999999999d}", "{index!r}", "{0}", "{index:{index}}", "{"]
+
+
+@pytest.mark.parametrize("pattern", BRACES)
+def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path, pattern):
+    text = """
+[fabric]
+thickness = 0.8
+[[bubble]]
+radius = 100
+pressures = [20]
+[bubble.data.points]
+pattern = "PATTERN"
+indices = [1]
+"""
+    path = tmp_path / "project.toml"
+    path.write_text(changed(text, ("PATTERN", pattern)))
+    complaint_with(["data.points.pattern: expected a name with {index}"], read_project, path)
+    (tmp_path / "t_{07}.csv").write_text("")
+    path.write_text(changed(text, ("PATTERN", "t_{{{index:02d}}}.csv"), ("[1]", "[7]")))
+    assert "there is no file" not in str(read_project(path).tests["bubble"])
+
+
+def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
+    monkeypatch.setattr("bubblefit.readers.names.SECONDS", 0.3)
+    begun = time.monotonic()
+    path = Path("a" * 60 + "!kPa")
+    said = complaint(number_in_name, path, PRESSURE_UNITS, "(a+)+$", "kPa", "from_name")
+    assert "from_name: the pattern '(a+)+$' takes too long" in said
+    assert time.monotonic() - begun < 20
+    pattern = r"^\w+?_(\d+(?:[.,]\d+)?)kPa"
+    assert number_in_name(
+        Path("step_35,5kPa.csv"), PRESSURE_UNITS, pattern, "kPa"
+    ) == pytest.approx(0.0355)
+
+
+def test_a_cards_text_is_no_line_of_an_export(tmp_path):
+    project = read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
+    plain = next(iter(project.cards.values())).card
+    card = MaterialCard(plain.law, plain.thickness, HOSTILE, HOSTILE)
+    write_card(card, tmp_path / "card.toml")
+    for name, kind in FORMATS.items():
+        try:
+            made = kind.export(read_card(tmp_path / "card.toml"))
+        except InputError:
+            continue
+        for text in made.files.values():
+            for line in text.splitlines():
+                assert not line.lstrip().lower().startswith(("*include", "include")), name
+                assert "\0" not in line
+
+
+def test_a_page_escapes_whatever_it_shows(tmp_path):
+    quoted = '"><img src=x onerror=alert(1)>'
+    curve = Series(HOSTILE, [0.0, 1.0], [0.0, 1.0])
+    parts = [
+        Table(HOSTILE, [HOSTILE], [[HOSTILE], [np.float64(1)]], HOSTILE),
+        Words([HOSTILE, quoted], warning=True), Facts([(HOSTILE, quoted)], quoted),
+        Download(quoted, HOSTILE, HOSTILE), Listing(HOSTILE),
+        Charts(HOSTILE, [Chart(quoted, HOSTILE, quoted, [curve])], HOSTILE),
+    ]  # fmt: skip
+    report = Report(
+        quoted, HOSTILE, facts=[(HOSTILE, quoted)], warnings=[HOSTILE],
+        sections=[Section(HOSTILE, parts)], files=[(quoted, HOSTILE)], versions={HOSTILE: quoted},
+    )  # fmt: skip
+    page = write_report(tmp_path, report).read_text()
+    assert "&lt;script&gt;alert" in page
+    for text in ("<script>alert", "<img src=x", "onerror=alert(1)>"):
+        assert text not in page

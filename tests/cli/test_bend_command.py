@@ -14,11 +14,11 @@ import pandas as pd
 import pytest
 from bubblefit.cli import progress
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
-from bubblefit.experiments.kinds import Exhibit
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.reports import prediction_page
+from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import registry
 
 from ..commands import bubblefit, in_process, interrupted, one_line, result_in

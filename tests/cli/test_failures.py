@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
-from bubblefit.experiments.kinds import Exhibit
 from bubblefit.inference import search as correction
+from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import process
 
 from ..commands import in_process, result_in

@@ -24,7 +24,7 @@ BATCH = EXAMPLES / "batch"
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory) -> dict[str, str]:
+def environment(tmp_path_factory):
     """No terminal's, no home; `bubblefit` on the PATH is this one."""
     folder = tmp_path_factory.mktemp("bin")
     command = folder / "bubblefit"
@@ -69,7 +69,7 @@ def job_of_github() -> dict[str, Any]:
     return job
 
 
-def test_github_runs_its_steps(tmp_path: Path, environment) -> None:
+def test_github_runs_its_steps(tmp_path, environment):
     job = job_of_github()
     steps = [step["run"] for step in job["steps"] if "run" in step]
     assert installs(steps[0]) and len(steps) == 4
@@ -80,12 +80,11 @@ def test_github_runs_its_steps(tmp_path: Path, environment) -> None:
         assert (tmp_path / name).exists()
 
 
-def test_gitlab_says_the_same(environment) -> None:
-    """Its lines are those of the other, so that they need not run twice."""
+def test_gitlab_says_the_same(environment):
     job = yaml.safe_load((BATCH / "gitlab-ci.yml").read_text())["fit"]
     theirs = [step["run"] for step in job_of_github()["steps"] if "run" in step]
 
-    def plain(step: str) -> str:
+    def plain(step):
         return " ".join(step.replace("\\\n", " ").split())
 
     assert [plain(s) for s in (*job["before_script"], *job["script"])] == list(map(plain, theirs))
@@ -93,7 +92,7 @@ def test_gitlab_says_the_same(environment) -> None:
     assert job["artifacts"]["paths"] == ["out", "result.json", "events.jsonl", "moduli.csv"]
 
 
-def test_the_image_starts_the_command(tmp_path: Path, environment) -> None:
+def test_the_image_starts_the_command(tmp_path, environment):
     text = (BATCH / "Containerfile").read_text()
     words = dict(re.findall(r"^(ENTRYPOINT|CMD|USER|ENV|FROM) (.*)$", text, flags=re.M))
     assert words["USER"] == "fabric" and words["FROM"].endswith("-slim")
@@ -116,7 +115,7 @@ def test_the_image_starts_the_command(tmp_path: Path, environment) -> None:
     assert (tmp_path / "fit" / "material.toml").is_file()
 
 
-def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path: Path, environment) -> None:
+def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
     folder, out = tmp_path / "nur lesen ü", tmp_path / "aus ß"
     folder.mkdir()
     shutil.copy(BATCH / "project.toml", folder / "Prüfung 1.toml")
@@ -136,7 +135,7 @@ def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path: Path, environm
     assert (out / "material.toml").is_file() and len(list(folder.iterdir())) == 1
 
 
-def test_the_documents_name_what_there_is() -> None:
+def test_the_documents_name_what_there_is():
     said = (ROOT / "docs" / "how-to" / "batch.md").read_text()
     for name in ("--events", "--json", "--fail-above", "BUBBLEFIT_CACHE", "TMPDIR"):
         assert name in said

@@ -25,7 +25,7 @@ def options_of(words: list[str]) -> dict[str, Any]:
     return command.make_context("fit", words[2:]).params
 
 
-def test_jobs_of_a_queue_are_workers_that_hold_a_licence() -> None:
+def test_jobs_of_a_queue_are_workers_that_hold_a_licence():
     jobqueue: Any = needs.library("dask_jobqueue")
     example = runpy.run_path(str(HERE / "queue_fit.py"))
     more = {
@@ -41,7 +41,7 @@ def test_jobs_of_a_queue_are_workers_that_hold_a_licence() -> None:
 
 
 @pytest.mark.parametrize("going_on", [False, True])
-def test_an_array_of_jobs_is_a_seed_each(tmp_path: Path, going_on: bool) -> None:
+def test_an_array_of_jobs_is_a_seed_each(tmp_path, going_on):
     program = tmp_path / "bubblefit"
     program.write_text('#!/bin/sh\nprintf "%s\\n" bubblefit "$@"\n')
     program.chmod(0o755)
@@ -59,7 +59,7 @@ def test_an_array_of_jobs_is_a_seed_each(tmp_path: Path, going_on: bool) -> None
     assert "#SBATCH --licenses=marc:1\n" in (HERE / "slurm.sh").read_text()
 
 
-def test_a_workflow_runs_what_the_command_takes() -> None:
+def test_a_workflow_runs_what_the_command_takes():
     text = (HERE / "Snakefile").read_text()
     shell = text[text.index("    shell:") :]
     words = "".join(re.findall(r'"(.*)"', shell))

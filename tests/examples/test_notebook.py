@@ -12,7 +12,7 @@ NOTEBOOK = EXAMPLES / "notebook" / "first-fit.ipynb"
 
 
 @pytest.mark.slow
-def test_the_notebook_runs() -> None:
+def test_the_notebook_runs():
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     before = {path.name for path in NOTEBOOK.parent.iterdir()}
     where = {"metadata": {"path": str(NOTEBOOK.parent)}}
@@ -26,7 +26,7 @@ def test_the_notebook_runs() -> None:
     assert {path.name for path in NOTEBOOK.parent.iterdir()} == before
 
 
-def test_it_names_what_the_interface_has() -> None:
+def test_it_names_what_the_interface_has():
     import bubblefit
 
     text = NOTEBOOK.read_text()

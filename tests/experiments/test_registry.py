@@ -3,11 +3,34 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from bubblefit.errors import PlugInFailure
+from bubblefit.errors import InputError, PlugInFailure
 from bubblefit.experiments import registry
+from bubblefit.experiments.keys import named_format
+from bubblefit.experiments.kinds import (
+    Doubt,
+    Expected,
+    Fabric,
+    Place,
+    beyond_card,
+    beyond_range,
+    by_strain,
+    judged,
+    notes_of,
+    notes_of_record,
+    other_thickness,
+    strains_of,
+    unstable_words,
+)
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.notes import NoteKind
+from bubblefit.solvers.base import History
 
 from ..complaints import complaint
 from ..plug_ins import install
@@ -59,3 +82,113 @@ def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, t
 def test_a_plug_in_does_not_replace_one_of_ours(packages):
     install(packages, "bubble", "raise RuntimeError", group="bubblefit.tests")
     assert kinds()["bubble"].title.startswith("a bubble")
+
+
+PLACE = Place(Path("fabric.toml"), "bubble[0]", Fabric("Valmex", 0.8))
+
+
+def test_a_format_is_checked_where_it_is_named():
+    assert named_format(PLACE, "data.points.format", "frame", None) is None
+    assert named_format(PLACE, "data.points.format", "frame", "csv") == "csv"
+    with pytest.raises(InputError) as caught:
+        named_format(PLACE, "data.points.format", "frame", "davis-9")
+    words = "fabric.toml: bubble[0].data.points.format: 'davis-9' is not one of: aramis, csv"
+    assert str(caught.value).startswith(words)
+
+
+CARD = MaterialCard(
+    HypoelasticLaw([0] * 3 + [20] + [0] * 3 + [150] + [0] * 3 + [500], 0.24, [0.1, 0.2, 0.3]), 0.81
+)
+
+
+def history(low: tuple[float, ...], high: tuple[float, ...]) -> History:
+    return History(np.ones(1), np.zeros((1, 4, 3)), np.array(low), np.array(high))
+
+
+def test_shear_counts_either_way_and_compression_does_not():
+    assert strains_of(history((-0.5, -0.6, -0.31), (0.1, 0.2, 0.25))) == pytest.approx(
+        [0.1, 0.2, 0.31]
+    )
+    assert strains_of(history((0.0, 0.0, -0.1), (0.1, 0.2, 0.3))) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_shear_beyond_the_card_is_noted_either_way():
+    for low, high in ((-0.31, 0.0), (0.0, 0.31)):
+        (note,) = notes_of(history((0.0, 0.0, low), (0.1, 0.2, high)), CARD)
+        assert note.startswith("shear strain 0.310 is beyond the card's valid range 0.300")
+
+
+def test_an_end_itself_is_within_it():
+    ends = np.array([0.1, 0.2, 0.3])
+    assert beyond_card(ends, CARD) == beyond_range(ends, ends) == []
+    assert len(beyond_card(1.001 * ends, CARD)) == len(beyond_range(1.001 * ends, ends)) == 3
+
+
+BOUNDS = Expected({"E1": (200.0, 1000.0), "E2": (100.0, 400.0)})
+
+
+@pytest.mark.parametrize(
+    ("modulus", "names", "words"),
+    [
+        (50.0, ("E1",), ""),
+        (49.9, ("E1",), "49.9 MPa, and the bounds of E1 are 200 to 1e+03"),
+        (4000.0, ("E1",), ""),
+        (4001.0, ("E1",), "4e+03 MPa, and the bounds of E1 are 200 to 1e+03"),
+        (25.0, ("E1", "E2"), ""),
+        (24.9, ("E1", "E2"), "24.9 MPa, and the bounds of E1 and E2 are 100 to 1e+03"),
+        (1601.0, ("E2",), "1.6e+03 MPa, and the bounds of E2 are 100 to 400"),
+    ],
+)
+def test_a_rough_modulus_may_be_off_by_four(modulus, names, words):
+    assert BOUNDS.outside(modulus, names) == words
+
+
+@pytest.mark.parametrize(("low", "stiffer"), [(60.0, False), (60.1, True)])
+def test_bounds_that_mean_the_warp_to_be_stiffer(low, stiffer):
+    assert Expected({"E1": (low, 1000.0), "E2": (100.0, 400.0)}).warp_is_stiffer is stiffer
+
+
+def test_what_stops_a_fit_and_what_is_noted():
+    doubts = [Doubt("a", False, "perhaps"), Doubt("b", True, "sure"), Doubt("c", True, "known"),
+              Doubt("d", True, "too")]  # fmt: skip
+    found = judged("t", doubts, ["c", "a"])
+    assert [d.name for d in found.doubts] == ["b", "c", "d", "a"]
+    assert [d.name for d in found.errors] == ["b", "d"]
+    assert [(n.kind, str(n), n.of) for n in found.notes] == [
+        (NoteKind.DOUBTFUL, "known (trusted: c)", "t"),
+        (NoteKind.DOUBTFUL, "perhaps (trusted: a)", "t"),
+    ]
+    words = complaint(found.demand, Path("p.toml"))
+    assert "sure [b]; too [d]." in words and "--trust" in words
+    judged("t", doubts, "abcd").demand(Path("p.toml"))
+
+
+def test_the_words_of_notes():
+    law = HypoelasticLaw.linear(300.0, 200.0, 5.0)
+    card = MaterialCard(HypoelasticLaw(law.beta, 0.2, [0.1, 0.2, 0.3], form=law.form), 0.8)
+    within, beyond = np.array([0.1, 0.2, 0.3]) * (1 + 9e-7), np.array([0.1, 0.21, 0.2])
+    ends = np.array([0.1, 0.2, 0.3])
+    assert beyond_card(within, card) == beyond_range(within, ends) == []
+    assert len(beyond_card(ends * (1 + 1.1e-6), card)) == 3
+    for found, kind in (
+        (beyond_card(beyond, card), NoteKind.BEYOND_CARD),
+        (beyond_range(beyond, ends), NoteKind.BEYOND_LAW),
+    ):
+        assert [note.kind for note in found] == [kind]
+        assert "fill" in found[0] and "0.210" in found[0] and "0.2" in found[0]
+    assert by_strain([1, 2, 3]) == {"warp": 1.0, "fill": 2.0, "shear": 3.0}
+    assert other_thickness(card, 0.8) == []
+    (note,) = other_thickness(card, 0.4)
+    assert note.kind is NoteKind.THICKNESS and note.endswith(
+        "with the card's moduli the fabric is 50 % softer; it was run with the card's thickness"
+    )
+    record = SimpleNamespace(strain=beyond, remarks=("made up",), unstable=("132 kPa",))
+    assert [n.kind for n in notes_of_record(record, card)] == [
+        NoteKind.SOLVER, NoteKind.BEYOND_CARD, NoteKind.UNSTABLE
+    ]  # fmt: skip
+    record.strain = None
+    assert [n.kind for n in notes_of_record(record, card)] == [NoteKind.SOLVER, NoteKind.UNSTABLE]
+    assert unstable_words(None) == unstable_words(()) == []
+    (note,) = unstable_words(("132 kPa",))
+    assert note.kind is NoteKind.UNSTABLE and note.endswith(": the model would not stay there")
+    assert "132 kPa" in note

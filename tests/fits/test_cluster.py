@@ -1,7 +1,4 @@
-"""Tasks on a Dask cluster: the same as here, whoever dies on the way.
-
-The workers are processes of this machine, started again when they die as a queue's jobs would be.
-"""
+"""Tasks on a Dask cluster: the same as here, whoever dies on the way."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -35,11 +32,12 @@ from ..counted_program import CountedSolver, seen
 for module in (sys.modules[__name__], counted_program):
     cloudpickle.register_pickle_by_value(module)
 
+
 NOBODY = "tcp://127.0.0.1:1"
 
 
 @pytest.fixture(scope="module")
-def scheduler() -> Iterator[str]:
+def scheduler():
     """The address of one with two workers."""
     distributed: Any = needs.library("distributed")
     options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
@@ -53,12 +51,7 @@ def tasks(scheduler: str, prepare: Callable[[], Any], count: int, **more: Any) -
     return [record for record in told if record is not None]
 
 
-# Results
-
-
-def test_a_fit_on_a_cluster_is_the_fit_here(
-    scheduler: str, together: bf.Fit, strips_project: bf.Project, tmp_path: Path
-) -> None:
+def test_a_fit_on_a_cluster_is_the_fit_here(scheduler, together, strips_project, tmp_path):
     fitted = bf.fit(strips_project, scheduler=scheduler, out=tmp_path / "out")
     here = bf.fit(strips_project, jobs=1, out=tmp_path / "here")
     history = [(tmp_path / name / "history.csv").read_bytes() for name in ("out", "here")]
@@ -67,9 +60,9 @@ def test_a_fit_on_a_cluster_is_the_fit_here(
     assert fitted.law.beta.tolist() == here.law.beta.tolist()
 
 
-def test_what_a_task_tells_comes_once_and_before_its_end(scheduler: str) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> int:
+def test_what_a_task_tells_comes_once_and_before_its_end(scheduler):
+    def prepare():
+        def task(number, tell):
             for k in range(2):
                 tell((number, k))
             return number
@@ -83,11 +76,11 @@ def test_what_a_task_tells_comes_once_and_before_its_end(scheduler: str) -> None
         assert records[at : at + 3] == [(number, 0), (number, 1), number]
 
 
-def test_it_is_got_ready_once_a_worker(scheduler: str) -> None:
-    def prepare() -> Any:
+def test_it_is_got_ready_once_a_worker(scheduler):
+    def prepare():
         made = [os.getpid(), 0]
 
-        def task(number: int, tell: Any) -> list[int]:
+        def task(number, tell):
             made[1] += 1
             return list(made)
 
@@ -101,8 +94,8 @@ def test_it_is_got_ready_once_a_worker(scheduler: str) -> None:
         assert sorted(own) == list(range(1, len(own) + 1))
 
 
-def test_what_a_worker_announces_is_heard_here(scheduler: str) -> None:
-    def prepare() -> Any:
+def test_what_a_worker_announces_is_heard_here(scheduler):
+    def prepare():
         return lambda number, tell: announce("waiting", f"run {number}") or time.sleep(0.5) or 1
 
     heard: list[Announcement] = []
@@ -111,7 +104,7 @@ def test_what_a_worker_announces_is_heard_here(scheduler: str) -> None:
     assert Announcement("waiting", "run 0") in heard
 
 
-def test_no_more_at_once_than_asked_for(scheduler: str, tmp_path: Path) -> None:
+def test_no_more_at_once_than_asked_for(scheduler, tmp_path):
     executor = Executor(1, scheduler)
     folder = tmp_path / "runs"
     list(executor.run_tasks(lambda: solving(CountedSolver(folder)), range(4)))
@@ -122,12 +115,9 @@ def solving(solver: Any) -> Any:
     return lambda number, tell: solver.run(number, None)
 
 
-# Whoever dies
-
-
-def test_a_worker_that_dies_costs_its_run_only(scheduler: str, tmp_path: Path) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> int:
+def test_a_worker_that_dies_costs_its_run_only(scheduler, tmp_path):
+    def prepare():
+        def task(number, tell):
             tell(("begun", number))
             if number == 3 and not (tmp_path / "died").exists():
                 (tmp_path / "died").touch()
@@ -147,9 +137,9 @@ def test_a_worker_that_dies_costs_its_run_only(scheduler: str, tmp_path: Path) -
     assert words.endswith(" died; task 3 of the starts is done again elsewhere")
 
 
-def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler: str, tmp_path: Path) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> int:
+def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
+    def prepare():
+        def task(number, tell):
             if number == 1:
                 with (tmp_path / "tries").open("a") as file:
                     file.write("x")
@@ -165,8 +155,8 @@ def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler: str, tmp_pa
     assert (tmp_path / "tries").read_text() == "xxx"
 
 
-def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch) -> None:
-    def lose(self: Any, prepare: Any, numbers: Any, what: str, lost: Any) -> Any:
+def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch):
+    def lose(self, prepare, numbers, what, lost):
         return iter([lost(number, "3 workers died of it") for number in numbers])
 
     monkeypatch.setattr(Executor, "run_tasks", lambda self, p, n, lost: lose(self, p, n, "", lost))
@@ -178,9 +168,9 @@ def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch) -> None:
     )  # fmt: skip
 
 
-def test_an_error_of_a_task_is_an_error_here(scheduler: str) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> int:
+def test_an_error_of_a_task_is_an_error_here(scheduler):
+    def prepare():
+        def task(number, tell):
             raise InputError("mesh.vtu", "quads", "made to fail")
 
         return task
@@ -190,7 +180,7 @@ def test_an_error_of_a_task_is_an_error_here(scheduler: str) -> None:
     assert caught.value.field == "quads"
 
 
-def test_a_scheduler_that_goes_is_an_error_soon() -> None:
+def test_a_scheduler_that_goes_is_an_error_soon():
     distributed: Any = needs.library("distributed")
     options = {"n_workers": 1, "processes": False, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(**options) as local:
@@ -206,9 +196,9 @@ def test_a_scheduler_that_goes_is_an_error_soon() -> None:
     assert time.monotonic() - begun < 10 and end.value.exit_code == 4
 
 
-def test_programs_end_when_nobody_wants_their_results(scheduler: str, tmp_path: Path) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> int:
+def test_programs_end_when_nobody_wants_their_results(scheduler, tmp_path):
+    def prepare():
+        def task(number, tell):
             script = f"echo $$ > {tmp_path}/{number}.pid; exec sleep 60"
             run_process(["sh", "-c", script], tmp_path, tmp_path / f"{number}.log")
             return number
@@ -223,9 +213,9 @@ def test_programs_end_when_nobody_wants_their_results(scheduler: str, tmp_path: 
         wait_for(lambda path=path: not Path(f"/proc/{path.read_text().strip()}").exists())
 
 
-def test_a_task_ends_at_its_next_word_when_nobody_wants_it(scheduler: str, tmp_path: Path) -> None:
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> None:
+def test_a_task_ends_at_its_next_word_when_nobody_wants_it(scheduler, tmp_path):
+    def prepare():
+        def task(number, tell):
             for _ in range(600):
                 (tmp_path / "alive").touch()
                 time.sleep(0.05)
@@ -240,21 +230,14 @@ def test_a_task_ends_at_its_next_word_when_nobody_wants_it(scheduler: str, tmp_p
     wait_for(lambda: time.time() - alive.stat().st_mtime > 1.0)
 
 
-# Who is used
-
-
-def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) -> None:
+def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
     ours = cluster.version()
     others = {
         "bubblefit": (ours[0], "0.1.9", ours[2]),
         "Python": ("3.9.1", *ours[1:]),
         "code": (*ours[:2], "other"),
     }
-    words = {
-        "bubblefit": f"it has bubblefit {ours[1]}, here it is 0.1.9",
-        "Python": f"it has Python {ours[0]}, here it is 3.9.1",
-        "code": "it has another code of bubblefit",
-    }
+    words = {"bubblefit": "0.1.9", "Python": "3.9.1", "code": "another code"}
     for what, other in others.items():
         monkeypatch.setattr(cluster, "version", lambda other=other: other)
         heard: list[Announcement] = []
@@ -264,8 +247,7 @@ def test_a_worker_of_another_version_is_not_used(scheduler: str, monkeypatch) ->
         assert sum("is not used" in one.words for one in heard) == 2
 
 
-def test_the_code_counts_by_content(tmp_path: Path, monkeypatch) -> None:
-    """In whatever room it is; tests, documents and what has been compiled do not."""
+def test_the_code_counts_by_content(tmp_path, monkeypatch):
     files = {name: tmp_path / name for name in
              ("errors.py", "runs/starts.py", "templates/marc/deck.j2", "tests/test_a.py",
               "docs/make_api.py", "fits/__pycache__/start.pyc")}  # fmt: skip
@@ -283,9 +265,9 @@ def test_the_code_counts_by_content(tmp_path: Path, monkeypatch) -> None:
     assert cluster.version()[2] == cluster._code()
 
 
-def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> None:
+def test_a_worker_without_bubblefit_is_not_used(scheduler, monkeypatch):
     class Elsewhere:
-        def __reduce__(self) -> Any:
+        def __reduce__(self):
             return __import__, ("no_such_module",)
 
     monkeypatch.setattr(cluster, "version", Elsewhere)
@@ -293,7 +275,7 @@ def test_a_worker_without_bubblefit_is_not_used(scheduler: str, monkeypatch) -> 
     assert "it has no bubblefit of this version (" in said
 
 
-def test_workers_that_come_later_are_waited_for_and_used() -> None:
+def test_workers_that_come_later_are_waited_for_and_used():
     distributed: Any = needs.library("distributed")
     options = {"processes": False, "dashboard_address": ":0", "silence_logs": 50}
     heard: list[Announcement] = []
@@ -308,9 +290,7 @@ def test_workers_that_come_later_are_waited_for_and_used() -> None:
         assert heard[-1] == Announcement("", heard[0].of)
 
 
-def test_without_a_scheduler_the_command_ends_at_once(
-    strips_project: bf.Project, tmp_path: Path, monkeypatch
-) -> None:
+def test_without_a_scheduler_the_command_ends_at_once(strips_project, tmp_path, monkeypatch):
     begun = time.monotonic()
     arguments = ("fit", strips_project.path, "--out", tmp_path / "out")
     done = in_process(*arguments, "--scheduler", NOBODY, cwd=tmp_path, code=2)
@@ -322,20 +302,16 @@ def test_without_a_scheduler_the_command_ends_at_once(
     assert "no Dask scheduler answers at nonsense://x" in done.stderr
 
 
-def test_without_dask_the_extra_is_named(monkeypatch) -> None:
+def test_without_dask_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     said = complaint(check, NOBODY)
     assert said == "--scheduler: Dask is not installed; pip install 'bubblefit[cluster]'"
 
 
-# Licences
-
-
-def test_a_scheduler_counts_licences(scheduler: str, tmp_path: Path) -> None:
-    """Every worker locks files of its own here: nobody but the scheduler counts."""
+def test_a_scheduler_counts_licences(scheduler, tmp_path):
     runs = tmp_path / "runs"
 
-    def prepare() -> Any:
+    def prepare():
         given = {
             "licences": 1, "licence_folder": str(tmp_path / f"locks-{os.getpid()}"),
             "licence_scheduler": scheduler,
@@ -348,19 +324,17 @@ def test_a_scheduler_counts_licences(scheduler: str, tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("locks-*"))) == 2
 
 
-def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(
-    scheduler: str, tmp_path: Path
-) -> None:
+def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(scheduler, tmp_path):
     runs, given = tmp_path / "runs", {"licences": 2, "licence_folder": str(tmp_path / "locks")}
 
-    def end_with_program() -> None:
+    def end_with_program():
         log = runs / "log"
         while not (log.exists() and "begin 0 " in log.read_text()):
             time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGKILL)
 
-    def prepare() -> Any:
-        def task(number: int, tell: Any) -> Any:
+    def prepare():
+        def task(number, tell):
             dies = number == 0 and not (tmp_path / "died").exists()
             if dies:
                 (tmp_path / "died").touch()
@@ -382,8 +356,8 @@ def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(
     assert set(found.ended.values()) == {1} and len(found.ended) == 16
 
 
-def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path) -> None:
-    def take(count: int) -> None:
+def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
+    def take(count):
         given = licences.licence_settings(
             "acme", {"licences": count, "licence_folder": str(tmp_path)}
         )
@@ -394,10 +368,7 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler: str, tmp_path: Path
     assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
 
 
-def test_no_licence_is_leased_where_nobody_answers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Nor is one kept from others on this machine; a scheduler that goes takes its leases along."""
+def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
     monkeypatch.setattr(licences, "CONNECT_S", 1.0)
     distributed: Any = needs.library("distributed")
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
@@ -414,7 +385,7 @@ def test_no_licence_is_leased_where_nobody_answers(
         pass
 
 
-def test_a_fit_hands_its_scheduler_to_the_solver(strips_project: bf.Project) -> None:
+def test_a_fit_hands_its_scheduler_to_the_solver(strips_project):
     project = strips_project.with_scheduler("tcp://there:1")
     assert executor_of(project).scheduler == project.options_of("marc")["licence_scheduler"]
     assert "licence_scheduler" not in strips_project.options_of("marc")

@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import time
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.experiments import registry as kinds_of_test
+from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
-from bubblefit.experiments.kinds import Exhibit, RunRecord, notes_of_record
+from bubblefit.experiments.kinds import Output, PredictedRun, RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import FEW
+from bubblefit.notes import FEW, Note, NoteKind, rows
+from bubblefit.project import project as project_module
 from bubblefit.project.project import Project, chosen_cards, read_project
+from bubblefit.reports import prediction_page
+from bubblefit.reports.content import Exhibit, Report, Words
+from bubblefit.reports.html import percent
 from bubblefit.reports.style import NAMED
 from bubblefit.runs import executor
-from bubblefit.runs.predictions import Predictions, RunEvent, predict
+from bubblefit.runs import predictions as prediction_result
+from bubblefit.runs import predictions as predictions_module
+from bubblefit.runs.predictions import Predictions, RunEvent, measured_tests, predict
+from bubblefit.runs.record import versions
+from bubblefit.runs.simulation import simulate, simulate_cards
 from bubblefit.solvers import registry
-from matplotlib.figure import Figure
+from bubblefit.solvers.base import History
 
+from ..bars import BarTest, project_of
 from ..complaints import complaint
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
 from ..drawings import lines
@@ -32,12 +46,12 @@ TESTS = ("150 mm, 90 kPa", "high")
 
 
 @pytest.fixture(autouse=True)
-def formula(monkeypatch: pytest.MonkeyPatch) -> None:
+def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
 
 
 @pytest.fixture
-def project(tmp_path: Path) -> Project:
+def project(tmp_path):
     return read_project(write_project(tmp_path))
 
 
@@ -49,7 +63,7 @@ def without_cards(folder: Path) -> Project:
     return read_project(path)
 
 
-def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
+def test_every_test_with_every_card(project, tmp_path):
     events: list[RunEvent | None] = []
     done = predict(project, jobs=1, progress=events.append)
     runs, curves = done.runs(), done.curves()
@@ -72,9 +86,7 @@ def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
     assert done.worst is None and done.silent() == []
 
 
-def test_figures_show_the_curves_of_the_table(
-    project: Project, tmp_path: Path, drawn: list[Figure]
-) -> None:
+def test_figures_show_the_curves_of_the_table(project, tmp_path, drawn):
     done = predict(project, ["high"], jobs=1)
     done.report(tmp_path / "out")
     curves = done.curves()
@@ -89,7 +101,7 @@ def test_figures_show_the_curves_of_the_table(
         assert gas[0] == pytest.approx((volume - volume[0]) / 1e6)
 
 
-def test_tests_and_cards_by_name(project: Project) -> None:
+def test_tests_and_cards_by_name(project):
     done = predict(project, ["high"], ["stiff"], jobs=1)
     assert [(run.test.name, run.card) for run in done.each] == [("high", "stiff")]
     mine = MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.81)
@@ -98,9 +110,7 @@ def test_tests_and_cards_by_name(project: Project) -> None:
     assert "there is no test 'low'" in complaint(predict, project, ["low"])
 
 
-def test_the_card_just_fitted_where_there_is_no_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_card_just_fitted_where_there_is_no_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "fabric").mkdir()
     project = without_cards(tmp_path / "fabric")
@@ -116,7 +126,7 @@ def test_the_card_just_fitted_where_there_is_no_other(
     assert list(chosen_cards(read_project(write_project(tmp_path)))) == list(CARDS)
 
 
-def test_what_is_there_is_not_run_again(project: Project, tmp_path: Path) -> None:
+def test_what_is_there_is_not_run_again(project, tmp_path):
     first = predict(project, ["high"], jobs=1, out=tmp_path / "out")
     events: list[RunEvent | None] = []
     again = predict(project, jobs=1, out=tmp_path / "out", resume=True, progress=events.append)
@@ -128,7 +138,7 @@ def test_what_is_there_is_not_run_again(project: Project, tmp_path: Path) -> Non
         predict(project, jobs=1, out=tmp_path / "none", resume=True)
 
 
-def test_nothing_is_written_over_unless_it_is_asked_for(project: Project, tmp_path: Path) -> None:
+def test_nothing_is_written_over_unless_it_is_asked_for(project, tmp_path):
     predict(project, ["high"], jobs=1, out=tmp_path / "out")
     with pytest.raises(OutputError, match="--resume"):
         predict(project, ["high"], jobs=1, out=tmp_path / "out")
@@ -140,7 +150,7 @@ def test_nothing_is_written_over_unless_it_is_asked_for(project: Project, tmp_pa
     assert again.record is not None and len(again.record.runs) == 2
 
 
-def test_seconds_are_those_that_it_took(project: Project) -> None:
+def test_seconds_are_those_that_it_took(project):
     begun = time.perf_counter()
     done = predict(project, ["high"], jobs=1)
     took = time.perf_counter() - begun
@@ -149,12 +159,11 @@ def test_seconds_are_those_that_it_took(project: Project) -> None:
 
 
 @pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])
-def test_processes(project: Project, monkeypatch, asked, said, some: int) -> None:
-    """As asked for, else as the project says, else as many as there are cores; time is told."""
+def test_processes(project, monkeypatch, asked, said, some):
     told: list[tuple[int, str]] = []
     events: list[RunEvent | None] = []
 
-    def side_by_side(prepare, numbers, jobs: int, what: str):
+    def side_by_side(prepare, numbers, jobs, what):
         told.append((jobs, what))
         run = prepare()
         yield None
@@ -167,14 +176,14 @@ def test_processes(project: Project, monkeypatch, asked, said, some: int) -> Non
     assert [event is None for event in events] == [False, True, False, False]
 
 
-def test_a_thickness_that_makes_no_model_names_test_and_card(project: Project) -> None:
+def test_a_thickness_that_makes_no_model_names_test_and_card(project):
     card = MaterialCard(HypoelasticLaw.linear(500.0, 150.0, 20.0), 0.0)
     said = complaint(predict, project, ["high"], {"of nothing": card}, jobs=1)
     assert said.startswith(f"{project.path}: 'high' with card 'of nothing', ")
 
 
-def test_an_interrupt_leaves_what_ended(project: Project, tmp_path: Path) -> None:
-    def interrupt(event: RunEvent | None) -> None:
+def test_an_interrupt_leaves_what_ended(project, tmp_path):
+    def interrupt(event):
         if event is not None and event.done == 2:
             raise KeyboardInterrupt
 
@@ -185,7 +194,7 @@ def test_an_interrupt_leaves_what_ended(project: Project, tmp_path: Path) -> Non
     assert len(predict(project, jobs=1, out=tmp_path / "out", resume=True).each) == 4
 
 
-def test_measured_tests_that_say_nothing(tmp_path: Path) -> None:
+def test_measured_tests_that_say_nothing(tmp_path):
     write_readings(tmp_path / "a.csv", noise=0.02)
     path = write_project(tmp_path, 'measured.files = ["a.csv"]', soft=FAILS)
     done = predict(read_project(path), jobs=1)
@@ -196,7 +205,7 @@ def test_measured_tests_that_say_nothing(tmp_path: Path) -> None:
         predict(read_project(path), cards=["soft"], jobs=1)
 
 
-def test_a_card_runs_with_its_own_thickness(project: Project) -> None:
+def test_a_card_runs_with_its_own_thickness(project):
     """Not with the fabric's of 0.81 mm: the card's moduli are those of the card's thickness."""
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     cards = {f"{t} mm": MaterialCard(law, t) for t in (0.81, 0.9)}
@@ -208,8 +217,7 @@ def test_a_card_runs_with_its_own_thickness(project: Project) -> None:
     assert thick > 1.05 * thin
 
 
-def test_notes_stand_wherever_a_run_does(project: Project, tmp_path: Path, monkeypatch) -> None:
-    """On the terminal, on the page, in the table and in result.json."""
+def test_notes_stand_wherever_a_run_does(project, tmp_path, monkeypatch):
     monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     short = replace(law, strain_range=np.array([0.3, 0.01, 0.3]))
@@ -227,7 +235,7 @@ def test_notes_stand_wherever_a_run_does(project: Project, tmp_path: Path, monke
             assert note in page and note in lines
 
 
-def test_notes_that_many_share_are_one_line(project: Project) -> None:
+def test_notes_that_many_share_are_one_line(project):
     done = predict(project, jobs=1)
     many = [
         replace(run, notes=(f"snaps between {i} and {i + 1.5} kPa", "the same"))
@@ -238,7 +246,7 @@ def test_notes_that_many_share_are_one_line(project: Project) -> None:
     assert "8 times" in lines[0] and "snaps between 0 and 1.5 kPa" in lines[0]
 
 
-def test_every_kind_of_note() -> None:
+def test_every_kind_of_note():
     card = MaterialCard(
         HypoelasticLaw([0] * 3 + [20] + [0] * 3 + [150] + [0] * 3 + [500], 0.24, [0.1, 0.2, 0.3]),
         0.81,
@@ -253,12 +261,338 @@ def test_every_kind_of_note() -> None:
     assert notes_of_record(RunRecord(1.0, "failed"), card) == []
 
 
-def test_an_early_end_is_a_result_with_its_reason(tmp_path: Path) -> None:
+def test_an_early_end_is_a_result_with_its_reason(tmp_path):
     done = predict(read_project(write_project(tmp_path, soft=STOPS)), jobs=1, out=tmp_path / "out")
-    assert done.ended(0) == "stopped at 120 of 240 mm: the run stopped early: so asked"
+    reason = done.ended(0)
+    assert "120 of 240 mm" in reason and "so asked" in reason
     assert len(list((tmp_path / "out" / "runs").glob("*.npz"))) == 4
     done.report(tmp_path / "out")
-    reason = "stopped at 120 of 240 mm: the run stopped early: so asked"
     assert reason in (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
     assert reason in "\n".join(done.lines())
     assert pd.read_csv(tmp_path / "out" / "runs.csv")["ended"][0] == reason
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    monkeypatch.setattr(cylinders, "draw_figures", lambda *_: [("loads.png", "loads")])
+    monkeypatch.setattr(cylinders, "write_beams", lambda *_: [("a.vtu", "a beam")])
+
+
+@pytest.fixture
+def seen(monkeypatch, no_pictures):
+    reports: list[Report] = []
+
+    def keep(folder, report):
+        reports.append(report)
+        return folder / "report.html"
+
+    monkeypatch.setattr(prediction_page, "write_report", keep)
+    return reports
+
+
+def predictions(folder: Path, soft: float, measured: bool) -> Predictions:
+    write_readings(folder / "a.csv", noise=0.02)
+    first = 'measured.files = ["a.csv"]' if measured else ""
+    done = predict(read_project(write_project(folder, first, soft)), jobs=1)
+    # Two notes of one run, and seconds that can be told from others.
+    each = [
+        replace(run, record=replace(run.record, seconds=2.0 + i)) for i, run in enumerate(done.each)
+    ]
+    each[1] = replace(each[1], notes=("made up", Note(NoteKind.SNAP, "also")))
+    return Predictions(done.project, tuple(each), 30.0)
+
+
+def test_failures_errors_and_notes(tmp_path, seen):
+    done = predictions(tmp_path, FAILS, measured=True)
+    done.report(tmp_path / "out")
+    (found,) = seen
+    (worst,) = [e for i in range(4) if (e := done.error(i)) is not None]
+    assert done.worst == worst and done.failed() == [0, 2] and done.silent() == [0]
+    assert percent(worst) in found.summary and "2 of 4 runs" in found.summary
+    shown = dict(found.facts)
+    assert (shown["tests"], shown["cards"], shown["seconds of all runs"]) == (2, 2, 14.0)
+    assert (shown["wall time, s"], shown["length, mm"], shown["span, mm"]) == (30.0, 3000.0, 2000.0)
+    assert len(found.warnings) == 2 and all("failed: made to" in line for line in found.warnings)
+    sure = next(part for part in found.parts if isinstance(part, Words))
+    assert len(sure.lines) == 6 and sum("Assumed" in line for line in sure.lines) == 5
+    assert [table.title for table in found.tables] == ["Runs", "Against measured loads", "Notes"]
+    assert [row[:3] for row in found.tables[-1].rows] == [
+        ["150 mm, 90 kPa", "stiff", "of the solver"], ["150 mm, 90 kPa", "stiff", "snap"],
+        ["high", "stiff", "of the solver"],
+    ]  # fmt: skip
+    assert [name for name, _ in found.files] == [
+        "runs.csv", "notes.csv", "result.json", "load_deflection.csv", "measured.csv", "a.vtu"
+    ]  # fmt: skip
+    assert found.versions == versions()
+
+
+def test_nothing_to_tell(tmp_path, seen):
+    done = predictions(tmp_path, STOPS, measured=False)
+    quiet = Predictions(done.project, tuple(replace(run, notes=()) for run in done.each), 30.0)
+    quiet.report(tmp_path / "out")
+    (found,) = seen
+    assert len(found.warnings) == 2 and all("120 of 240" in line for line in found.warnings)
+    assert [table.title for table in found.tables] == ["Runs"]
+    assert quiet.worst is None and not quiet.failed() and not quiet.silent()
+
+
+def test_result_json(tmp_path):
+    done = predictions(tmp_path, FAILS, measured=True)
+    result = dict(done.result)
+    runs, tests = result.pop("runs"), result.pop("tests")
+    assert result.pop("notes") == rows(done.notes)
+    assert result == {
+        "command": "predict", "title": "Tubes", "solver": "formula", "cards": ["soft", "stiff"],
+        "walls": [], "worst_relative_error": done.worst, "wall_s": 30.0, "cached_runs": 0,
+        "versions": versions(),
+    }  # fmt: skip
+    assert runs[0] == {
+        "test": "150 mm, 90 kPa", "card": "soft", "wall": "", "predicted": True,
+        "ended": "failed: made to fail", "marks": [], "seconds": 2.0,
+    }  # fmt: skip
+    assert [run["marks"] for run in runs[1:]] == [["snap"], [], []]
+    told = ("card", "ended", "seconds", "iterations", "warnings")
+    assert {key: runs[1][key] for key in told} == {
+        "card": "stiff", "ended": "finished", "seconds": 3.0, "iterations": 0,
+        "warnings": ["made up", "also"],
+    }  # fmt: skip
+    assert runs[1]["error"]["relative"] == done.worst and runs[3]["error"] is None
+    assert tests["high"] == {
+        "kind": "cylinder", "diameter_mm": 150.0, "pressure_kPa": pytest.approx(140.0),
+        "length_mm": 3000.0, "seam_width_mm": 40.0, "element_size_mm": 40.0, "symmetry": "quarter",
+        "supports": {"span": 2000.0, "diameter": 100.0},
+        "collar": {"inner_diameter": 240.0, "length": 145.0, "fillet": 10.0},
+        "places_mm": {"40 mm": 40.0, "100 mm": 100.0, "240 mm": 240.0}, "slope_over_mm": 20.0,
+        "repetitions": 0,
+    }  # fmt: skip
+    assert tests["150 mm, 90 kPa"]["repetitions"] == 2
+    table = done.runs()
+    assert table["notes"].tolist() == ["", "made up; also", "", "made up"]
+    assert table["seconds"].tolist() == [2.0, 3.0, 4.0, 5.0]
+    assert done.lines()[-3:] == [
+        "note: 150 mm, 90 kPa with stiff: made up",
+        "note: high with stiff: made up",
+        "note: 150 mm, 90 kPa with stiff: also",
+    ]
+
+
+@dataclass(frozen=True)
+class Strut:
+    """A bar that is pulled by so many mm per mm."""
+
+    strain: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class StrutTest:
+    name: str
+    kind: str = "strut"
+
+    def models(self, thickness: float = 1.0) -> Mapping[str, Strut]:
+        return {"strut": Strut(0.01, thickness)}
+
+
+class StrutOutcome:
+    """Force of a strut, beside 5 N that were measured."""
+
+    def __init__(self, runs: Sequence[PredictedRun]) -> None:
+        self.forces = [float(run.record.arrays["force"][0]) for run in runs]
+
+    def ended(self, number: int) -> str:
+        return "finished"
+
+    def error(self, number: int) -> float:
+        return abs(self.forces[number] / 5.0 - 1.0)
+
+    def numbers(self, number: int) -> Mapping[str, Any]:
+        return {"force_N": self.forces[number]}
+
+    columns = numbers
+
+    def curve(self, number: int) -> pd.DataFrame:
+        return pd.DataFrame({"force_N": [self.forces[number]]})
+
+    def test_numbers(self, test):
+        return {"measured_N": 5.0}
+
+    def lines(self) -> Sequence[str]:
+        return [f"struts: {self.forces}"]
+
+    def show(self, out: Output) -> Exhibit:
+        out.path("struts.txt").parent.mkdir(parents=True, exist_ok=True)
+        out.path("struts.txt").write_text("struts")
+        return Exhibit([("struts", len(self.forces))], files=[(out.name("struts.txt"), "struts")])
+
+
+class StrutKind:
+    name, title, fitted, studied = "strut", "a strut", False, None
+    outcome = StrutOutcome
+
+    @property
+    def predicted(self) -> StrutKind:
+        return self
+
+    def depends_on(self, model: Strut) -> Sequence[object]:
+        return (model,)
+
+    def arrays(self, model: Strut, history: History) -> Mapping[str, np.ndarray]:
+        return {"force": history.load}
+
+    def early(self, model: Strut, history: History) -> str:
+        return history.early
+
+    def measured(self, test: StrutTest) -> bool:
+        return True
+
+
+class Both(Formula):
+    """Also pulls struts."""
+
+    def run(self, model: Any, law: HypoelasticLaw, *rest: Any, **named: Any) -> History:
+        if not isinstance(model, Strut):
+            return super().run(model, law, *rest, **named)
+        force = law.beta[11] * model.strain * model.thickness
+        strain = np.array([model.strain, 0.0, 0.0])
+        return History(np.array([force]), np.zeros((1, 1, 3)), np.zeros(3), strain)
+
+
+@pytest.fixture
+def mixed(tmp_path, monkeypatch):
+    """A project of two cylinders and a strut."""
+    kind, ours = StrutKind(), kinds_of_test.kind_named
+
+    def kind_named(name):
+        return kind if name == "strut" else ours(name)
+
+    for module in (prediction_result, predictions_module):
+        monkeypatch.setattr(module, "kind_named", kind_named)
+    monkeypatch.setitem(registry.SOLVERS, "formula", Both)
+    read = read_project(write_project(tmp_path))
+    known = {**kinds_of_test.kinds(), "strut": kind}
+    monkeypatch.setattr(project_module, "kinds", lambda: known)
+    return replace(read, tests={"pulled": StrutTest("pulled"), **read.tests})
+
+
+def test_two_kinds_in_one_series(mixed, tmp_path):
+    done = predict(mixed, jobs=1, out=tmp_path / "out")
+    assert [run.test.name for run in done.each][:2] == ["pulled"] * 2 and len(done.each) == 6
+    forces = [0.01 * e1 * 0.81 for e1 in (500.0, 900.0)]
+    runs = done.runs()
+    np.testing.assert_allclose(runs["force_N"][:2], forces)
+    assert runs["force_N"][2:].isna().all() and runs["stiffness_N_per_mm"][2:].notna().all()
+    assert done.worst == pytest.approx(max(abs(f / 5 - 1) for f in forces))
+    done.report(tmp_path / "out")
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["tests"]["pulled"] == {"kind": "strut", "measured_N": 5.0}
+    said = [run.get("force_N") for run in result["runs"]]
+    assert said[:2] == pytest.approx(forces) and said[2:] == [None] * 4
+    # Each kind has a folder of its own.
+    assert (tmp_path / "out" / "strut" / "struts.txt").is_file()
+    assert (tmp_path / "out" / "cylinder" / "figures" / "all-loads.png").is_file()
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<td>strut/struts.txt</td>" in page
+    assert '"labels":["deflection of the collar, mm","load, N"]' in page
+    events: list[Any] = []
+    predict(mixed, jobs=1, out=tmp_path / "out", resume=True, progress=events.append)
+    assert all(event.again for event in events if event is not None and event.run is not None)
+
+
+def test_one_kind_of_two(mixed):
+    assert [t.name for t in measured_tests(mixed)] == ["pulled"]
+    done = predict(mixed, "strut", jobs=1)
+    assert {run.test.kind for run in done.each} == {"strut"}
+    assert done.lines() == [f"struts: {[0.01 * 500.0 * 0.81, 0.01 * 900.0 * 0.81]}"]
+
+
+def test_a_kind_that_is_neither_fitted_nor_predicted(mixed, monkeypatch):
+    monkeypatch.setattr(StrutKind, "predicted", None)
+    assert "no card is judged on these tests: pulled" in complaint(predict, mixed, "pulled")
+    assert len(predict(mixed, jobs=1).each) == 4
+
+
+CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
+THICK = MaterialCard(CARD.law, 1.0, "thick")
+
+
+def test_one_card_in_one_test(bars):
+    histories = simulate(BarTest("a bar", ("warp", "fill")), THICK, solver="bars")
+    assert list(histories) == ["warp", "fill"]
+    half = simulate(BarTest("a bar"), CARD, solver="bars")["warp"]
+    np.testing.assert_allclose(histories["warp"].load, 2 * half.load)
+    assert {model.thickness for model in bars.seen} == {0.5, 1.0}
+
+
+def test_cards_in_tests(bars, tmp_path):
+    tests, steps = [BarTest("one", ("warp", "fill")), BarTest("two")], []
+    cards = {"soft": CARD, "thick": THICK}
+    done = simulate_cards(project_of(*tests), tests, cards, tmp_path, progress=steps.append)
+    text = (tmp_path / "result.json").read_text()
+    assert text == json.dumps(done.numbers, indent=1) + "\n"
+    assert list(done.numbers["tests"]) == ["one", "two"] and "cards" not in done.numbers
+    soft, thick = done.numbers["tests"]["two"]["cards"].values()
+    assert thick["warp"] == pytest.approx(2 * soft["warp"])
+    # Each test has files of its own.
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "one-bars.txt", "two-bars.txt", "notes.csv", "result.json"
+    }  # fmt: skip
+    assert steps[0].analyses == 6 and steps[-1].analysis == 6
+    (note,) = done.numbers["notes"]
+    assert note["of"] == "thick" and "1 mm" in note["note"] and "0.5 mm" in note["note"]
+    assert done.lines[-1] == f"note: thick: {note['note']}" and "one: soft: pulled" in done.lines
+
+
+def test_numbers_of_a_single_test_stand_at_the_top(bars, tmp_path):
+    tests = [BarTest("a bar")]
+    done = simulate_cards(project_of(*tests), tests, {"soft": CARD}, tmp_path, command="mine")
+    assert done.numbers["cards"] == done.numbers["tests"]["a bar"]["cards"]
+    assert done.numbers["command"] == "mine" and done.numbers["solver"] == "bars"
+    assert (tmp_path / "bars.txt").exists() and list(done.lines) == ["soft: pulled"]
+
+
+def test_a_card_that_fails_is_left_out(bars, tmp_path):
+    bars.law_fails = lambda law: law.nu12 > 0.3
+    stiff = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.4), 0.5, "stiff")
+    tests = [BarTest("a bar")]
+    done = simulate_cards(project_of(*tests), tests, {"soft": CARD, "stiff": stiff}, tmp_path)
+    assert done.numbers["cards"]["stiff"] == {"warp": "the bar breaks"}
+    with pytest.raises(SolverFailure, match="the bar breaks"):
+        simulate_cards(project_of(*tests), tests, {"stiff": stiff}, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+def test_notes_of_failures_name_test_card_and_part(bars, tmp_path):
+    bars.law_fails = lambda law: law.nu12 > 0.3
+    stiff = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.4), 0.5, "stiff")
+    cards = {"soft": CARD, "stiff": stiff}
+
+    def said(*tests):
+        done = simulate_cards(project_of(*tests), list(tests), cards, tmp_path)
+        assert {note["kind"] for note in done.numbers["notes"]} == {"failed"}
+        written = (tmp_path / "notes.csv").read_text()
+        lines = [f"{note['of']}: {note['note']}" for note in done.numbers["notes"]]
+        assert all(note["of"] in written for note in done.numbers["notes"])
+        assert done.lines[-len(lines) :] == [f"note: {line}" for line in lines]
+        return lines
+
+    for tests, of in (
+        ([BarTest("a bar")], ["stiff"]),
+        ([BarTest("a bar", ("warp", "fill"))], ["stiff, warp", "stiff, fill"]),
+        ([BarTest("one"), BarTest("two", ("warp", "fill"))],
+         ["one, stiff", "two, stiff, warp", "two, stiff, fill"]),
+    ):  # fmt: skip
+        assert said(*tests) == [f"{one}: the bar breaks" for one in of]
+
+
+def test_progress_names_card_and_part(bars, tmp_path):
+    tests, steps = [BarTest("a bar", ("warp", "fill"))], []
+    simulate_cards(project_of(*tests), tests, {"soft": CARD}, tmp_path, progress=steps.append)
+    assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps] == [
+        ("soft, warp", 1, 2, 0.0, 0), ("soft, warp", 1, 2, 4.0, 0),
+        ("soft, fill", 2, 2, 0.0, 0), ("soft, fill", 2, 2, 4.0, 0),
+    ]  # fmt: skip
+
+
+def test_a_solver_that_there_is_not():
+    with pytest.raises(InputError, match="nowhere"):
+        simulate(BarTest("a bar"), CARD, solver="nowhere")

@@ -72,7 +72,7 @@ def study_with(jobs: int, numbers: list[int]) -> dict[int, tuple]:
     return ends
 
 
-def test_jobs_and_order_do_not_change_a_start() -> None:
+def test_jobs_and_order_do_not_change_a_start():
     alone = study_with(1, [0, 1, 2, 3])
     assert all(value < 1e-6 for value, _, _ in alone.values())
     assert study_with(2, [3, 0, 1, 2]) == alone
@@ -101,13 +101,13 @@ def build_failing() -> FitProblem:
     raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
 
 
-def test_a_process_that_dies_is_noticed() -> None:
+def test_a_process_that_dies_is_noticed():
     with pytest.raises(BubblefitError, match="--resume") as caught:
         list(run_starts(build_dying, FitOptions(), 1, [0, 1], 2))
     assert caught.value.exit_code == 4
 
 
-def test_errors_cross_the_process_border_whole() -> None:
+def test_errors_cross_the_process_border_whole():
     with pytest.raises(SolverFailure, match="no licence") as failure:
         list(run_starts(build_failing, FitOptions(), 1, [0, 1], 2))
     assert failure.value.exit_number == 3004 and failure.value.scratch == Path("/tmp/scratch")
@@ -116,18 +116,14 @@ def test_errors_cross_the_process_border_whole() -> None:
     assert caught.value.field == "quads"
 
 
-def test_no_shared_memory_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A container with /dev/shm missing or read-only cannot make the semaphores of a queue."""
-
-    def refuse(*arguments: Any, **named: Any) -> None:
+def test_no_shared_memory_is_needed(monkeypatch):
+    def refuse(*arguments, **named):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refuse)
     assert sorted(filter(None, run_tasks(lambda: lambda n, tell: 10 * n, [1, 2, 3], 2))) == [
-        10,
-        20,
-        30,
-    ]
+        10, 20, 30,
+    ]  # fmt: skip
 
 
 def killed_once(folder: Path, where: str) -> Any:
@@ -153,7 +149,7 @@ def killed_once(folder: Path, where: str) -> Any:
 
 @pytest.mark.parametrize("where", ["before", "amid", "after"])
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, jobs) -> None:
+def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, jobs):
     found = []
     for record in run_tasks(lambda: killed_once(tmp_path, where), [1, 2, 3, 4], jobs):
         if record is not None:
@@ -161,17 +157,15 @@ def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, job
     ended = [number for number, content in found if content == bytes(10**5)]
     assert sorted(ended) == [1, 2, 3, 4]
     (said,) = caplog.messages
-    assert said == (
-        "a worker process died (exit code -9; out of memory?); what it did is done again"
-    )
+    assert "exit code -9" in said
     assert not multiprocessing.active_children()
 
 
-def test_what_cannot_cross_is_told_in_words() -> None:
+def test_what_cannot_cross_is_told_in_words():
     class Own(Exception):
         """Of a function: it cannot be pickled."""
 
-    def task(number: int, tell: Any) -> None:
+    def task(number, tell):
         raise Own("of its own sort")
 
     with pytest.raises(BubblefitError, match="Own: of its own sort"):
@@ -185,11 +179,10 @@ def alive(process: int) -> bool:
         return False
 
 
-def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
-    """Whatever they do: one waits for a program outside, which ends with it, as its folder does."""
+def test_workers_end_when_their_parent_is_killed(tmp_path):
     needs.linux("who is alive")
 
-    def task(number: int, tell: Any) -> None:
+    def task(number, tell):
         with run_folder("t", tmp_path, False, "t", "log") as folder:
             tell((os.getpid(), folder))
             run_process(["sleep", "300"], folder, folder / "log")
@@ -212,7 +205,7 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
             time.sleep(0.05)
 
 
-def test_the_processes_end_when_the_reader_stops() -> None:
+def test_the_processes_end_when_the_reader_stops():
     # Wherever the workers are: one was once told to end within a lock of its queue, and hung.
     for records in range(1, 7):
         running = run_starts(build, FitOptions(max_analyses=60), 5, [0, 1, 2, 3], 2)
@@ -222,13 +215,10 @@ def test_the_processes_end_when_the_reader_stops() -> None:
         assert not multiprocessing.active_children()
 
 
-def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """It is a copy of the parent: an exception would run through the code that started it."""
+def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(monkeypatch, tmp_path):
     parent, leave = os.getpid(), os._exit
 
-    def told_to_end(status: int) -> None:
+    def told_to_end(status):
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(0.1)
         leave(status)
@@ -243,16 +233,15 @@ def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(
     assert not list(tmp_path.iterdir())
 
 
-def test_processes_end_by_themselves_when_all_is_done(tmp_path: Path) -> None:
-    """They are not killed while they still write what they have to write."""
+def test_processes_end_by_themselves_when_all_is_done(tmp_path):
     parent = os.getpid()
 
-    def ending() -> Any:
+    def ending():
         atexit = multiprocessing.util.Finalize(None, written, exitpriority=1)
         assert atexit.still_active()
         return lambda number, tell: number
 
-    def written() -> None:
+    def written():
         assert os.getpid() != parent
         time.sleep(0.2)
         (tmp_path / str(os.getpid())).touch()

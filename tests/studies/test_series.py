@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import io
+import json
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
 import pytest
+from bubblefit.cli.main import main
 from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
 from bubblefit.reports.page_file import read_page_data
+from bubblefit.runs import simulation as analyses
+from bubblefit.runs.folder import FOLDER
 from bubblefit.runs.series import (
     Series,
     card_of,
@@ -24,13 +32,15 @@ from bubblefit.runs.series import (
     write_study,
 )
 
-from ..bars import BarKind, BarSolver, BarTest, project_of
+from ..bars import BarKind, BarTest, project_of
+from ..commands import in_process, result_in
 from ..complaints import complaint
+from ..projects import BUBBLE
 
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 
 
-def test_parts_are_called_by_what_tells_them_apart(bars: BarSolver) -> None:
+def test_parts_are_called_by_what_tells_them_apart(bars):
     one, two = BarTest("one"), BarTest("two", ("warp", "fill"), elements=6, increments=3)
     project = project_of(one, two)
     assert list(parts_of(project, [one], 0.5)) == ["one"]
@@ -46,22 +56,19 @@ def test_parts_are_called_by_what_tells_them_apart(bars: BarSolver) -> None:
     assert part_name(two, "warp", 2, 1) == "warp" and part_name(two, "warp", 1, 2) == "two"
 
 
-def test_a_refinement_that_cannot_be_had(bars: BarSolver) -> None:
+def test_a_refinement_that_cannot_be_had(bars):
     test = BarTest("one")
     said = complaint(parts_of, project_of(test), [test], 0.5, "elements", 0.05)
-    assert said == (
-        "bars.toml: refinement by 0.05 (--levels, --coarser, --factor), elements: expected 1 or "
-        "more, got 0"
-    )
+    assert said.startswith("bars.toml: refinement by 0.05") and said.endswith("got 0")
 
     class Filed(BarTest):
-        def models(self, *_: Any, **__: Any) -> Any:
+        def models(self, *_, **__):
             raise InputError("mesh.inp", "line 3", "odd")
 
     assert complaint(parts_of, project_of(test), [Filed("x")], 0.5) == "mesh.inp: line 3: odd"
 
 
-def test_tests_that_no_study_can_run(bars: BarSolver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tests_that_no_study_can_run(bars, monkeypatch):
     one, two = BarTest("one"), BarTest("two")
     project = project_of(one, two)
     assert studied_tests(project) == studied_tests(project, []) == [one, two]
@@ -71,7 +78,7 @@ def test_tests_that_no_study_can_run(bars: BarSolver, monkeypatch: pytest.Monkey
     assert said == "bars.toml: no study can run the tests of this project"
 
 
-def test_the_card_that_is_given(tmp_path: Path) -> None:
+def test_the_card_that_is_given(tmp_path):
     write_card(MaterialCard(CARD.law, 0.6, "filed"), tmp_path / "c.toml")
     project = project_of(BarTest("one"), cards={"own": CARD})
     assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
@@ -82,7 +89,7 @@ def test_the_card_that_is_given(tmp_path: Path) -> None:
     assert note.kind is NoteKind.THICKNESS and "0.6 mm" in note and "0.5 mm" in note
 
 
-def test_analyses_are_told_one_after_the_other(bars: BarSolver) -> None:
+def test_analyses_are_told_one_after_the_other(bars):
     steps: list[Any] = []
     test = BarTest("one", ("warp", "fill"))
     series = Series(project_of(test), CARD, steps.append)
@@ -96,11 +103,11 @@ def test_analyses_are_told_one_after_the_other(bars: BarSolver) -> None:
     ]  # fmt: skip
     assert series.notes(history) == []
     short = SimpleNamespace(law=SimpleNamespace(strain_range=[0.09, 1.0, 1.0]))
-    series.card = short  # type: ignore[assignment]
+    series.card = short
     assert [note.kind for note in series.notes(history)] == [NoteKind.BEYOND_CARD]
 
 
-def test_what_a_study_writes(tmp_path: Path) -> None:
+def test_what_a_study_writes(tmp_path):
     table, drawn = pd.DataFrame({"a": [1, 2], "b": ["x", "y"]}), []
     out, notes = tmp_path / "new", [Note(NoteKind.SNAP, "snaps", "one")]
     write_study(out, "mesh", table, drawn.append, {"a": [1]}, notes, "Finer", ["it settles"])
@@ -112,3 +119,115 @@ def test_what_a_study_writes(tmp_path: Path) -> None:
     assert (out / "mesh.csv").read_bytes() == b"a,b\n1,x\n2,y\n" and drawn == [out / "mesh.png"]
     assert (out / "result.json").read_text() == '{\n "a": [\n  1\n ]\n}\n'
     assert (out / "notes.csv").read_text() == "of,kind,note\none,snap,snaps\n"
+
+
+COMMANDS = {
+    "mesh": ("study", "mesh", "project.toml", "--levels", 3),
+    "nu12": ("study", "nu12", "project.toml", "--nu12", 0.1, "--nu12", 0.2, "--nu12", 0.4),
+    "simulated": ("simulate", "test", "project.toml", "--card", "other.toml"),
+}
+
+
+class Killed(BaseException):
+    """In place of a signal that nobody can catch: nothing of ours handles it."""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "project.toml").write_text(BUBBLE)
+    for name, modulus in (("card", 800.0), ("other", 700.0)):
+        law = HypoelasticLaw.linear(modulus, 400.0, 80.0)
+        write_card(MaterialCard(law, 0.81, name), tmp_path / f"{name}.toml")
+    for figure in ("plot_convergence", "plot_nu12"):
+        monkeypatch.setattr(f"bubblefit.reports.{figure}", lambda path, *_: path.touch())
+    return tmp_path
+
+
+def killed_after(monkeypatch: pytest.MonkeyPatch, count: int) -> list[int]:
+    """Of the analyses that are made, one more than `count` is the end; how many there were."""
+    made = [0]
+
+    def run(self, model, law, *given, real=analyses.Once.run, **named):
+        before = self.cache.entries()
+        history = real(self, model, law, *given, **named)
+        if len(self.cache.entries()) > len(before):
+            made[0] += 1
+        if made[0] > count:
+            raise Killed
+        return history
+
+    monkeypatch.setattr(analyses.Once, "run", run)
+    return made
+
+
+def without(result, *names: str):
+    if isinstance(result, dict):
+        return {k: without(v, *names) for k, v in result.items() if k not in names}
+    return [without(one, *names) for one in result] if isinstance(result, list) else result
+
+
+@pytest.mark.parametrize("what", COMMANDS)
+def test_every_cut_ends_as_if_there_had_been_none(folder, what):
+    command = functools.partial(
+        in_process, *COMMANDS[what], "--card", "card.toml", "--out", "out", cwd=folder
+    )
+    out = folder / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        total = killed_after(patch, 1000)
+        command()
+    whole, tables = result_in(out), sorted(out.glob("*.csv"))
+    before = {path.name: path.read_bytes() for path in tables}
+    assert total[0] >= 2
+    for cut in range(total[0]):
+        shutil.rmtree(out)
+        with pytest.MonkeyPatch.context() as patch:
+            killed_after(patch, cut)
+            with pytest.raises(Killed):
+                run_here(folder, what)
+        assert not (out / "result.json").exists()
+        with pytest.MonkeyPatch.context() as patch:
+            made = killed_after(patch, 1000)
+            command("--resume")
+        assert made[0] == total[0] - cut - 1
+        assert without(result_in(out), "seconds") == without(whole, "seconds")
+        for name, content in before.items():
+            one, other = (pd.read_csv(source) for source in (out / name, io.BytesIO(content)))
+            own = [column for column in one if column not in ("seconds",)]
+            pd.testing.assert_frame_equal(one[own], other[own], check_exact=True)
+
+
+def run_here(folder: Path, what: str) -> None:
+    """Not by click's runner, which would take the end for an exception of the command."""
+    arguments = [*map(str, COMMANDS[what]), "--card", "card.toml", "--out", "out"]
+    with contextlib.chdir(folder):
+        main(arguments, standalone_mode=False)
+
+
+def test_what_there_is_to_go_on_with(folder):
+    arguments = (*COMMANDS["nu12"], "--card", "card.toml", "--out", "out")
+    done = in_process(*arguments, "--resume", cwd=folder, code=2)
+    assert "out: holds nothing to go on with; leave --resume out" in done.output
+    done = in_process(*arguments, "--resume", "--overwrite", cwd=folder, code=2)
+    assert "give one of them, not both" in done.output
+    in_process(*arguments, cwd=folder)
+    done = in_process(*arguments, cwd=folder, code=2)
+    assert "already holds a result" in done.output
+    kept = list((folder / "out" / FOLDER).glob("*/*.run"))
+    assert len(kept) == 4
+    # Another card: nothing of the first is taken.
+    before = result_in(folder / "out")
+    other = (*COMMANDS["nu12"], "--card", "other.toml", "--out", "out")
+    in_process(*other, "--resume", cwd=folder)
+    after = result_in(folder / "out")
+    assert json.dumps(after["models"]) != json.dumps(before["models"])
+    in_process(*other, "--overwrite", cwd=folder)
+    assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
+
+
+def test_seconds_are_those_of_the_run(folder):
+    arguments = (*COMMANDS["mesh"], "--card", "card.toml", "--out", "out")
+    in_process(*arguments, cwd=folder)
+    first = pd.read_csv(folder / "out" / "convergence.csv")
+    in_process(*arguments, "--resume", cwd=folder)
+    second = pd.read_csv(folder / "out" / "convergence.csv")
+    assert first["seconds"].tolist() == second["seconds"].tolist()

@@ -23,7 +23,6 @@ RADIUS, THICKNESS = 100.0, 0.81
 PRESSURES = (0.02, 0.06, 0.15, 0.3)
 FABRIC = Expected({"E1": (250.0, 1500.0), "E2": (50.0, 500.0), "G12": (7.0, 70.0)})
 LAW = HypoelasticLaw.linear(700.0, 300.0, 15.0)
-
 Fields = tuple[DisplacementField, ...]
 
 
@@ -45,7 +44,7 @@ def inflated(
 
 
 @pytest.fixture(scope="module")
-def good() -> Fields:
+def good():
     return inflated(LAW)
 
 
@@ -132,11 +131,9 @@ def at_origin(field: DisplacementField) -> DisplacementField:
 def exchanged(fields: Fields) -> Fields:
     first, second, third, last = fields
     return (
-        first,
-        replace(third, pressure=second.pressure),
-        replace(second, pressure=third.pressure),
+        first, replace(third, pressure=second.pressure), replace(second, pressure=third.pressure),
         last,
-    )
+    )  # fmt: skip
 
 
 TRAPS = {

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.data import prepare
-from bubblefit.experiments.bubble.findings import (
-    clock_pictures,
-    recorded_lines,
-    recorded_numbers,
-    recorded_table,
-)
+from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
+from bubblefit.experiments.bubble.point_files import RecordedFrames
+from bubblefit.experiments.bubble.report import clock_pictures, recorded_table
 from bubblefit.experiments.kinds import Output, files_of
 from bubblefit.project.project import project_text, read_project, settings_of
+from bubblefit.readers.pressure_log import ClockOffset
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
@@ -95,11 +94,9 @@ def names(test) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "said",
-    ["from_name = true", "from_name = '_(.+)kPa'\nunit = 'kPa'", "column = 'p'"],
+    "said", ["from_name = true", "from_name = '_(.+)kPa'\nunit = 'kPa'", "column = 'p'"]
 )
 def test_the_frames_nearest_to_the_pressures(folder, said):
-    """Inflated to the frame's own pressure, not to the one asked for."""
     section = f"[bubble.data.points.pressure]\n{said}\n"
     test = bubble(project(folder, section, "[10.5, 60]"))
     assert names(test) == ["p4_10kPa.csv", "p13_60kPa.csv"]
@@ -117,7 +114,7 @@ def test_the_frames_nearest_to_the_pressures(folder, said):
 
 
 def test_a_tolerance_is_in_the_unit_of_the_pressures(folder):
-    def taken(tolerance: float):
+    def taken(tolerance):
         said = f"[bubble.data.points.pressure]\nfrom_name = true\ntolerance = {tolerance}\n"
         return bubble(project(folder, said, "[10.5, 60]")).pressures
 
@@ -139,7 +136,6 @@ def test_all_frames_and_some(folder):
 
 
 def test_the_log_is_in_the_record_of_a_run(folder, tmp_path):
-    """Also where it lies beside the project, not beside the frames."""
     (folder / "beside.csv").write_bytes((folder / "data" / "valve.csv").read_bytes())
     text = LOG.format(more="").replace("valve.csv", "beside.csv")
     found = read_project(project(folder, text, "[10, 60]"))
@@ -199,7 +195,6 @@ def test_times_of_frames_from_a_table_or_the_names(folder):
 
 
 def test_one_file_with_all_frames(folder, tmp_path):
-    """A log tells its frames apart; a name or a column is of one frame a file."""
     (tmp_path / "data").mkdir()
     shutil.copy(folder / "data" / "valve.csv", tmp_path / "data")
     files = sorted(
@@ -276,3 +271,76 @@ def test_bad_logs_name_file_and_field(folder, old, new, words):
     assert old in text
     path.write_text(text.replace(old, new))
     complaint_with(words, read_project, path)
+
+
+#: Of all five frames of the film, MPa; the first of them is before the log begins.
+DOUBT = np.array([np.nan, 0.0002, 0.0004, 0.0006, 0.0008])
+CLOCK = ClockOffset(
+    offset=41.254, lower=40.996, upper=41.504, misfit=0.00234,
+    pressure=np.array([np.nan, 0.01, 0.021, 0.033, 0.06]), doubt=DOUBT,
+    times=np.arange(5.0), heights=np.array([0.0, 10.0, 20.0, 30.0, 40.0]),
+)  # fmt: skip
+TAKEN = RecordedFrames(
+    files=(Path("a.csv"), Path("b.csv")), frames=None, names=("a.csv", "b.csv"),
+    pressure=np.array([0.021, 0.06]), asked=np.array([0.0215, 0.0598]), source="the log valve.csv",
+    count=5, left_out={"at no pressure": 1, "before the log": 2}, doubt=DOUBT[[2, 4]], clock=CLOCK,
+)  # fmt: skip
+#: Without a log, and of what frames there are.
+PLAIN = replace(TAKEN, asked=None, doubt=None, clock=None, left_out={}, source="the files' names")
+
+
+def test_numbers_for_result_json():
+    found = recorded_numbers(TAKEN)
+    rows = [
+        {"frame": "a.csv", "pressure_kPa": 21.0, "asked_kPa": 21.5, "uncertain_kPa": 0.4},
+        {"frame": "b.csv", "pressure_kPa": 60.0, "asked_kPa": 59.8, "uncertain_kPa": 0.8},
+    ]
+    assert found.pop("taken") == [pytest.approx(row) for row in rows]
+    assert found == {
+        "from": "the log valve.csv", "frames": 5,
+        "left_out": {"at no pressure": 1, "before the log": 2},
+        "clock": {
+            "offset_s": 41.254, "between_s": [40.996, 41.504], "misfit": 0.00234,
+            "how": "found by the apex heights",
+        },
+    }  # fmt: skip
+    given = recorded_numbers(replace(TAKEN, clock=replace(CLOCK, misfit=None)))["clock"]
+    assert (given["misfit"], given["how"]) == (None, "given")
+    plain = recorded_numbers(PLAIN)
+    assert plain["taken"][1] == pytest.approx({"frame": "b.csv", "pressure_kPa": 60.0})
+    assert "clock" not in plain
+
+
+def test_lines_for_the_terminal():
+    first, second = recorded_lines(TAKEN)
+    assert "2 of 5 frames" in first and "21 in place of 21.5 kPa" in first
+    for number in ("41.25 s", "41.00 and 41.50 s", "0.0023", "0.5 kPa"):
+        assert number in second
+    (_, given) = recorded_lines(replace(TAKEN, clock=replace(CLOCK, misfit=None)))
+    assert given.endswith("41.25 s, given")
+    (plain,) = recorded_lines(PLAIN)
+    assert "2 of 5 frames" in plain
+
+
+def test_the_table_of_frames():
+    table = recorded_table(TAKEN)
+    assert [row[0] for row in table.rows] == ["a.csv", "b.csv"]
+    assert table.rows[0][1:] == pytest.approx([21.0, 21.5, -0.5, 0.4])
+    assert table.rows[1][1:] == pytest.approx([60.0, 59.8, 0.2, 0.8])
+    # Where the offset was given, the clocks leave nothing open.
+    given = recorded_table(replace(TAKEN, asked=None, clock=replace(CLOCK, misfit=None)))
+    assert given.header == ["frame", "pressure, kPa"]
+    plain = recorded_table(PLAIN)
+    assert plain.rows == [["a.csv", pytest.approx(21.0)], ["b.csv", pytest.approx(60.0)]]
+
+
+def test_pressures_and_heights_are_drawn_by_the_clock_of_the_log(tmp_path, monkeypatch):
+    drawn = []
+    module = "bubblefit.experiments.bubble.findings"
+    monkeypatch.setattr(f"{module}.plot_clock", lambda *what: drawn.append(what))
+    assert clock_pictures(PLAIN, Output(tmp_path)) == [] == drawn
+    clock_pictures(TAKEN, Output(tmp_path))
+    ((path, times, pressure, heights, taken),) = drawn
+    assert path == tmp_path / "clock.png"
+    assert times == pytest.approx([41.254, 42.254, 43.254, 44.254, 45.254])
+    assert pressure is CLOCK.pressure and heights is CLOCK.heights and taken is TAKEN.pressure
