@@ -370,9 +370,9 @@ def _write_points(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    import bubblefit.fits.fit
-    import bubblefit.fits.predictions
     import bubblefit.reports
-    import bubblefit.studies.validation  # noqa: F401
+    import bubblefit.runs.fit
+    import bubblefit.runs.predictions
+    import bubblefit.runs.validation  # noqa: F401
 
     sys.exit(main(sys.argv[1:]))

@@ -6,6 +6,7 @@ import html
 import importlib.util
 import json
 import os
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -419,10 +420,10 @@ def test_marks_stand_wherever_a_run_does(tmp_path, monkeypatch):
     expected = [[], ["beyond card range"], ["snap"], ["beyond card range", "snap"]]
     assert [run["marks"] for run in done.result["runs"]] == expected
     table = pd.read_csv(tmp_path / "out" / "runs.csv", keep_default_na=False)
-    assert table["marks"].tolist() == ["; ".join(marks) for marks in expected]
+    assert table["marks"].tolist() == ["; ".join(each) for each in expected]
     rows = [line for line in done.lines() if "kPa  " in line or line.startswith("high")]
-    for row, marks in zip(rows, expected, strict=True):
-        assert row.endswith(f"[{', '.join(marks)}]") if marks else "[" not in row
+    for row, some in zip(rows, expected, strict=True):
+        assert row.endswith(f"[{', '.join(some)}]") if some else "[" not in row
     page = (tmp_path / "out" / "report.html").read_text().replace("\u00a0", " ")
     assert "beyond card range, snap</td>" in page
     notes = pd.read_csv(tmp_path / "out" / "notes.csv", keep_default_na=False)
