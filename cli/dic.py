@@ -143,14 +143,13 @@ def _lines(result: dict[str, Any]) -> list[str]:
 def _write(
     out: Path, rows: Sequence[dict[str, Any]], names: Sequence[str], found: Sequence[Sphere]
 ) -> None:
-    from ..reports.sphere import plot_spheres
+    from ..reports.bubbles import sphere_charts
+    from ..reports.vega import save
 
     with replacing(out) as path:
         write_table(path, list(rows[0]), [list(row.values()) for row in rows])
-    plot_spheres(
-        out.with_suffix(".png"),
-        [
-            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
-            for name, one in zip(names, found, strict=True)
-        ],
-    )
+    drawn = [
+        (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
+        for name, one in zip(names, found, strict=True)
+    ]
+    save(out.with_suffix(".png"), sphere_charts(drawn))

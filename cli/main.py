@@ -10,7 +10,6 @@ import click
 from .. import __version__
 from .events import with_events
 from .examples import examples
-from .home import place_matplotlib
 from .logs import listen, with_verbose
 from .options import COMMAND_LINE
 from .usage import Suggesting, in_one_line
@@ -100,4 +99,3 @@ def main(verbose: bool) -> None:
     4 the solver failed, 130 interrupted.
     """
     listen(verbose)
-    place_matplotlib()

@@ -38,7 +38,7 @@ def command(folders: tuple[Path, ...], kind: str, out: Path | None) -> None:
     """
     import tempfile
 
-    from ..reports.beside import beside
+    from ..reports.content import beside
     from ..reports.html import PAGE, write_page
     from ..reports.pdf import print_page
     from ..reports.unfinished import page_of_folder

@@ -14,7 +14,8 @@ from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...meshes.strip_models import elongations
 from ...readers.biaxial import BiaxialPath
-from ...reports.biaxial import BiaxialPanel, plot_biaxial
+from ...reports.strips import BiaxialPanel, biaxial_charts
+from ...reports.vega import save
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Output, Simulation, strains_of
 from .objective import PERCENT
@@ -133,7 +134,7 @@ def _write(test: BiaxialTest, found: Loadings, out: Output) -> None:
         )
         larger = path.load.max(axis=1)
         panels.append(BiaxialPanel(path.ratio, larger, PERCENT * path.since, curves))
-    plot_biaxial(out.path("paths.png"), panels)
+    save(out.path("paths.png"), biaxial_charts("ratios", panels))
 
 
 def _within(card: MaterialCard, elongation: Array) -> int:

@@ -19,10 +19,9 @@ from ...meshes.disk import Outline
 from ...notes import Note, NoteKind
 from ...readers.fields import DisplacementField
 from ...readers.pressure_log import ClockOffset
-from ...reports.clock import plot_clock
+from ...reports.bubbles import clock_charts, disk_charts, registration_charts
 from ...reports.content import Table
-from ...reports.registration import plot_registration
-from ...reports.surface import plot_disk
+from ...reports.vega import save
 from ...writing import replacing
 from ..kinds import Findings, FittedTest, Output, Shown
 from .objective import FieldObjective, displacement_offset
@@ -118,7 +117,8 @@ def sheet_exhibit(
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
-        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], edge)
+        heights = [("z0, mm", points[:, :2], points[:, 2])]
+        save(out.path(PICTURE), disk_charts(heights, edge))
         how = " and ".join(w for w in _used(prepared) if w in ("measured surface", "modes"))
         words = "surface of the sheet in the reference picture"
         figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
@@ -128,7 +128,7 @@ def sheet_exhibit(
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
         _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
-        plot_disk(out.path(CONSTANT_PICTURE), own, edge)
+        save(out.path(CONSTANT_PICTURE), disk_charts(own, edge))
         words = "measured less modelled, as far as it is the same at all pressures"
         figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
         files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))
@@ -244,9 +244,8 @@ def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
     if clock is None:
         return []
     times = clock.times + clock.offset
-    plot_clock(
-        out.path(PICTURE_RECORDED_WORDS), times, clock.pressure, clock.heights, taken.pressure
-    )
+    charts = clock_charts(times, clock.pressure, clock.heights, taken.pressure)
+    save(out.path(PICTURE_RECORDED_WORDS), charts)
     return [
         (
             out.name(PICTURE_RECORDED_WORDS),
@@ -362,7 +361,7 @@ def registration_picture(
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))
-    plot_registration(out.path(PICTURE_REGISTRATION), last.points, maps, outline.edge())
+    save(out.path(PICTURE_REGISTRATION), registration_charts(last.points, maps, outline.edge()))
     return out.name(
         PICTURE_REGISTRATION
     ), "measured points in the test's coordinates, the rim, warp and fill"

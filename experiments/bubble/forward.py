@@ -18,9 +18,9 @@ from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import surface_strain
-from ...reports.profiles import plot_profiles
-from ...reports.pvd import write_pvd
-from ...reports.vtu import write_vtu
+from ...reports.bubbles import cut_charts
+from ...reports.vega import save
+from ...reports.vtu import write_pvd, write_vtu
 from ...solvers.base import History
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Output, Simulation, Studied, strains_of
@@ -209,12 +209,8 @@ def simulate(
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
-        plot_profiles(
-            out.path(f"profiles{suffix}.png"),
-            test.pressures,
-            model.mesh.points,
-            history.displacement,
-        )
+        cuts = cut_charts(name, test.pressures, model.mesh.points, history.displacement)
+        save(out.path(f"profiles{suffix}.png"), cuts)
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [
             f"{p:8.1f} kPa   apex {z:8.3f} mm"

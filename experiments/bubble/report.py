@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 
 from ...inference.comparison import Blocks
 from ...readers.surfaces import write_surfaces
-from ...reports.charts import Chart, Charts, Series, dots, line
+from ...reports.bubbles import chosen, cut_charts, height_charts, kilo, left_out, ranks, rise_charts
+from ...reports.charts import Chart, Charts, Shades, dots
 from ...reports.content import Part, Table
-from ...reports.cuts import node_cut, point_cut
-from ...reports.maps import Maps, Shade, Shades, Solid, maps_of
-from ...reports.packed import pack
-from ...reports.profiles import plot_profiles
-from ...reports.rises import plot_rises
-from ...reports.scatter import plot_heights
+from ...reports.maps import Maps, Shade, Solid, maps_of, pack
+from ...reports.vega import save
 from ...writing import replacing
 from ..kinds import Exhibit, Findings, FittedTest, Output, Shown
 from .findings import (
@@ -117,37 +114,21 @@ def residual_table(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame
 
 Array = NDArray[np.float64]
 
-#: Pressures that are drawn in one chart; of more, as many spread over all, the last among them.
-MOST = 8
 #: Points that are drawn of one pressure.
 POINTS = 120
-AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
-
-
-def chosen(count: int) -> list[int]:
-    """Numbers of the pressures that are drawn."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int)).tolist()
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Heights along both axes: lines of the model, dots of what was measured."""
-    pressures, offset = prepared.test.pressures, displacement_offset(fitted.nuisance)
-    displacement = fitted.histories[0].displacement + offset
-    points = fitted.comparisons[0].model.mesh.points
-    numbers = chosen(len(pressures))
-    charts = []
-    for axis, (title, label) in enumerate(AXES):
-        series: list[Series] = []
-        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
-            cut, name = node_cut(points, displacement[k], axis), kilo(pressures[k])
-            series.append(line(name, cut.position, cut.height, rank=rank))
-            seen = prepared.fields[k]
-            spots = point_cut(seen.points, seen.displacement, axis)
-            series.append(dots(name, spots.position, spots.height, rank=rank))
-        alt = f"{title}: heights modelled and measured at {len(numbers)} pressures"
-        charts.append(Chart(title, label, "height z, mm", series, alt))
-    caption = f"{prepared.test.name}: lines are the model, dots {source(prepared)}"
-    return Charts(f"{prepared.test.name} cuts", charts, f"{caption}.{left_out(pressures, numbers)}")
+    """Return heights along both axes: lines of the model, dots of what was measured."""
+    displacement = fitted.histories[0].displacement + displacement_offset(fitted.nuisance)
+    return cut_charts(
+        f"{prepared.test.name} cuts",
+        prepared.test.pressures,
+        fitted.comparisons[0].model.mesh.points,
+        displacement,
+        [(seen.points, seen.displacement) for seen in prepared.fields],
+        f"{prepared.test.name}: lines are the model, dots {source(prepared)}.",
+    )
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
@@ -169,31 +150,13 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         charts.append(
             Chart(title, "measured dz, mm", "modelled − measured, mm", series, alt, level=0.0)
         )
-    pressures = [target.pressure for target in targets]
     caption = f"{prepared.test.name}: what is left, over the measured height."
-    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(pressures, numbers))
-
-
-def ranks(count: int) -> list[float]:
-    """Of rising pressures, for their colours."""
-    return np.linspace(0.1, 1.0, count).tolist()
-
-
-def kilo(pressure: float) -> str:
-    """A pressure (MPa) in kPa."""
-    return f"{1e3 * pressure:.4g} kPa"
+    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(len(targets)))
 
 
 def source(prepared: PreparedBubble) -> str:
     """What the model is compared with."""
     return "the known solution" if prepared.known is not None else "what was measured"
-
-
-def left_out(pressures: Sequence[float], numbers: Sequence[int]) -> str:
-    """That not every pressure is drawn."""
-    if len(numbers) == len(pressures):
-        return ""
-    return f" Of {len(pressures)} pressures {len(numbers)} are drawn."
 
 
 LABELS = ("x (warp), mm", "y (fill), mm")
@@ -332,26 +295,19 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
 
 def _pictures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
     """Cuts and heights against what was measured, as pictures beside the page."""
-    test, offset = prepared.test, displacement_offset(fitted.nuisance)
+    test = prepared.test
     displacement = fitted.histories[0].displacement
     label = "known solution" if prepared.known is not None else "measured"
-    plot_profiles(
-        out.path(PROFILES),
-        test.pressures,
-        fitted.comparisons[0].model.mesh.points,
-        displacement + offset,
-        measured=[(f.points, f.displacement) for f in prepared.fields],
-        measured_label=label,
-    )
     objective = objective_of(fitted)
     targets, modelled = objective.targets, objective.modelled(displacement, fitted.nuisance)
-    plot_heights(
-        out.path(HEIGHTS),
+    save(out.path(PROFILES), profile_charts(prepared, fitted))
+    heights = height_charts(
         [t.pressure for t in targets],
         [t.displacement[:, 2] for t in targets],
         [own[:, 2] for own in modelled],
         label,
     )
+    save(out.path(HEIGHTS), heights)
     return [
         (out.name(PROFILES), f"{test.name}: cuts through the bubble along warp and fill"),
         (out.name(HEIGHTS), f"{test.name}: modelled against measured height"),
@@ -442,5 +398,5 @@ def _equilibrium(prepared: PreparedBubble) -> Table:
 
 def _rises(prepared: PreparedBubble, out: Output) -> Shown:
     pressures = [field.pressure for field in prepared.fields]
-    plot_rises(out.path(HEIGHTS_EXAMINED), pressures, prepared.view.rises)
+    save(out.path(HEIGHTS_EXAMINED), rise_charts(pressures, prepared.view.rises))
     return out.name(HEIGHTS_EXAMINED), "rise about the centre against pressure"

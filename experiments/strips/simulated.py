@@ -13,7 +13,8 @@ from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
-from ...reports.loads import plot_loads
+from ...reports.strips import load_charts
+from ...reports.vega import save
 from ...solvers.base import History
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Output, Simulation, strains_of
@@ -134,7 +135,8 @@ def _write(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> Non
             part = slice(pull.shown)
             drawn[direction].append((name, pull.elongation[part], pull.history.load[part]))
             rms[direction] += [] if pull.rms is None else [pull.rms]
-    plot_loads(out.path("loads.png"), load_panels(list(test.strips.values()), drawn, rms))
+    panels = load_panels(list(test.strips.values()), drawn, rms)
+    save(out.path("loads.png"), load_charts("loads", panels))
     for number, name in enumerate(cards, start=1):
         if (name, "bias") in ended:
             stem = "bias" if len(cards) == 1 else f"bias-{number}"

@@ -18,15 +18,14 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW
 from bubblefit.project.cards import chosen_cards
 from bubblefit.project.project import Project, read_project
-from bubblefit.reports.style import NAMED
+from bubblefit.reports.charts import Charts
 from bubblefit.runs import executor, processes
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
-from matplotlib.figure import Figure
 
 from ..complaints import complaint
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
-from ..drawings import lines
+from ..drawings import data, lines
 
 CARDS = ("soft", "stiff")
 TESTS = ("150 mm, 90 kPa", "high")
@@ -74,20 +73,21 @@ def test_every_test_with_every_card(project: Project, tmp_path: Path) -> None:
 
 
 def test_figures_show_the_curves_of_the_table(
-    project: Project, tmp_path: Path, drawn: list[Figure]
+    project: Project, tmp_path: Path, drawn: list[Charts]
 ) -> None:
     done = predict(project, ["high"], jobs=1)
     done.report(tmp_path / "out")
     curves = done.curves()
-    panels = {axes.get_ylabel(): axes for figure in drawn for axes in figure.axes}
+    panels = {c.y_label: c for charts in drawn for c in charts.charts}
+    (volumes,) = (charts.charts[0] for charts in drawn if charts.name == "gas")
     for rank, card in enumerate(CARDS):
         own = curves[curves["card"] == card]
-        load = lines(panels["load, N"], NAMED[rank])[0]
-        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T)
-        gas = lines(panels["gauge pressure, kPa"], NAMED[rank])[0]
-        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy())
+        load = lines(panels["load, N"], card)[0]
+        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T, rel=1e-5)
+        gas = data(volumes)[rank]
+        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy(), rel=1e-5)
         volume = own["volume_mm3"].to_numpy()
-        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6)
+        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6, rel=1e-5)
 
 
 def test_tests_and_cards_by_name(project: Project) -> None:

@@ -17,9 +17,9 @@ from bubblefit.experiments.kinds import Around, laws_around
 from bubblefit.materials.card import CardCertainty, MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
+from bubblefit.reports.charts import Charts
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.solvers import registry
-from matplotlib.figure import Figure
 
 from ..commands import in_process
 from ..cylinder_cases import STOPS, Banded, Formula, write_project
@@ -82,7 +82,7 @@ def test_draws_give_the_same_spread(tmp_path: Path) -> None:
 
 
 def test_the_spread_stands_wherever_the_load_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[Figure]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[Charts]
 ) -> None:
     """Beside the band of the walls and told from it; nothing is invented for another card."""
     monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
@@ -109,13 +109,11 @@ def test_the_spread_stands_wherever_the_load_does(
     assert [run["load_sigma_N"] for run in done.result["runs"][2:]] == [
         dict.fromkeys(("40 mm", "100 mm", "240 mm"))
     ] * 2
-    (axes,) = [a for f in drawn for a in f.axes if a.get_ylabel() == "load, N"]
-    dotted = [line.get_ydata() for line in axes.lines if line.get_linewidth() == 1.2]
+    (chart,) = [c for charts in drawn for c in charts.charts if c.y_label == "load, N"]
+    (banded,) = [s for s in chart.series if s.y and s.lower]
     ends = [known["load_N"] + sign * 1.96 * known["load_sigma_N"] for sign in (-1, 1)]
-    assert len(dotted) == 2
-    np.testing.assert_allclose(dotted, ends)
-    names = [text.get_text() for f in drawn for g in f.legends for text in g.get_texts()]
-    assert "95 % by the card" in names
+    np.testing.assert_allclose([banded.lower, banded.upper], ends, rtol=1e-5)
+    assert "95 % by the card" in [s.name for s in chart.series]
 
 
 def test_another_program_is_not_run_unasked(tmp_path: Path, monkeypatch) -> None:

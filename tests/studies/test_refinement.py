@@ -13,9 +13,9 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
+from bubblefit.reports.charts import Charts
 from bubblefit.runs.refinement import edge_length, refine, rms_between
 from bubblefit.runs.simulation import Step
-from matplotlib.figure import Figure
 
 from ..bars import STRETCH, WIDTH, BarSolver, BarTest, project_of
 from ..drawings import data
@@ -90,7 +90,7 @@ def test_parts_and_tests_are_told_apart(bars: BarSolver) -> None:
 
 
 def test_a_level_that_fails_is_named_and_left_out(
-    bars: BarSolver, tmp_path: Path, drawn: list[Figure]
+    bars: BarSolver, tmp_path: Path, drawn: list[Charts]
 ) -> None:
     bars.fails = 16
     study = refine(project_of(BarTest("a bar")), CARD)
@@ -108,9 +108,9 @@ def test_a_level_that_fails_is_named_and_left_out(
     # The figure shows the levels of the table that ended, each beside the next finer one.
     rows = table[table.quantity == END]
     change = 100 * np.abs(np.diff(rows.value)) / rows.value.iloc[-1]
-    shown = data(drawn[0].axes[0])[0]
-    assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1])
-    assert shown[1] == pytest.approx(change)
+    shown = data(drawn[0].charts[0])[0]
+    assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1], rel=1e-5)
+    assert shown[1] == pytest.approx(change, rel=1e-5)
     first = charts_of(tmp_path)["convergence"][0]
     (own,) = (series for series in first.series if series.name == END)
     assert own.x == pytest.approx(shown[0], rel=1e-5)

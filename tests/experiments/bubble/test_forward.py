@@ -18,6 +18,8 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.base import History
 
+from ...drawings import caught
+
 PART = "bubble"
 BETA = np.zeros(12)
 BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
@@ -36,9 +38,7 @@ def history() -> History:
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
-    calls: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(forward, "plot_profiles", lambda *args: calls.append(args))
-    return calls
+    return caught(monkeypatch, forward, "cut_charts")
 
 
 def simulated(folder: Path, sheet: object = Sheet(), **outcomes: Any) -> Any:
@@ -71,7 +71,8 @@ def test_one_card(tmp_path: Path, drawn: list[Any]) -> None:
     assert table[["x_mm", "y_mm"]].to_numpy() == pytest.approx(points, abs=1e-6)
     moved = history().displacement.reshape(-1, 3)
     assert table[["dx_mm", "dy_mm", "dz_mm"]].to_numpy() == pytest.approx(moved, abs=1e-6)
-    ((path, pressures, points, shown),) = drawn
+    ((path, name, pressures, points, shown),) = drawn
+    assert name == "soft"
     assert path == tmp_path / "profiles.png" and tuple(pressures) == MODEL.pressures
     np.testing.assert_array_equal(points, MODEL.mesh.points)
     np.testing.assert_array_equal(shown, history().displacement)

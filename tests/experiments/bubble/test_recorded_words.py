@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bubblefit.experiments.bubble import findings as recorded_words
 from bubblefit.experiments.bubble.findings import (
     clock_pictures,
     recorded_lines,
@@ -16,6 +17,8 @@ from bubblefit.experiments.bubble.findings import (
 from bubblefit.experiments.bubble.point_files import RecordedFrames
 from bubblefit.experiments.kinds import Output
 from bubblefit.readers.pressure_log import ClockOffset
+
+from ...drawings import caught
 
 #: Of all five frames of the film, MPa; the first of them is before the log begins.
 DOUBT = np.array([np.nan, 0.0002, 0.0004, 0.0006, 0.0008])
@@ -108,9 +111,7 @@ def test_the_table_of_frames() -> None:
 def test_pressures_and_heights_are_drawn_by_the_clock_of_the_log(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn = []
-    module = "bubblefit.experiments.bubble.findings"
-    monkeypatch.setattr(f"{module}.plot_clock", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, recorded_words, "clock_charts")
     assert clock_pictures(PLAIN, Output(tmp_path)) == [] == drawn
     clock_pictures(TAKEN, Output(tmp_path))
     ((path, times, pressure, heights, taken),) = drawn

@@ -18,6 +18,8 @@ from bubblefit.experiments.kinds import Output
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField
 
+from ...drawings import caught
+
 MOTIONS = (
     SimpleNamespace(points=9, shift=np.array([0.3, 0.4, 0.0]), angle=0.25),
     SimpleNamespace(points=0, shift=np.array([9.0, 9.0, 9.0]), angle=9.0),
@@ -94,8 +96,7 @@ def test_table_and_line() -> None:
 
 
 def test_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Any] = []
-    monkeypatch.setattr(registration, "plot_registration", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, registration, "registration_charts")
     points, edge = np.ones((3, 2)), Outline.circle(100.0)
     moved = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 3.0]])
     first = DisplacementField(0.01, points, 0 * moved)

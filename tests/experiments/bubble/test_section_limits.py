@@ -33,6 +33,7 @@ from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.readers.fields import DisplacementField
 
 from ...complaints import complaint
+from ...drawings import caught
 
 PLACE = Place(Path("p.toml"), "bubble[0]", Fabric("a fabric", 0.8))
 METRES = replace(PLACE, scales=Scales(pressure=0.1, length=1000.0))
@@ -311,8 +312,7 @@ def test_times_that_cannot_be_had(tmp_path: Path, said: dict[str, Any], words: s
 
 
 def test_every_cell_of_what_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Any] = []
-    monkeypatch.setattr(examined, "plot_rises", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, examined, "rise_charts")
     monkeypatch.setattr(examined, "registration_picture", lambda *_: ("maps.png", "maps"))
     points = np.zeros((4, 2))
     fields = [

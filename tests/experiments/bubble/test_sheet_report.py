@@ -20,6 +20,8 @@ from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.notes import NoteKind
 from bubblefit.solvers.base import History
 
+from ...drawings import caught
+
 PRESSURES = (0.02, 0.2)
 MESH = disk_mesh(100.0, 16)
 #: mm, the surface in the reference picture; that of the two modes is 1 and x in radii.
@@ -130,8 +132,7 @@ def test_a_sheet_of_which_nothing_is_known(sheet: Sheet, warned: int) -> None:
 
 
 def test_pictures_and_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Any] = []
-    monkeypatch.setattr(sheet_report, "plot_disk", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, sheet_report, "disk_charts")
     assert sheet_report.sheet_exhibit(*fitted(Sheet(slack=True)), Output(tmp_path)) == ([], [])
     assert not drawn and not list(tmp_path.iterdir())
     figures, files = sheet_report.sheet_exhibit(*fitted(ALL), Output(tmp_path, "b-"))
