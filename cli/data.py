@@ -26,7 +26,8 @@ from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.spheres import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
-from ..reports.sphere import plot_spheres
+from ..reports.bubbles import sphere_charts
+from ..reports.vega import save
 from ..runs.check import check
 from ..writing import replacing
 from .options import (
@@ -342,13 +343,11 @@ def _write(
 ) -> None:
     with replacing(out) as path:
         write_table(path, list(rows[0]), [list(row.values()) for row in rows])
-    plot_spheres(
-        out.with_suffix(".png"),
-        [
-            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
-            for name, one in zip(names, found, strict=True)
-        ],
-    )
+    drawn = [
+        (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
+        for name, one in zip(names, found, strict=True)
+    ]
+    save(out.with_suffix(".png"), sphere_charts(drawn))
 
 
 dic_command.add_command(dic_sphere)

@@ -15,7 +15,6 @@ from .terminal import (
     examples,
     in_one_line,
     listen,
-    place_matplotlib,
     with_common_options,
 )
 
@@ -101,4 +100,3 @@ def main(verbose: bool) -> None:
     4 the solver failed, 130 interrupted.
     """
     listen(verbose)
-    place_matplotlib()

@@ -10,12 +10,11 @@ import difflib
 import functools
 import json
 import logging
-import os
 import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -347,17 +346,3 @@ def with_common_options(command: click.Command) -> click.Command:
                          callback=_begin, help="Write progress to FILE, one JSON object a line."),
         ]  # fmt: skip
     return command
-
-
-def place_matplotlib() -> None:
-    """Let matplotlib keep its list of fonts in BUBBLEFIT_CACHE where the home cannot be written.
-
-    Otherwise every process warns on stderr that it keeps none.
-    """
-    cache = os.environ.get("BUBBLEFIT_CACHE")
-    if not cache or "MPLCONFIGDIR" in os.environ or os.access(os.path.expanduser("~"), os.W_OK):
-        return
-    folder = Path(cache).absolute() / "matplotlib"
-    with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        os.environ["MPLCONFIGDIR"] = str(folder)

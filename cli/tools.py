@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from ..errors import InputError
-from ..reports.beside import beside
+from ..reports.content import beside
 from ..reports.html import PAGE, write_page
 from ..reports.pdf import print_page
 from ..reports.unfinished import page_of_folder

@@ -1,34 +1,74 @@
-"""Figures, the page and VTU files."""
+"""Charts, the page and files for ParaView.
 
-from .beam import BeamBodies, plot_beam
-from .bending import BendLine, BendPanel, BendReadings, plot_bending, plot_bending_cases, plot_gas
-from .biaxial import BiaxialPanel, plot_biaxial
-from .charts import Chart, Charts, Series, dots, line
-from .clock import plot_clock
-from .content import Download, Facts, Listing, Picture, Report, Section, Table, Words, pictures
-from .convergence import ConvergencePanel, plot_convergence
-from .curves import plot_curves
+A chart is declared once, as plain data (`Chart`): `save` draws it as a file, `write_report` puts it
+on the page.
+"""
+
+from .bubbles import (
+    chosen,
+    clock_charts,
+    cut_charts,
+    disk_charts,
+    height_charts,
+    kilo,
+    left_out,
+    ranks,
+    registration_charts,
+    rise_charts,
+    sphere_charts,
+)
+from .charts import Chart, Charts, Series, band, dots, faces, line
+from .content import (
+    Download,
+    Facts,
+    Listing,
+    Part,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Words,
+    beside,
+    pictures,
+    read_page_data,
+)
+from .cylinders import (
+    BeamBodies,
+    BendLine,
+    BendPanel,
+    BendReadings,
+    beam_charts,
+    bending_charts,
+    gas_charts,
+)
 from .html import percent, write_report
-from .laws import LawRow, plot_laws
-from .loads import StripCurves, plot_loads
-from .maps import Maps, Shade, Solid, maps_of
-from .moduli import plot_moduli
-from .moduli_together import plot_moduli_together
-from .nu12 import plot_nu12
-from .optima import plot_optima
-from .orders import OrderErrors, plot_orders
-from .packed import pack
-from .pinned import plot_pinned
-from .plan import plot_plan
-from .profiles import plot_profiles
-from .registration import plot_registration
-from .rises import plot_rises
-from .scatter import plot_heights
-from .sphere import plot_spheres
-from .strip import plot_strip
-from .surface import plot_disk
-from .vtu import write_vtu
-from .weights import plot_weights
+from .maps import Maps, Shade, Solid, maps_of, pack
+from .moduli import bootstrap_charts, moduli_charts, moduli_together, pinned_charts
+from .strips import (
+    BiaxialPanel,
+    OrderErrors,
+    StripCurves,
+    biaxial_charts,
+    load_charts,
+    order_charts,
+    specimen_charts,
+    strip_charts,
+)
+from .studies import (
+    ConvergencePanel,
+    LawRow,
+    ProfilePanel,
+    convergence_charts,
+    held_out_charts,
+    law_charts,
+    nu12_charts,
+    optima_chart,
+    plan_charts,
+    profile_charts,
+    weights_charts,
+)
+from .vega import save
+from .vtu import write_pvd, write_vtu
 
 __all__ = [
     "BeamBodies",
@@ -45,7 +85,9 @@ __all__ = [
     "Listing",
     "Maps",
     "OrderErrors",
+    "Part",
     "Picture",
+    "ProfilePanel",
     "Report",
     "Section",
     "Series",
@@ -54,37 +96,49 @@ __all__ = [
     "StripCurves",
     "Table",
     "Words",
+    "band",
+    "beam_charts",
+    "bending_charts",
+    "beside",
+    "biaxial_charts",
+    "bootstrap_charts",
+    "chosen",
+    "clock_charts",
+    "convergence_charts",
+    "cut_charts",
+    "disk_charts",
     "dots",
+    "faces",
+    "gas_charts",
+    "height_charts",
+    "held_out_charts",
+    "kilo",
+    "law_charts",
+    "left_out",
     "line",
+    "load_charts",
     "maps_of",
+    "moduli_charts",
+    "moduli_together",
+    "nu12_charts",
+    "optima_chart",
+    "order_charts",
     "pack",
     "percent",
     "pictures",
-    "plot_beam",
-    "plot_bending",
-    "plot_bending_cases",
-    "plot_biaxial",
-    "plot_clock",
-    "plot_convergence",
-    "plot_curves",
-    "plot_disk",
-    "plot_gas",
-    "plot_heights",
-    "plot_laws",
-    "plot_loads",
-    "plot_moduli",
-    "plot_moduli_together",
-    "plot_nu12",
-    "plot_optima",
-    "plot_orders",
-    "plot_pinned",
-    "plot_plan",
-    "plot_profiles",
-    "plot_registration",
-    "plot_rises",
-    "plot_spheres",
-    "plot_strip",
-    "plot_weights",
+    "pinned_charts",
+    "plan_charts",
+    "profile_charts",
+    "ranks",
+    "read_page_data",
+    "registration_charts",
+    "rise_charts",
+    "save",
+    "specimen_charts",
+    "sphere_charts",
+    "strip_charts",
+    "weights_charts",
+    "write_pvd",
     "write_report",
     "write_vtu",
 ]

@@ -9,24 +9,30 @@ from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..runs.bootstrap import METHOD, SAMPLES
 from ..runs.series import FILES, write_folder
-from .bootstrap_charts import Array, bootstrap_charts
-from .bootstraps import plot_bootstrap
+from .charts import Array, Charts
 from .content import Report, Section, Table
 from .fit_page import two_digits
 from .html import percent
+from .moduli import bootstrap_charts
+from .vega import save
 
 if TYPE_CHECKING:
     from ..runs.bootstrap import Bootstrap
 
+CAPTION = (
+    f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
+    "band by the noise alone"
+)
 TABLE, COEFFICIENTS, FIGURE = "bootstrap.csv", "coefficients.csv", "bootstrap.png"
 
 
 def write_bootstrap(done: Bootstrap, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
     shown = (done.strains, _best(done), done.bands, done.of_fit)
-    figures = {FIGURE: lambda path: plot_bootstrap(path, *shown)}
+    charts = bootstrap_charts(*shown, CAPTION)
+    figures = {FIGURE: lambda path: save(path, charts)}
     tables = {TABLE: done.table(), COEFFICIENTS: done.coefficients()}
-    return write_folder(folder, tables, figures, done.notes, _page(done), done.result, 9)
+    return write_folder(folder, tables, figures, done.notes, _page(done, charts), done.result, 9)
 
 
 def _best(done: Bootstrap) -> dict[str, Array]:
@@ -35,12 +41,8 @@ def _best(done: Bootstrap) -> dict[str, Array]:
     return {name: law.modulus(name, strain) for name, strain in done.strains.items()}
 
 
-def _page(done: Bootstrap) -> Report:
+def _page(done: Bootstrap, charts: Charts) -> Report:
     told = ", ".join(f"{name} {percent(own)}" for name, (own, _) in done.sigma.items())
-    caption = (
-        f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
-        "band by the noise alone"
-    )
     return Report(
         title=f"{done.found.setup.project.title}: bootstrap over {done.over}",
         summary=f"1 sigma over {len(done.samples)} samples: {told}.",
@@ -56,7 +58,7 @@ def _page(done: Bootstrap) -> Report:
             Section(
                 "The samples",
                 [
-                    bootstrap_charts(done.strains, _best(done), done.bands, done.of_fit, caption),
+                    charts,
                     _sigmas(done),
                     _correlations(done),
                 ],

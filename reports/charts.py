@@ -1,37 +1,52 @@
-"""Curves, bands and measured points as data: what a chart of the page is drawn from."""
+"""Charts as plain data: each is declared once, and `vega` draws it on the page and as a file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import Literal
+from math import isfinite, log10
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
 Numbers = Sequence[float | None]
+#: Colours of values: from nothing to much, or with zero in the middle.
+Shades = Literal["from least", "about zero"]
+Look = Literal["line", "dots", "band", "faces"]
 
-#: Digits of what a chart is drawn from.
+#: Significant digits of the numbers in a chart.
 DIGITS = 6
-#: Measured points that are drawn of one series; of more, every second, third ... is.
+#: Most points drawn of one series of dots; longer series are thinned evenly.
 MOST_POINTS = 400
+#: A ratio of values above which a logarithmic axis is easier to read than a linear one.
+DECADE = 10.0
+#: Free space beyond the data, as a share of their range.
+MARGIN = 0.05
+#: A smaller share of values of the other sign does not call for colours about zero.
+ONE_SIGN = 0.05
+#: Titles by name of the direction of a strip; other names stand as they are.
+TITLES = {"bias": "45° bias", "bias45": "45° bias"}
 
 
 @dataclass(frozen=True)
 class Series:
-    """One curve, band or cloud of points of a chart.
+    """One curve, band, cloud of points or set of coloured faces of a chart.
 
     Parameters
     ----------
     name : in the legend, "" for none.
-    x, y : (n,) in the units of the axes; None where there is no value.
-    lower, upper : (n,) ends of a band about the curve; empty for none.
-    look : line, dots, or nothing but the band.
-    colour : number of the named colour; rank : 0 to 1 along the colours of rising loads instead.
-    dashes : number of the pattern, 0 for none. ends : whether a dot ends the curve: nothing is
-    known further on. faint : what stands behind the others. marks : whether every value of a line
-    has a dot.
+    x, y : (n,) in the units of the axes; None where there is no value. Faces have their corners
+        one after the other.
+    lower, upper : (n,) ends of a band about a curve, or of error bars through dots.
+    look : line, dots, only the band, or faces.
+    colour : index of the palette; rank : 0 to 1 along the colours of rising loads instead.
+    dashes : index of the dash pattern, 0 for solid. ends : draw a dot at the end of the curve.
+    faint : thin, pale and behind the others. marks : draw a dot at every value of a line.
+    values : colours on the chart's scale, one for every dot or face.
+    shape : Vega's name of the symbol. wide : a thick pale line behind the others. hollow : dots
+    are rings.
     """
 
     name: str
@@ -39,22 +54,33 @@ class Series:
     y: Numbers = ()
     lower: Numbers = ()
     upper: Numbers = ()
-    look: Literal["line", "dots", "band"] = "line"
+    look: Look = "line"
     colour: int = 0
     rank: float | None = None
     dashes: int = 0
     ends: bool = False
     faint: bool = False
     marks: bool = False
+    values: Numbers = ()
+    shape: str = "circle"
+    wide: bool = False
+    hollow: bool = False
 
 
 @dataclass(frozen=True)
 class Chart:
-    """One pair of axes. Labels have their units; alt says in words what there is to see.
+    """One pair of axes; the labels name the units.
 
-    from_zero : whether the y axis begins at zero. top : of the y axis, where a band may be as wide
-    as it likes; None for that of everything drawn. level : a line across, at this y.
-    x_names : what stands at x = 1, 2, ... instead of numbers.
+    Parameters
+    ----------
+    alt : description in words for those who cannot see the chart.
+    from_zero : the y axis begins at zero. top : end of the y axis, where a band may be wider than
+        is worth showing; None for that of all that is drawn. level : y of a horizontal line.
+    x_names : names at x = 1, 2, ... in place of numbers.
+    equal : both axes have the same scale, as a drawing true to scale needs.
+    scale : label of the colours of `Series.values`. shades : their kind; ends : values of the
+        first and last colour, those of the data by default.
+    x_range, y_range : part that is shown; everything by default.
     """
 
     title: str
@@ -68,20 +94,27 @@ class Chart:
     level: float | None = None
     log_x: bool = False
     x_names: Sequence[str] = ()
+    equal: bool = False
+    scale: str = ""
+    shades: Shades = "from least"
+    ends: tuple[float, float] | None = None
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class Charts:
-    """Charts that belong together, side by side where there is room, with one caption."""
+    """Charts that belong together, with one caption; columns : in a file, 0 for up to three."""
 
     name: str
     charts: Sequence[Chart]
     caption: str
+    columns: int = 0
     part: Literal["charts"] = "charts"
 
 
 def numbers(values: ArrayLike) -> list[float | None]:
-    """(n,) as plain numbers of `DIGITS` digits; None for what is not finite."""
+    """Return (n,) plain numbers of `DIGITS` digits; None for what is not finite."""
     flat = np.asarray(values, dtype=float).ravel().tolist()
     return [float(f"{v:.{DIGITS}g}") if isfinite(v) else None for v in flat]
 
@@ -91,25 +124,123 @@ def line(
     x: ArrayLike,
     y: ArrayLike,
     band: tuple[ArrayLike, ArrayLike] | None = None,
-    colour: int = 0,
-    rank: float | None = None,
-    dashes: int = 0,
-    ends: bool = False,
-    faint: bool = False,
-    marks: bool = False,
+    **look: Any,
 ) -> Series:
-    """A curve of arrays (n,), with its band where there is one."""
+    """Return a curve of arrays (n,), with its band; look : further fields of `Series`."""
     lower, upper = ([], []) if band is None else (numbers(band[0]), numbers(band[1]))
-    return Series(
-        name, numbers(x), numbers(y), lower, upper, "line", colour, rank, dashes, ends, faint, marks
-    )
+    return Series(name, numbers(x), numbers(y), lower, upper, **look)
+
+
+def band(name: str, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, **look: Any) -> Series:
+    """Return only a band between two curves (n,)."""
+    return Series(name, numbers(x), (), numbers(lower), numbers(upper), "band", **look)
 
 
 def dots(
-    name: str, x: ArrayLike, y: ArrayLike, colour: int = 0, rank: float | None = None
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    bars: tuple[ArrayLike, ArrayLike] | None = None,
+    most: int = MOST_POINTS,
+    values: ArrayLike = (),
+    **look: Any,
 ) -> Series:
-    """Points of arrays (n,); where there are very many, every second, third ... of them."""
-    count = max(1, -(-len(np.ravel(np.asarray(x))) // MOST_POINTS))
-    return Series(
-        name, numbers(x)[::count], numbers(y)[::count], look="dots", colour=colour, rank=rank
-    )
+    """Return points of arrays (n,), thinned to at most `most`, with the ends of error bars."""
+    every = slice(None, None, max(1, -(-np.size(np.asarray(x)) // most)))
+    lower, upper = ([], []) if bars is None else (numbers(end)[every] for end in bars)
+    across, up, own = (numbers(given)[every] for given in (x, y, values))
+    return Series(name, across, up, lower, upper, look="dots", values=own, **look)
+
+
+def faces(name: str, corners: ArrayLike, values: ArrayLike) -> Series:
+    """Return polygons of corners (faces, k, 2), coloured by values (faces,)."""
+    at = np.asarray(corners, dtype=float)
+    x, y = numbers(at[..., 0]), numbers(at[..., 1])
+    return Series(name, x, y, look="faces", values=numbers(values))
+
+
+def spans_a_decade(values: ArrayLike) -> bool:
+    """Return True where the finite values are all positive and span more than a decade."""
+    finite = np.asarray(values, dtype=float).ravel()
+    finite = finite[np.isfinite(finite)]
+    return bool(len(finite) and finite.min() > 0 and finite.max() > DECADE * finite.min())
+
+
+def shades_of(values: ArrayLike) -> Shades:
+    """Return the kind of colours that values call for: about zero where both signs matter."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    both = min(-low, high) > ONE_SIGN * max(abs(low), abs(high))
+    return "about zero" if both else "from least"
+
+
+def ends_of(values: Array, shades: Shades) -> tuple[float, float]:
+    """Return the values of the first and the last colour."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return 0.0, 1.0
+    if shades == "about zero":
+        most = float(np.abs(known).max()) or 1.0
+        return -most, most
+    low, high = float(known.min()), float(known.max())
+    return (low, high) if high > low else (low, low + 1.0)
+
+
+def scale_ends(chart: Chart) -> tuple[float, float]:
+    """Return the values of a chart's first and last colour."""
+    if chart.ends is not None:
+        return chart.ends
+    every = [np.array(s.values, dtype=float) for s in chart.series if s.values]
+    return ends_of(np.concatenate(every) if every else np.zeros(0), chart.shades)
+
+
+def looks_of(charts: Sequence[Chart]) -> Mapping[str, Series] | None:
+    """Return one series by name; None where charts draw the same name in different looks."""
+    found: dict[str, Series] = {}
+    for s in (s for chart in charts for s in chart.series if s.name):
+        first = found.setdefault(s.name, s)
+        if _look(s) != _look(first) and s.look == first.look:
+            return None
+    return found
+
+
+def _look(s: Series) -> tuple[object, ...]:
+    return s.colour if s.rank is None else s.rank, s.dashes, s.shape, s.hollow
+
+
+def axis_ends(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the least and largest value of the x and of the y axis, with a small margin."""
+    along = (s.x for s in chart.series)
+    up: Iterable[Numbers] = (v for s in chart.series for v in (s.y, s.lower, s.upper))
+    if chart.top is not None:
+        up = (s.y for s in chart.series)
+    level = [] if chart.level is None else [chart.level]
+    values = [*_known(up, chart.log_y), *level]
+    low, high = _ends(values, chart.log_y, MARGIN)
+    if not chart.log_y and not chart.equal and min(values, default=0.0) >= 0:
+        low = 0.0 if chart.from_zero or low < 0.25 * high else low
+    if chart.top is not None:
+        high = max(chart.top, low + 1e-12)
+    if chart.x_names:
+        return (0.5, len(chart.x_names) + 0.5), chart.y_range or (low, high)
+    dotted = any(s.look != "line" or s.marks for s in chart.series)
+    x = _ends(_known(along, chart.log_x), chart.log_x, 0.02 if dotted else 0.0)
+    return chart.x_range or x, chart.y_range or (low, high)
+
+
+def _known(several: Iterable[Numbers], log: bool) -> list[float]:
+    return [v for own in several for v in own if v is not None and (v > 0 or not log)]
+
+
+def _ends(values: list[float], log: bool, room: float) -> tuple[float, float]:
+    if not values:
+        return (1.0, 10.0) if log else (0.0, 1.0)
+    low, high = min(values), max(values)
+    if log:
+        share = max((high / low) ** room, 1.0 if high > low else 2.0)
+        # An axis of less than a third of a decade has hardly a number to read.
+        while log10(high * share / (low / share)) < 0.35:
+            share *= 1.2
+        return low / share, high * share
+    span = high - low
+    more = room * span if span > 0 else 0.5 * abs(high) or 0.5
+    return low - more, high + more

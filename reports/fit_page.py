@@ -27,11 +27,9 @@ from ..writing import replacing
 from .charts import Charts
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
-from .moduli import plot_moduli
-from .moduli_charts import moduli_charts, pinned_charts
-from .optima import plot_optima
-from .optima_charts import optima_chart
-from .pinned import plot_pinned
+from .moduli import moduli_charts, pinned_charts
+from .studies import optima_chart
+from .vega import save
 
 if TYPE_CHECKING:
     from ..runs.folder import AS_RUN, DIGITS, PROVENANCE
@@ -469,8 +467,9 @@ def _shown(exhibits: Mapping[str, Exhibit]) -> list[Part]:
 
 
 def _optima(fit: Fit, folder: Path) -> Charts:
-    plot_optima(folder / OPTIMA, optima(fit))
-    return optima_chart(optima(fit), optima_words(fit))
+    charts = optima_chart(optima(fit), optima_words(fit))
+    save(folder / OPTIMA, charts)
+    return charts
 
 
 def _moduli(fit: Fit, folder: Path) -> Charts:
@@ -487,13 +486,13 @@ def _moduli(fit: Fit, folder: Path) -> Charts:
             ]
         ).transpose(1, 0, 2)
     truth = None if known is None else modulus_curves(known, strains)
-    shown = None if known is not None else band
-    plot_moduli(folder / MODULI_PICTURE, strains, curves, truth, band=shown)
     words = ", where a dot ends them" if known is None and band is not None else ""
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    return moduli_charts(strains, curves, truth, band, caption)
+    charts = moduli_charts(strains, curves, truth, band, caption)
+    save(folder / MODULI_PICTURE, charts)
+    return charts
 
 
 def _strains(fit: Fit, count: int = SMOOTH) -> Array:
@@ -513,9 +512,10 @@ def _pinned(fit: Fit, folder: Path) -> list[Charts]:
         for source, sigmas in pins.items()
     }
     count = next(iter(sigma.values())).shape[1]
-    plot_pinned(folder / PINNED, _strains(fit, count), sigma)
     caption = "What each test pins down: one standard deviation of the moduli"
-    return [pinned_charts(_strains(fit, count), sigma, caption)]
+    charts = pinned_charts(_strains(fit, count), sigma, caption)
+    save(folder / PINNED, charts)
+    return [charts]
 
 
 FAILED = "This failed, and there is no result."

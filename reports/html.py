@@ -4,30 +4,33 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import fields
 from datetime import date
+from io import BytesIO
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from jinja2 import FileSystemLoader
+from markupsafe import Markup
+from PIL import Image, UnidentifiedImageError
 
 from ..files import TEMPLATES, environment
 from ..notes import percent as percent
 from ..writing import replacing
-from .chart_svg import chart_svg
-from .content import Report
-from .embedded import data_uri
-from .map_svg import map_svg
-from .markup import as_markup
-from .page_data import charts_data, maps_data, solid_data
-from .page_file import as_written, write_page_data
-from .solid_svg import solid_svg
+from . import maps, vega
+from .charts import Charts
+from .content import Report, as_written, write_page_data
 
 PAGE = "report.html"
 #: In the order in which they are read.
-SCRIPTS = ("tools", "axes", "charts", "chart_mouse", "maps", "solids", "start")
+SCRIPTS = ("tools", "charts", "maps", "solids", "start")
+#: Colours that a picture keeps; enough for its shades, a third of the bytes.
+COLOURS = 128
+#: Pixels along which a picture is wide at most.
+WIDEST = 1600
 
 
 def write_report(folder: Path | str, report: Report) -> Path:
@@ -60,33 +63,41 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
 
 
 def page_text(folder: Path, report: Report, today: date | None = None) -> str:
-    """The page as text. folder : of its pictures; today : the day that it names."""
+    """Return the page as text. folder : of its pictures; today : the day that it names."""
     html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
     html.filters |= {
-        "number": number, "percent": percent, "chart_svg": chart_svg, "map_svg": map_svg,
-        "charts_data": charts_data, "maps_data": maps_data, "solid_svg": solid_svg,
-        "solid_data": solid_data, "data_link": data_link,
+        "number": number, "percent": percent, "chart_views": chart_views, "drawn": vega.figure,
+        "map_views": maps.map_views, "maps_data": maps.maps_data, "as_script": as_script,
+        "solid_svg": maps.solid_svg, "solid_data": maps.solid_data, "data_link": data_link,
         "data_uri": lambda file: data_uri(folder, file),
     }  # fmt: skip
-    style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8")
+    style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8") + vega.dark_style()
+    moving = any(part.part in ("charts", "maps") for part in report.parts)
     script = "".join(
         (TEMPLATES / "report" / "scripts" / f"{name}.js").read_text(encoding="utf-8")
         for name in SCRIPTS
     )
     script = f'"use strict";\n{{\n{script}}}\n'
+    library = vega.library() if moving else ""
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
-        "style": as_markup(style), "script": as_markup(script), "today": today or date.today(),
-        "policy": policy(style, script),
+        "style": _own(style), "script": _own(script), "library": _own(library),
+        "today": today or date.today(), "policy": policy(style, script, library),
     }  # fmt: skip
     return html.get_template("report.html.j2").render(context)
 
 
-def policy(style: str, script: str) -> str:
-    """What the page may do: run this script, look as this style says, show what is inside it."""
+def chart_views(part: Charts) -> list[dict[str, Any]]:
+    """Return Vega's specification of every chart of a figure."""
+    width = vega.NARROW if len(part.charts) >= vega.THREE else vega.WIDE
+    return [vega.view(chart, width) for chart in part.charts]
+
+
+def policy(style: str, *scripts: str) -> str:
+    """Return what the page may do: run these scripts, look as this style says, show itself."""
     allowed: Mapping[str, str] = {
         "default-src": "'none'",
-        "script-src": _hash(script),
+        "script-src": " ".join(_hash(script) for script in scripts if script),
         "style-src": _hash(style),
         "img-src": "data:",
         "base-uri": "'none'",
@@ -99,13 +110,44 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
+def _own(text: str) -> Markup:
+    return Markup(text)  # noqa: S704 - style and scripts are part of the product
+
+
+def as_script(content: Any) -> Markup:
+    """Return JSON that ends no script element, whatever it holds."""
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return Markup(safe)  # noqa: S704 - the three letters that matter in HTML are escaped
+
+
 def data_link(text: str) -> str:
-    """A link whose target is the text itself."""
+    """Return a link whose target is the text itself."""
     return "data:application/octet-stream;base64," + base64.b64encode(text.encode()).decode()
 
 
+def data_uri(folder: Path, file: str) -> str:
+    """Return a PNG of the folder as a link, "" where there is no such picture in it.
+
+    Names that lead out of the folder are of no picture in it.
+    """
+    path = (folder / file).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        return ""
+    try:
+        with Image.open(path, formats=["PNG"]) as picture:
+            small = picture.convert("RGB")
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError):
+        return ""
+    if small.width > WIDEST:
+        small = small.resize((WIDEST, round(small.height * WIDEST / small.width)))
+    stream = BytesIO()
+    small.quantize(COLOURS, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
 def number(value: object) -> str:
-    """Four significant digits for floats; text, counts and missing values as a reader expects."""
+    """Return four significant digits of floats; text, counts and missing values as expected."""
     if value is None:
         return "–"
     if not isinstance(value, float):

@@ -18,8 +18,8 @@ from ..runs.folder import RESULT, Store
 from ..writing import replacing
 from .content import Report, Section, Table, pictures
 from .html import write_report
-from .laws import LawRow, plot_laws
-from .named_charts import law_charts
+from .studies import LawRow, law_charts
+from .vega import save
 
 if TYPE_CHECKING:
     from ..experiments.kinds import PreparedTest
@@ -90,7 +90,8 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         for f in comparison.forms
     ]
     total = sum(noise(first).values())
-    plot_laws(folder / "laws.png", rows, total, result["objective_is"])
+    charts = law_charts(rows, total, result["objective_is"], CAPTION)
+    save(folder / "laws.png", charts)
     page = Report(
         title=f"{comparison.project.title}: forms of the moduli",
         summary="; ".join(conclusion(result)),
@@ -98,7 +99,7 @@ def write_comparison(comparison: LawComparison, folder: Path) -> Path:
         warnings=[note.line for note in comparison.notes],
         sections=[
             Section("Errors", [
-                law_charts(rows, total, result["objective_is"], CAPTION),
+                charts,
                 Table(
                     "Errors",
                     list(table.columns),

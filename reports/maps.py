@@ -1,19 +1,76 @@
-"""Values at places over several loads as data: what maps of the page are drawn from."""
+"""Values at places and surfaces over several loads: the page's maps and its body to turn.
+
+Arrays are kept packed (`Packed`); maps are charts of coloured dots that Vega draws; the surface is
+drawn here for paper, and moved by a script of the page.
+"""
 
 from __future__ import annotations
 
+import base64
+import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+from math import prod
+from typing import Any, Literal
 
 import numpy as np
+from markupsafe import Markup, escape
 from numpy.typing import ArrayLike, NDArray
 
-from .packed import Packed, pack
+from .charts import Array, Chart, Shades, dots, ends_of
+from .vega import COLOURS, view
 
-Array = NDArray[np.float64]
-#: Colours: from nothing to much, or with zero in the middle.
-Shades = Literal["from least", "about zero"]
+#: Steps between the least and the largest value; one more stands for what is not there.
+STEPS = 65534
+MISSING = 65535
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Numbers of any shape: value = least + step * (0 to `STEPS`), `MISSING` for NaN.
+
+    shape : of the array, in C order. least, step : in the numbers' unit. data : little endian
+    unsigned 16 bit, zlib, base 64.
+    """
+
+    shape: tuple[int, ...]
+    least: float
+    step: float
+    data: str
+
+    @property
+    def values(self) -> Array:
+        """The array; each value within half a `step` of what was packed.
+
+        Raises
+        ------
+        ValueError : the data are damaged, or of another shape.
+        """
+        count = prod(self.shape)
+        try:
+            # One byte more than wanted shows what is longer; nothing longer is unpacked.
+            raw = zlib.decompressobj().decompress(base64.b64decode(self.data), 2 * count + 1)
+        except zlib.error as error:
+            raise ValueError(f"packed numbers are damaged: {error}") from None
+        if len(raw) != 2 * count:
+            raise ValueError(f"packed numbers: {len(raw) // 2}, expected {count}")
+        steps = np.frombuffer(raw, dtype="<u2").astype(float)
+        steps[steps == MISSING] = np.nan
+        return np.asarray(self.least + self.step * steps.reshape(self.shape))
+
+
+def pack(values: ArrayLike) -> Packed:
+    """Numbers as text; infinite ones and NaN are missing."""
+    array = np.asarray(values, dtype=float)
+    known = np.isfinite(array)
+    least = float(array[known].min()) if known.any() else 0.0
+    most = float(array[known].max()) if known.any() else 0.0
+    step = (most - least) / STEPS or 1.0
+    steps = np.full(array.shape, MISSING, dtype="<u2")
+    steps[known] = np.rint((array[known] - least) / step)
+    data = base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode()
+    return Packed(array.shape, least, step, data)
+
 
 #: What stands beside each other in a row of maps, and how it is coloured.
 BESIDE: Mapping[str, Shades] = {
@@ -21,6 +78,8 @@ BESIDE: Mapping[str, Shades] = {
     "modelled": "from least",
     "modelled − measured": "about zero",
 }
+#: Pixels of a map, and of which a colour bar is four fifths.
+SIDE = 150.0
 #: Places that are drawn of one load; of more, every second, third ... is.
 MOST_PLACES = 700
 
@@ -115,3 +174,142 @@ def maps_of(
     if max(every) > 1:
         caption += f" Of the places one in {max(every)} is shown."
     return Maps(name, loads, slider, counts, pack(thin(places)), panels, *labels, caption, alt)
+
+
+def frame_of(maps: Maps, values: Array, load: int) -> Array:
+    """What of values (all, ...) belongs to a load."""
+    first = sum(maps.counts[:load])
+    return values[first : first + maps.counts[load]]
+
+
+def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
+    """Of the colours: the same for the maps of a row that have the same shades."""
+    alike = [p for p in maps.panels if p.row == panel.row and p.shades == panel.shades]
+    every = np.concatenate([frame_of(maps, p.values.values, load) for p in alike])
+    return ends_of(every, panel.shades)
+
+
+def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
+    """Return one map at one load as a chart of coloured dots, true to scale."""
+    every, places = maps.places.values, frame_of(maps, maps.places.values, load)
+    low, high = every.min(axis=0), every.max(axis=0)
+    around = 0.04 * float((high - low).max()) or 1.0
+    values = frame_of(maps, panel.values.values, load)
+    spots = dots("", places[:, 0], places[:, 1], most=max(len(places), 1), values=values)
+    return Chart(
+        panel.name, maps.x_label, maps.y_label, [spots],
+        f"{panel.name}, {panel.unit}, {maps.loads[load]}", equal=True, scale=panel.unit,
+        shades=panel.shades, ends=row_ends(maps, panel, load),
+        x_range=(float(low[0]) - around, float(high[0]) + around),
+        y_range=(float(low[1]) - around, float(high[1]) + around),
+    )  # fmt: skip
+
+
+def map_views(maps: Maps) -> list[dict[str, Any]]:
+    """Return Vega's specifications of all maps at the last load."""
+    last = len(maps.loads) - 1
+    # About as wide as neighbours lie apart.
+    size = float(np.clip(1.3 * SIDE**2 / max(maps.counts), 5.0, 160.0))
+    return [view(map_chart(maps, panel, last), width=SIDE, dot=size) for panel in maps.panels]
+
+
+def maps_data(maps: Maps) -> dict[str, Any]:
+    """Return what the page's script needs: all values, packed, and the ends of the colours."""
+    loads = range(len(maps.loads))
+    ends = [[row_ends(maps, panel, load) for panel in maps.panels] for load in loads]
+    return asdict(maps) | {"ends": ends}
+
+
+def solid_data(solid: Solid) -> dict[str, Any]:
+    """Return what the page's script needs to turn a surface: values, and the first view."""
+    every = solid.points.values
+    return asdict(solid) | {
+        "colours": COLOURS, "scale": scale_of(every), "middle": middle_of(every).tolist(),
+        "centre": CENTRE, "turn": TURN, "raise": RAISE,
+    }  # fmt: skip
+
+
+#: Classes of a surface's values.
+CLASSES = len(COLOURS["from least"])
+WIDTH, HEIGHT, MARGIN = 570.0, 430.0, 12.0
+#: Of the width, for the colour bar and its numbers; the surface stands in the rest.
+BAR, BAR_HEIGHT = 112.0, 152.0
+#: From where it is seen at first, degrees: turned about z, and raised over the horizon.
+TURN, RAISE = 35.0, 28.0
+#: Where the middle of the surface stands.
+CENTRE = (0.5 * (WIDTH - BAR), 0.5 * HEIGHT)
+
+
+def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
+    """The surface at a load, coloured by one of its shades."""
+    every = solid.points.values
+    faces = np.rint(solid.faces.values).astype(int)
+    flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
+    flat = flat * scale_of(every) * (1.0, -1.0) + CENTRE
+    own = solid.shades[shade]
+    low, high = ends_of(own.values.values, own.shades)
+    number = classes(own.values.values[load], low, high)
+    colours = COLOURS[own.shades]
+    parts = [
+        f'<svg class="solid" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
+        f'aria-label="{escape(solid.alt or solid.caption)}"><g class="faces">'
+    ]
+    for k in np.argsort(depth[faces].mean(axis=1)):
+        d = "L".join(f"{x:.1f} {y:.1f}" for x, y in flat[faces[k]])
+        fill = colours[number[k]] if number[k] >= 0 else "#999"
+        parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
+    parts.append(f'</g><g class="scale" transform="translate({WIDTH - BAR + 8:g} {2 * MARGIN:g})">')
+    parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
+    return Markup("".join(parts))  # noqa: S704 - titles and units are escaped
+
+
+def middle_of(points: Array) -> Array:
+    """(3,) of the box around all loads, about which it is turned."""
+    flat = points.reshape(-1, 3)
+    return np.asarray(0.5 * (flat.min(axis=0) + flat.max(axis=0)))
+
+
+def scale_of(points: Array) -> float:
+    """Of the picture, so that it fits however it is turned."""
+    flat = points.reshape(-1, 3)
+    radius = float(np.linalg.norm(flat - middle_of(points), axis=1).max()) or 1.0
+    return (min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / radius
+
+
+def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
+    """(n, 2) to the right and up, and (n,) how near, of points (n, 3) mm."""
+    a, b = np.radians(turn), np.radians(height)
+    right = points @ (np.cos(a), np.sin(a), 0.0)
+    away = points @ (-np.sin(a), np.cos(a), 0.0)
+    up = points[:, 2] * np.cos(b) + away * np.sin(b)
+    near = points[:, 2] * np.sin(b) - away * np.cos(b)
+    return np.column_stack([right, up]), near
+
+
+def scale_bar(shades: Shades, unit: str, low: float, high: float) -> str:
+    """The colours from low to high, upwards, with three values and the unit."""
+    colours = COLOURS[shades]
+    each = BAR_HEIGHT / len(colours)
+    bars = "".join(
+        f'<rect y="{each * (len(colours) - 1 - k):.1f}" width="12" height="{each + 0.5:.1f}" '
+        f'fill="{shade}"/>'
+        for k, shade in enumerate(colours)
+    )
+    tall = each * len(colours)
+    words = "".join(
+        f'<text class="end" x="16" y="{at:.1f}">{short(value)}</text>'
+        for value, at in ((high, 9.0), (0.5 * (low + high), 0.5 * tall + 4), (low, tall))
+    )
+    return f'{bars}{words}<text class="unit" x="0" y="{tall + 16:.1f}">{escape(unit)}</text>'
+
+
+def short(value: float) -> str:
+    """Return a number with three digits."""
+    return f"{float(f'{value:.3g}'):g}".replace("-", "\u2212")
+
+
+def classes(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.intp]:
+    """Number of each value's colour, -1 where there is no value."""
+    share = (values - low) / (high - low)
+    number = np.clip(np.floor(np.nan_to_num(share) * CLASSES), 0, CLASSES - 1).astype(np.intp)
+    return np.where(np.isfinite(values), number, -1)

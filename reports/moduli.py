@@ -1,127 +1,179 @@
-"""Moduli of the best fits beside the known solution (Fig. 4.9), or of several named laws."""
+"""Charts of tangent moduli over strain: fits, bands, and what each test determines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullLocator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..inference.posterior import LEVEL
-from .style import BLACK, SKY, VERMILION, named_look, new_figure, quiet, save
+from .charts import Array, Chart, Charts, Series, dots, line, spans_a_decade
 
-Array = NDArray[np.float64]
-
+#: Title and axis of E1, E2 and G12.
 PANELS = (
-    ("$E_1$ (warp)", r"warp strain $\varepsilon_1$"),
-    ("$E_2$ (fill)", r"fill strain $\varepsilon_2$"),
-    ("$G_{12}$ (shear)", r"shear strain $\gamma_{12}$"),
+    ("E1, along the warp", "logarithmic strain ε1"),
+    ("E2, along the fill", "logarithmic strain ε2"),
+    ("G12, in shear", "shear strain γ12"),
 )
-#: Deviation (%) below which curves are the same to machine precision.
-SMALLEST = 1e-10
-BAND = f"{100 * LEVEL:.0f} % band"
+MODULUS = "tangent modulus, MPa"
+#: Deviation (%) below which curves are the same to machine precision, and decades drawn of it.
+SAME, DECADES = 1e-10, 7
+#: Percent; a modulus known no better than this is not determined.
+NOT_DETERMINED = 1000.0
+#: Percent; nothing is known better than this, and a zero has to stand somewhere.
+SMALLEST = 1e-3
+#: Of the percentiles of a bootstrap, which are two curves.
+SAMPLES = "percentiles of the samples"
 
 
-def plot_moduli(
-    path: Path | str,
+def moduli_charts(
     strains: ArrayLike,
     moduli: ArrayLike,
     known: ArrayLike | None = None,
-    names: Sequence[str] | None = None,
     band: ArrayLike | None = None,
-) -> Path:
-    """Draw E1, E2 and G12 over the strain range reached.
+    caption: str = "",
+    names: Sequence[str] | None = None,
+) -> Charts:
+    """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
 
     Parameters
     ----------
-    path : PNG, SVG or PDF.
     strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached;
         (fits, 3, k) where every law has a range of its own.
     moduli : (fits, 3, k) MPa, best fit first, in the same order.
-    known : (3, k) MPa; a second row of panels then shows the deviation from it in percent.
-    names : of the fits, where they are laws to be told apart and not one's best and the next.
-    band : (2, 3, k) MPa, lower and upper end of the band of the first fit; left out where they
-        are not finite. A dot then ends each of its curves, and the band with it.
+    known : (3, k) MPa; a second row of charts then shows the deviation from it in percent.
+    band : (2, 3, k) MPa, ends of the band of the first fit; not drawn where it is not finite.
+    names : of the fits where they are different laws, and not one's best and the next.
 
     Raises
     ------
     ValueError : not one name a fit, or strains of each law's own together with a known solution.
-    OutputError : the file cannot be written.
     """
-    fits = np.asarray(moduli, dtype=float)
-    given = np.asarray(strains, dtype=float)
-    x = np.broadcast_to(given, fits.shape)
-    truth = None if known is None else np.asarray(known, dtype=float)
+    fits, given = np.asarray(moduli, dtype=float), np.asarray(strains, dtype=float)
     if names is not None and len(names) != len(fits):
-        raise ValueError(f"plot_moduli: {len(names)} names for {len(fits)} fits")
-    if truth is not None and given.ndim == 3:
-        raise ValueError("plot_moduli: beside a known solution all fits need the same strains")
-    rows = 1 if truth is None else 2
-    figure = new_figure(10.5, 3.6 if rows == 1 else 5.6)
-    axes = figure.subplots(rows, 3, squeeze=False, height_ratios=[1.6, 1.0][:rows], sharex="col")
-    looks = _looks(len(fits), names)
-    for m, (name, strain) in enumerate(PANELS):
-        top = axes[0, m]
-        if truth is not None:
-            # Wide and pale beneath, so that a fit that lies on it is seen to do so.
-            top.plot(given[m], truth[m], color=VERMILION, linewidth=6, alpha=0.45, label="known")
-        if band is not None:
-            lower, upper = np.asarray(band, dtype=float)[:, m]
-            top.fill_between(
-                x[0, m], lower, upper, where=np.isfinite(lower) & np.isfinite(upper),
-                color=looks[0]["color"], alpha=0.18, linewidth=0, label=BAND,
-            )  # fmt: skip
-        for i in range(len(fits) - 1, -1, -1):
-            top.plot(x[i, m], fits[i, m], **looks[i])
-        if band is not None:
-            top.plot(x[0, m, -1:], fits[0, m, -1:], "o", color=looks[0]["color"], markersize=4.5)
-        drawn = fits[:, m] if truth is None else np.vstack([fits[:, m], truth[m : m + 1]])
-        # By the curves alone: a band may be as wide as it likes, and is then cut off.
-        top.set_ylim(min(0.0, float(drawn.min())), 1.08 * float(drawn.max()))
-        label = "tangent modulus, MPa" if m == 0 else ""
-        quiet(top, strain if rows == 1 else "", label, name)
-        if truth is not None:
-            _deviation(axes[1, m], given[m], fits[:, m], truth[m], strain, looks, first=m == 0)
-    lines = dict(zip(*axes[0, 0].get_legend_handles_labels()[::-1], strict=True))
-    order = [look["label"] for look in looks]
-    shown = {n: lines[n] for n in dict.fromkeys([*order, "known", BAND]) if n in lines}
-    figure.legend(
-        list(shown.values()), list(shown), loc="outside upper right", ncols=4, frameon=False
-    )
-    return save(figure, path)
-
-
-def _looks(fits: int, names: Sequence[str] | None) -> list[dict[str, Any]]:
-    """Of every fit: told apart by name, or the best before all others."""
-    if names is not None:
-        return [
-            {"linewidth": 1.5, **named_look(rank), "label": name} for rank, name in enumerate(names)
+        raise ValueError(f"moduli_charts: {len(names)} names for {len(fits)} fits")
+    if known is not None and given.ndim == 3:
+        raise ValueError("moduli_charts: beside a known solution all fits need the same strains")
+    x, truth = np.broadcast_to(given, fits.shape), None if known is None else np.asarray(known)
+    ends = None if band is None else np.asarray(band, dtype=float)
+    charts = []
+    for m, (title, label) in enumerate(PANELS):
+        own = None if ends is None else (ends[0, m], ends[1, m])
+        series = [
+            line(x=x[i, m], y=fits[i, m], **_look(i, len(fits), names)) for i in range(1, len(fits))
         ]
-    best = {"color": BLACK, "linewidth": 1.4, "label": "best"}
-    return [best, *[{"color": SKY, "linewidth": 1.2, "label": f"next {fits - 1}"}] * (fits - 1)]
+        dot = ends is not None and known is None
+        best = line(x=x[0, m], y=fits[0, m], band=own, ends=dot, **_look(0, len(fits), names))
+        series.insert(0, best)
+        drawn = [fits[:, m].max()]
+        if truth is not None:
+            series.append(line("known", given[m], truth[m], colour=1, dashes=1))
+            drawn.append(truth[m].max())
+        # By the curves alone: a band may be as wide as it likes, and is then cut off.
+        top, (first, *_, last) = 1.12 * float(max(drawn)), fits[0, m]
+        alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[0, m, -1]:.3g}"
+        charts.append(Chart(title, label, MODULUS, series, alt, from_zero=True, top=top))
+    if truth is not None:
+        charts += [_deviation(m, given[m], fits[:, m], truth[m], names) for m in range(3)]
+    return Charts("moduli", charts, caption, columns=3)
+
+
+def _look(rank: int, count: int, names: Sequence[str] | None) -> dict[str, Any]:
+    """Return name and look of a fit: by its name, or the best before all others."""
+    if names is not None:
+        return {"name": names[rank], "colour": rank, "dashes": rank // 8}
+    if rank == 0:
+        return {"name": "best", "colour": 0}
+    return {"name": f"next {count - 1}", "colour": 6, "faint": True}
 
 
 def _deviation(
-    axes: Axes, x: Array, fits: Array, truth: Array, strain: str, looks: Sequence[dict[str, Any]],
-    first: bool,
-) -> None:  # fmt: skip
-    percent = np.maximum(100 * np.abs(fits / truth - 1), SMALLEST)
-    for line, look in zip(percent[::-1], looks[::-1], strict=True):
-        axes.plot(x, line, **look)
-    # Whole decades with room for the text above; dips where curves cross say nothing.
-    high = np.ceil(np.log10(percent.max())) + 1
-    low = np.floor(max(np.log10(percent.min()), high - 7))
-    axes.set_yscale("log")
-    axes.set_ylim(10.0**low, 10.0**high)
-    axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    axes.yaxis.set_minor_locator(NullLocator())
-    quiet(axes, strain, "deviation from known, %" if first else "")
-    worst = f"{looks[0]['label']}: at most {percent[0].max():.2g} %"
-    axes.text(
-        0.98, 0.97, worst, transform=axes.transAxes,
-        ha="right", va="top", fontsize=8.5, color=BLACK,
-    )  # fmt: skip
+    m: int, strain: Array, fits: Array, truth: Array, names: Sequence[str] | None
+) -> Chart:
+    percent = np.maximum(100 * np.abs(fits / truth - 1), SAME)
+    worst = float(percent[0].max())
+    # Dips where curves cross say nothing.
+    least = float(percent.max()) / 10**DECADES
+    series = [
+        line(**_look(i, len(fits), names), x=strain, y=np.maximum(own, least))
+        for i, own in enumerate(percent)
+    ]
+    label, first = "deviation from known, %", names[0] if names else "best"
+    said = f"{first}: at most {worst:.2g} %"
+    return Chart(f"{PANELS[m][0]}: {said}", PANELS[m][1], label, series, said, log_y=True)
+
+
+def moduli_together(
+    strains: ArrayLike, moduli: ArrayLike, sigma: ArrayLike | None = None, title: str = ""
+) -> Charts:
+    """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
+
+    strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. sigma :
+    (3, k) MPa, one standard deviation, as bands; left out where it is not finite. The axis is
+    logarithmic where the moduli are positive and span more than a decade.
+    """
+    x, curves = np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
+    series = []
+    for m, name in enumerate(("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")):
+        s = None if sigma is None else np.asarray(sigma, dtype=float)[m]
+        band = None if s is None else (curves[m] - s, curves[m] + s)
+        series.append(line(name, x[m], curves[m], band, colour=m, ends=True))
+    log, high = spans_a_decade(curves), float(curves.max())
+    alt = f"moduli from {float(curves.min()):.3g} to {high:.3g} MPa"
+    top = None if log else 1.08 * high
+    chart = Chart(title, "logarithmic strain", MODULUS, series, alt, log, not log, top)
+    return Charts("moduli together", [chart], "")
+
+
+def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
+    """Return charts of the relative uncertainty of the moduli from each test and all together.
+
+    strains : (3, k). sigma : by name, (3, k), one standard deviation in percent of the modulus;
+    what is above `NOT_DETERMINED`, or not finite, is marked by triangles there.
+    """
+    x, charts = np.asarray(strains, dtype=float), []
+    for m, (title, label) in enumerate(PANELS):
+        series: list[Series] = []
+        marks: list[Series] = []
+        for rank, (name, every) in enumerate(sigma.items()):
+            values = np.asarray(every, dtype=float)[m]
+            lost = ~(values <= NOT_DETERMINED)
+            known = np.where(lost, np.nan, np.maximum(values, SMALLEST))
+            series.append(line(name, x[m], known, colour=rank, dashes=rank // 8))
+            if lost.any():
+                # Triangles of several tests stand above each other.
+                height = NOT_DETERMINED * 1.4 ** (rank + 1)
+                at = dots(f"{name}, not determined", x[m][lost], np.full(lost.sum(), height),
+                          most=12, colour=rank, shape="triangle-up")  # fmt: skip
+                marks.append(at)
+        level = NOT_DETERMINED if marks else None
+        alt, up = f"uncertainty of {title} by test", "1 σ, % of the modulus"
+        charts.append(Chart(title, label, up, series + marks, alt, log_y=True, level=level))
+    words = f"{caption}; above {NOT_DETERMINED:g} % a modulus is not determined: triangles"
+    return Charts("pinned", charts, words)
+
+
+def bootstrap_charts(
+    strains: Mapping[str, Array],
+    best: Mapping[str, Array],
+    samples: Mapping[str, Array],
+    fit: Mapping[str, Array],
+    caption: str,
+) -> Charts:
+    """Return charts of moduli with percentiles of a bootstrap beside the band of their fit.
+
+    strains, best : (n,) by modulus, MPa. samples, fit : (2, n), lower and upper ends.
+    """
+    charts = []
+    for (title, label), name in zip(PANELS, strains, strict=True):
+        x, low, high = strains[name], samples[name][0], samples[name][1]
+        series = [
+            line("fit, with its band by the noise", x, best[name], (fit[name][0], fit[name][1])),
+            line(SAMPLES, x, low, colour=1, dashes=1),
+            line(SAMPLES, x, high, colour=1, dashes=1),
+        ]
+        top = 1.08 * max(float(best[name].max()), float(high.max()))
+        alt = f"{title}: at rest {best[name][0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
+        charts.append(Chart(title, label, MODULUS, series, alt, from_zero=True, top=top))
+    return Charts("bootstrap", charts, caption)

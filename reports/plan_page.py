@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from ..materials.forms.base import COMPONENTS
 from ..runs.plan import ASSUMED, words
 from ..runs.series import FILES, write_folder
+from .charts import Charts
 from .content import Report, Section, Table
-from .named_charts import plan_charts
-from .plan import plot_plan
+from .studies import plan_charts
+from .vega import save
 
 if TYPE_CHECKING:
     from ..runs.plan import Plan, Planned
@@ -22,20 +23,20 @@ CAPTION = "1 sigma of the moduli with one more test, root mean square along each
 
 def write_plan(plan: Plan, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-    figures = {FIGURE: lambda path: plot_plan(path, *_shown(plan), WITHOUT)}
+    charts = plan_charts([title for title, _ in _rows(plan)], _sigma(plan), CAPTION)
+    figures = {FIGURE: lambda path: save(path, charts)}
     return write_folder(
-        folder, {TABLE: plan.table()}, figures, plan.notes, _page(plan), plan.result, 6
+        folder, {TABLE: plan.table()}, figures, plan.notes, _page(plan, charts), plan.result, 6
     )
 
 
-def _shown(plan: Plan) -> tuple[list[str], dict[str, list[float]]]:
-    """Titles, and of each modulus 1 sigma in percent."""
+def _sigma(plan: Plan) -> dict[str, list[float]]:
+    """Return 1 sigma of each modulus in percent, one a test."""
     every = (plan.now, *plan.candidates)
-    titles = [WITHOUT, *(planned.title for planned in plan.candidates)]
-    return titles, {name: [100 * one.summary[name] for one in every] for name in COMPONENTS}
+    return {name: [100 * one.summary[name] for one in every] for name in COMPONENTS}
 
 
-def _page(plan: Plan) -> Report:
+def _page(plan: Plan, charts: Charts) -> Report:
     first = plan.candidates[0]
     told = ", ".join(
         f"{name} {words(plan.now.summary[name])} to {words(first.summary[name])}"
@@ -55,7 +56,7 @@ def _page(plan: Plan) -> Report:
             Section(
                 "Which test next",
                 [
-                    plan_charts([title for title, _ in _rows(plan)], _shown(plan)[1], CAPTION),
+                    charts,
                     _summaries(plan),
                 ],
             ),

@@ -9,21 +9,28 @@ from ..inference.likelihood import THRESHOLD
 from ..inference.posterior import LEVEL
 from ..runs.profile import METHOD
 from ..runs.series import FILES, write_folder
+from .charts import Charts
 from .content import Report, Section, Table
-from .likelihoods import ProfilePanel, plot_likelihoods
-from .profile_charts import profile_charts
+from .studies import ProfilePanel, profile_charts
+from .vega import save
 
 if TYPE_CHECKING:
     from ..runs.profile import Profile, Profiles
 
 TABLE, FIGURE = "profile.csv", "profile.png"
+CAPTION = (
+    "-2 log L of each modulus held at a value, everything else fitted anew (dots), and by the "
+    "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
+    f"of {100 * LEVEL:.0f} %"
+)
 
 
 def write_profiles(found: Profiles, folder: Path) -> Path:
     """Write everything; raises OutputError. The page's path."""
-    figures = {FIGURE: lambda path: plot_likelihoods(path, _panels(found), THRESHOLD)}
+    charts = profile_charts(_panels(found), THRESHOLD, CAPTION)
+    figures = {FIGURE: lambda path: save(path, charts)}
     return write_folder(
-        folder, {TABLE: found.table()}, figures, found.notes, _page(found), found.result, 9
+        folder, {TABLE: found.table()}, figures, found.notes, _page(found, charts), found.result, 9
     )
 
 
@@ -34,13 +41,8 @@ def _panels(found: Profiles) -> list[ProfilePanel]:
     ]
 
 
-def _page(found: Profiles) -> Report:
+def _page(found: Profiles, charts: Charts) -> Report:
     first = found.each[0]
-    caption = (
-        "-2 log L of each modulus held at a value, everything else fitted anew (dots), and by the "
-        "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
-        f"of {100 * LEVEL:.0f} %"
-    )
     return Report(
         title=f"{found.title}: profile likelihood",
         summary=f"{first.name}: {first.words}.",
@@ -53,7 +55,7 @@ def _page(found: Profiles) -> Report:
         sections=[
             Section(
                 "The profiles",
-                [profile_charts(_panels(found), THRESHOLD, caption), _ends(found)],
+                [charts, _ends(found)],
             )
         ],
         files=[

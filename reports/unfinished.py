@@ -9,8 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Store
 from ..runs.starts import HISTORY, STARTS, RunningFiles
-from .content import Facts, Part, Report, Section, Table, Words
-from .page_file import PAGE_DATA, read_page_data
+from .content import PAGE_DATA, Facts, Part, Report, Section, Table, Words, read_page_data
 
 UNFINISHED = (
     "Unfinished: there is no result yet, only what was recorded so far; --resume goes on with it."

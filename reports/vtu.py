@@ -1,17 +1,18 @@
-"""The inflated bubble for ParaView."""
+"""Files for ParaView: deformed meshes (.vtu), and series of them (.pvd)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..meshes.mesh import Mesh
-from ..writing import replacing
+from ..writing import replacing, write_text
 
 
 def write_vtu(
@@ -47,3 +48,27 @@ def write_vtu(
     with replacing(path) as temporary:
         meshio.write(temporary, grid, file_format="vtu")
     return Path(path)
+
+
+HEAD = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+TAIL = "  </Collection>\n</VTKFile>\n"
+
+
+def write_pvd(path: Path, files: Sequence[tuple[float, Path]]) -> Path:
+    """Write a collection of files that are there, each with its time.
+
+    Parameters
+    ----------
+    path : ends in .pvd. files : time (whatever it counts: kPa) and file, named from the collection.
+
+    Raises
+    ------
+    OutputError : the file cannot be written.
+    """
+    rows = [
+        f'    <DataSet timestep="{time:.9g}" part="0" '
+        f"file={quoteattr(file.relative_to(path.parent).as_posix())}/>\n"
+        for time, file in files
+    ]
+    write_text(path, HEAD + "".join(rows) + TAIL)
+    return path

@@ -173,24 +173,25 @@ class Nu12Study:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.nu12 import plot_nu12
-        from ..reports.nu12_charts import nu12_charts
+        from ..reports.studies import nu12_charts
+        from ..reports.vega import save
 
         panels = {
             name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
             for name, part in self.parts.items()
         }
         title = f"{self.project.name}: what nu12 changes"
+        charts = nu12_charts(panels, self.base, self.response, title)
         write_study(
             Path(folder),
             "nu12",
             self.table(),
-            lambda path: plot_nu12(path, panels, self.base, self.response),
+            lambda path: save(path, charts),
             self.result,
             self.notes,
             title,
             self.lines(),
-            [nu12_charts(panels, self.base, self.response, title)],
+            [charts],
         )
 
 

@@ -37,7 +37,7 @@ from .simulation import Progress
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..reports.convergence import ConvergencePanel
+    from ..reports.studies import ConvergencePanel
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
@@ -131,20 +131,21 @@ class Refinement:
         ------
         OutputError : the folder cannot be written.
         """
-        from ..reports.convergence import plot_convergence
-        from ..reports.convergence_charts import convergence_charts
+        from ..reports.studies import convergence_charts
+        from ..reports.vega import save
 
         drawn, title = panels(self), f"{self.project.name}: finer and finer {self.what}"
+        charts = convergence_charts(drawn, self.what, title)
         write_study(
             Path(folder),
             "convergence",
             self.table(),
-            lambda path: plot_convergence(path, drawn, self.what),
+            lambda path: save(path, charts),
             self.result,
             self.notes,
             title,
             self.lines(),
-            [convergence_charts(drawn, self.what, title)],
+            [charts],
         )
 
 
@@ -460,7 +461,7 @@ def table(study: Refinement) -> pd.DataFrame:
 
 def panels(study: Refinement) -> list[ConvergencePanel]:
     """What the figure shows: relative changes from each level to the next finer one."""
-    from ..reports.convergence import ConvergencePanel
+    from ..reports.studies import ConvergencePanel
 
     drawn = []
     for name, runs in study.runs.items():

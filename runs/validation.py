@@ -280,7 +280,7 @@ class Validation:
     def write(self, folder: Path) -> None:
         """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
         from ..reports.html import write_report
-        from ..reports.named_charts import held_out_charts
+        from ..reports.studies import held_out_charts
         from .series import study_page
 
         with replacing(folder / TABLE) as path:

@@ -207,9 +207,10 @@ class WeightStudy:
 
     def write(self, folder: Path) -> None:
         """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
+        from ..reports.charts import Charts
         from ..reports.html import write_report
-        from ..reports.weights import plot_weights
-        from ..reports.weights_charts import weights_charts
+        from ..reports.studies import weights_charts
+        from ..reports.vega import save
         from .folder import Store
         from .series import study_page
 
@@ -228,11 +229,13 @@ class WeightStudy:
             },
             {name: self.sigma(name) for name in COMPONENTS},
         )
-        plot_weights(folder / FIGURE, *shown)
+        parts = weights_charts(*shown)
+        every = [chart for part in parts for chart in part.charts]
+        save(folder / FIGURE, Charts("weights", every, "", columns=2))
         write_notes(folder, self.notes)
         title = f"{self.title}: the weight of {self.counted}"
         said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_report(folder, study_page(*said, FIGURE, weights_charts(*shown)))
+        write_report(folder, study_page(*said, FIGURE, parts))
         Store(folder).finish(self.result)
 
 

@@ -7,19 +7,19 @@ import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from bubblefit.experiments import registry as experiments
+from bubblefit.reports import vega
+from bubblefit.reports.charts import Charts
 from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
-from matplotlib.figure import Figure
 
 from . import needs
 from .bars import BarKind, BarSolver
-from .figure_checks import check_figure
+from .figure_checks import check_charts
 from .golden_files import Golden
 
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.
@@ -61,20 +61,19 @@ def ccx() -> Executable:
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Figure]]:
-    """Every figure saved by the test, in turn; each is still written, and looked at in the end."""
-    figures: list[Figure] = []
-    write = Figure.savefig
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Charts]]:
+    """Charts of every file saved by the test, in turn; each is still written, and checked."""
+    found: list[Charts] = []
+    rendered = vega.rendered
 
-    def keep(self: Figure, *args: Any, **kwargs: Any) -> None:
-        # At its own resolution, for which all sizes in it are then known.
-        write(self, *args, **{**kwargs, "dpi": "figure"})
-        figures.append(self)
+    def keep(charts: Charts, suffix: str) -> bytes:
+        found.append(charts)
+        return rendered(charts, suffix)
 
-    monkeypatch.setattr(Figure, "savefig", keep)
-    yield figures
-    for figure in figures:
-        check_figure(figure)
+    monkeypatch.setattr(vega, "rendered", keep)
+    yield found
+    for charts in found:
+        check_charts(charts)
 
 
 @pytest.fixture

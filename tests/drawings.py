@@ -1,57 +1,79 @@
-"""What a figure shows, for the tests: numbers on its axes, words in its legends."""
+"""What charts show, for the tests: numbers of their series, words of legends and axes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import pytest
+from bubblefit.reports.charts import Chart, Charts, Series
 
 
-def data(axes: Axes) -> list[np.ndarray]:
-    """(2, k) of every line, in the order in which they were drawn."""
-    return [np.array(line.get_data(), dtype=float) for line in axes.lines]
+def data(chart: Chart) -> list[np.ndarray]:
+    """(2, k) of every series of lines or dots, in order; what is not there is NaN."""
+    return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.look in ("line", "dots")]
 
 
-def lines(axes: Axes, colour: str) -> list[np.ndarray]:
-    """(2, k) of every line of the colour."""
-    return [np.array(line.get_data()) for line in axes.lines if line.get_color() == colour]
+def named(chart: Chart) -> dict[str, Series]:
+    """The series by name; of several with one name the first."""
+    return {s.name: s for s in reversed(chart.series)}
 
 
-def legend(figure: Figure) -> list[str]:
-    """Words of the figure's legend."""
-    return [text.get_text() for text in figure.legends[0].get_texts()]
+def lines(chart: Chart, name: str) -> list[np.ndarray]:
+    """(2, k) of every line or cloud of the name."""
+    return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.name == name and s.y]
 
 
-def titles(figure: Figure) -> list[str]:
-    """Of every panel."""
-    return [axes.get_title("left") for axes in figure.axes]
+def legend(charts: Charts) -> list[str]:
+    """Names of all series, each once."""
+    names = [s.name for chart in charts.charts for s in chart.series if s.name]
+    return list(dict.fromkeys(names))
 
 
-def shown(axes: Axes) -> tuple[str, str, str]:
+def shown(chart: Chart) -> tuple[str, str, str]:
     """Words of the axes, x and y, and the title."""
-    return axes.get_xlabel(), axes.get_ylabel(), axes.get_title("left")
+    return chart.x_label, chart.y_label, chart.title
+
+
+def caught(patch: pytest.MonkeyPatch, module: Any, *names: str) -> list[tuple[Any, ...]]:
+    """Calls of a module's declarations of charts that it saves: the file, then the arguments.
+
+    Nothing is drawn.
+    """
+    calls: list[tuple[Any, ...]] = []
+
+    def declared(*args: Any, **_: Any) -> tuple[Any, ...]:
+        return args
+
+    def saved(path: Path, args: tuple[Any, ...]) -> None:
+        calls.append((path, *args))
+
+    for name in names:
+        patch.setattr(module, name, declared)
+    save: Callable[..., None] = saved
+    patch.setattr(module, "save", save)
+    return calls
 
 
 def check_convergence(
-    figure: Figure, table: pd.DataFrame, what: str, rms: dict[str, Any] | None = None
+    charts: Charts, table: pd.DataFrame, what: str, rms: dict[str, Any] | None = None
 ) -> None:
-    """The figure of one model shows what convergence.csv has: changes over size, and the cost.
+    """The charts of one model show what convergence.csv has: changes over size, and the cost.
 
     rms : "rms_N" of the result, where the model has a load curve.
     """
     (model,) = set(table.model)
-    changes, cost = figure.axes
+    changes, cost = charts.charts
     size = {"elements": "mean edge, mm", "increments": "step, share of the load"}[what]
     assert shown(changes) == (size, "change to the next finer level, %", model)
-    assert shown(cost) == ("elements x increments", "seconds", "cost")
-    *names, first, second = legend(figure)
+    assert shown(cost) == ("elements × increments", "seconds", "cost")
+    assert changes.log_x and changes.log_y and cost.log_x and cost.log_y
+    *names, first, second = [s.name for s in changes.series]
     assert [first, second] == ["order 1", "order 2"]
-    curves = data(changes)
-    assert len(curves) == len(names) + 2
-    for name, curve in zip(names, curves, strict=False):
+    for name, curve in zip(names, data(changes), strict=False):
         rows = table[table.quantity == name]
         if name == "RMS along the load curve":
             assert rms is not None
@@ -60,7 +82,9 @@ def check_convergence(
             change = 100 * np.abs(np.diff(rows.value) / rows.value.iloc[-1])
         drawn = change > 1e-5  # the solver's tolerance hides the rest
         sizes = np.sort(table["size"].unique())[::-1][:-1]
-        np.testing.assert_allclose(curve, [sizes[drawn], change[drawn]])
+        seen = np.isfinite(curve[1])
+        np.testing.assert_allclose(curve[:, seen], [sizes[drawn], change[drawn]], rtol=1e-5)
     assert (rms is not None) == ("RMS along the load curve" in names)
     levels = table.drop_duplicates("factor")
-    np.testing.assert_allclose(data(cost)[0], [levels.elements * levels.increments, levels.seconds])
+    work = levels.elements * levels.increments
+    np.testing.assert_allclose(data(cost)[0], [work, levels.seconds], rtol=1e-5)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bubblefit.reports.charts import Chart, Charts
-from bubblefit.reports.page_file import read_page_data
+from bubblefit.reports.content import read_page_data
 
 
 def charts_of(folder: Path) -> dict[str, Sequence[Chart]]:

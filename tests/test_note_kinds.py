@@ -18,7 +18,7 @@ from bubblefit.cli.fits import lines_of
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.notes import FEW, Note, NoteKind, lines
 from bubblefit.project.project import read_project
-from bubblefit.reports import fit_page, law_page
+from bubblefit.reports import fit_page, law_page, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
 from bubblefit.runs.poisson import vary_nu12
@@ -26,7 +26,6 @@ from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.refinement import refine
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers import registry
-from matplotlib.figure import Figure
 
 from .bars import BarTest
 from .cylinder_cases import Formula, write_project
@@ -149,7 +148,7 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
 def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
-    patch.setattr(law_page, "plot_laws", lambda *_: None)
+    patch.setattr(law_page, "save", lambda *_: None)
     patch.setattr(law_page, "_side_by_side", lambda *_: [])
     done = fits.comparison(fit)
     page = done.report(folder)
@@ -175,14 +174,14 @@ def told_by_simulation(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note
 
 
 def told_by_nu12(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    patch.setattr(Figure, "savefig", lambda _, path, **__: Path(path).touch())
+    patch.setattr(vega, "rendered", lambda *_: b"")
     study = vary_nu12(series.bars(patch, notes), series.CARD, [0.2])
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
 def told_by_refinement(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
-    patch.setattr(Figure, "savefig", lambda _, path, **__: Path(path).touch())
+    patch.setattr(vega, "rendered", lambda *_: b"")
     study = refine(series.bars(patch, notes), series.CARD)
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)

@@ -27,7 +27,8 @@ from ...materials.designers import (
 )
 from ...notes import Note, NoteKind, rows
 from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
-from ...reports.biaxial import BiaxialPanel, plot_biaxial
+from ...reports.strips import BiaxialPanel, biaxial_charts
+from ...reports.vega import save
 from ...writing import replacing
 from .objective import PERCENT
 from .test import BiaxialData, BiaxialTest
@@ -357,5 +358,5 @@ def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> li
                 measured.ratio, larger, PERCENT * measured.since, (("constants", larger, strain),)
             )
         )
-    written.append(plot_biaxial(folder / f"{prefix}constants.png", panels))
+    written.append(save(folder / f"{prefix}constants.png", biaxial_charts("ratios", panels)))
     return written

@@ -16,9 +16,9 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...notes import Note, NoteKind
 from ...readers.biaxial import BiaxialPath
-from ...reports.biaxial import BiaxialPanel, plot_biaxial
-from ...reports.biaxial_charts import biaxial_charts
 from ...reports.content import Exhibit, Table
+from ...reports.strips import BiaxialPanel, biaxial_charts
+from ...reports.vega import save
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
 from .objective import PERCENT
@@ -113,7 +113,8 @@ def exhibit(
         )
         for p in paths
     ]
-    plot_biaxial(out.path("paths.png"), panels)
+    charts = biaxial_charts(f"{test.name} ratios", panels, CAPTION)
+    save(out.path("paths.png"), charts)
     return Exhibit(
         facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
         tables=[misfit_table(paths)],
@@ -121,7 +122,7 @@ def exhibit(
             (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
             (out.name("paths.png"), "picture of the ratios"),
         ],
-        parts=[biaxial_charts(f"{test.name} ratios", panels, CAPTION)],
+        parts=[charts],
     )
 
 
@@ -173,7 +174,7 @@ def exhibit_examined(test: BiaxialTest, out: Output) -> Exhibit:
         BiaxialPanel(path.ratio, path.load.max(axis=1), PERCENT * path.since)
         for path in test.data.paths
     ]
-    plot_biaxial(out.path(PATHS), panels)
+    save(out.path(PATHS), biaxial_charts("ratios", panels))
     used = {(id(path.table), path.cycle.count) for path in test.data.paths}
     rows: list[list[object]] = []
     for read, cycles in zip(test.data.tables, test.data.cycles, strict=True):
@@ -305,7 +306,7 @@ def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
         )
         larger = path.load.max(axis=1)
         panels.append(BiaxialPanel(path.ratio, larger, PERCENT * path.since, curves))
-    plot_biaxial(out.path("paths.png"), panels)
+    save(out.path("paths.png"), biaxial_charts("ratios", panels))
 
 
 def _within(card: MaterialCard, elongation: Array) -> int:

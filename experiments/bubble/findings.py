@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from ...inference.assessment import moduli_error
 from ...materials.forms.base import COMPONENTS
 from ...meshes.bubble_model import BubbleModel
-from ...notes import Note, NoteKind
+from ...notes import Note, NoteKind, percent
 from ...readers.pressure_log import ClockOffset
-from ...reports.html import percent
 from ..kinds import Findings, FittedTest
 from .objective import FieldObjective, displacement_offset
 from .point_files import PointFiles, RecordedFrames

@@ -17,19 +17,23 @@ from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.surfaces import write_surfaces
-from ...reports.charts import Chart, Charts, Series, dots, line
-from ...reports.clock import plot_clock
+from ...reports.bubbles import (
+    chosen,
+    clock_charts,
+    cut_charts,
+    disk_charts,
+    height_charts,
+    kilo,
+    left_out,
+    ranks,
+    registration_charts,
+    rise_charts,
+)
+from ...reports.charts import Chart, Charts, Shades, dots
 from ...reports.content import Exhibit, Part, Table
-from ...reports.cuts import node_cut, point_cut
-from ...reports.maps import Maps, Shade, Shades, Solid, maps_of
-from ...reports.packed import pack
-from ...reports.profiles import plot_profiles
-from ...reports.pvd import write_pvd
-from ...reports.registration import plot_registration
-from ...reports.rises import plot_rises
-from ...reports.scatter import plot_heights
-from ...reports.surface import plot_disk
-from ...reports.vtu import write_vtu
+from ...reports.maps import Maps, Shade, Solid, maps_of, pack
+from ...reports.vega import save
+from ...reports.vtu import write_pvd, write_vtu
 from ...solvers.base import History
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
@@ -165,37 +169,21 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
 
 Array = NDArray[np.float64]
 
-#: Pressures that are drawn in one chart; of more, as many spread over all, the last among them.
-MOST = 8
 #: Points that are drawn of one pressure.
 POINTS = 120
-AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
-
-
-def chosen(count: int) -> list[int]:
-    """Numbers of the pressures that are drawn."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int)).tolist()
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """Heights along both axes: lines of the model, dots of what was measured."""
-    pressures, offset = prepared.test.pressures, displacement_offset(fitted.nuisance)
-    displacement = fitted.histories[0].displacement + offset
-    points = fitted.comparisons[0].model.mesh.points
-    numbers = chosen(len(pressures))
-    charts = []
-    for axis, (title, label) in enumerate(AXES):
-        series: list[Series] = []
-        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
-            cut, name = node_cut(points, displacement[k], axis), kilo(pressures[k])
-            series.append(line(name, cut.position, cut.height, rank=rank))
-            seen = prepared.fields[k]
-            spots = point_cut(seen.points, seen.displacement, axis)
-            series.append(dots(name, spots.position, spots.height, rank=rank))
-        alt = f"{title}: heights modelled and measured at {len(numbers)} pressures"
-        charts.append(Chart(title, label, "height z, mm", series, alt))
-    caption = f"{prepared.test.name}: lines are the model, dots {source(prepared)}"
-    return Charts(f"{prepared.test.name} cuts", charts, f"{caption}.{left_out(pressures, numbers)}")
+    """Return heights along both axes: lines of the model, dots of what was measured."""
+    displacement = fitted.histories[0].displacement + displacement_offset(fitted.nuisance)
+    return cut_charts(
+        f"{prepared.test.name} cuts",
+        prepared.test.pressures,
+        fitted.comparisons[0].model.mesh.points,
+        displacement,
+        [(seen.points, seen.displacement) for seen in prepared.fields],
+        f"{prepared.test.name}: lines are the model, dots {source(prepared)}.",
+    )
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
@@ -217,31 +205,13 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         charts.append(
             Chart(title, "measured dz, mm", "modelled − measured, mm", series, alt, level=0.0)
         )
-    pressures = [target.pressure for target in targets]
     caption = f"{prepared.test.name}: what is left, over the measured height."
-    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(pressures, numbers))
-
-
-def ranks(count: int) -> list[float]:
-    """Of rising pressures, for their colours."""
-    return np.linspace(0.1, 1.0, count).tolist()
-
-
-def kilo(pressure: float) -> str:
-    """A pressure (MPa) in kPa."""
-    return f"{1e3 * pressure:.4g} kPa"
+    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(len(targets)))
 
 
 def source(prepared: PreparedBubble) -> str:
     """What the model is compared with."""
     return "the known solution" if prepared.known is not None else "what was measured"
-
-
-def left_out(pressures: Sequence[float], numbers: Sequence[int]) -> str:
-    """That not every pressure is drawn."""
-    if len(numbers) == len(pressures):
-        return ""
-    return f" Of {len(pressures)} pressures {len(numbers)} are drawn."
 
 
 LABELS = ("x (warp), mm", "y (fill), mm")
@@ -378,26 +348,19 @@ def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
 
 def _pictures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
     """Cuts and heights against what was measured, as pictures beside the page."""
-    test, offset = prepared.test, displacement_offset(fitted.nuisance)
+    test = prepared.test
     displacement = fitted.histories[0].displacement
     label = "known solution" if prepared.known is not None else "measured"
-    plot_profiles(
-        out.path(PROFILES),
-        test.pressures,
-        fitted.comparisons[0].model.mesh.points,
-        displacement + offset,
-        measured=[(f.points, f.displacement) for f in prepared.fields],
-        measured_label=label,
-    )
     objective = objective_of(fitted)
     targets, modelled = objective.targets, objective.modelled(displacement, fitted.nuisance)
-    plot_heights(
-        out.path(HEIGHTS),
+    save(out.path(PROFILES), profile_charts(prepared, fitted))
+    heights = height_charts(
         [t.pressure for t in targets],
         [t.displacement[:, 2] for t in targets],
         [own[:, 2] for own in modelled],
         label,
     )
+    save(out.path(HEIGHTS), heights)
     return [
         (out.name(PROFILES), f"{test.name}: cuts through the bubble along warp and fill"),
         (out.name(HEIGHTS), f"{test.name}: modelled against measured height"),
@@ -488,7 +451,7 @@ def _equilibrium(prepared: PreparedBubble) -> Table:
 
 def _rises(prepared: PreparedBubble, out: Output) -> Shown:
     pressures = [field.pressure for field in prepared.fields]
-    plot_rises(out.path(HEIGHTS_EXAMINED), pressures, prepared.view.rises)
+    save(out.path(HEIGHTS_EXAMINED), rise_charts(pressures, prepared.view.rises))
     return out.name(HEIGHTS_EXAMINED), "rise about the centre against pressure"
 
 
@@ -501,7 +464,8 @@ def sheet_exhibit(
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
-        plot_disk(out.path(PICTURE), [("z0, mm", points[:, :2], points[:, 2])], edge)
+        heights = [("z0, mm", points[:, :2], points[:, 2])]
+        save(out.path(PICTURE), disk_charts(heights, edge))
         how = " and ".join(w for w in used_of(prepared) if w in ("measured surface", "modes"))
         words = "surface of the sheet in the reference picture"
         figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
@@ -511,7 +475,7 @@ def sheet_exhibit(
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
         _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
-        plot_disk(out.path(CONSTANT_PICTURE), own, edge)
+        save(out.path(CONSTANT_PICTURE), disk_charts(own, edge))
         words = "measured less modelled, as far as it is the same at all pressures"
         figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
         files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))
@@ -550,9 +514,8 @@ def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
     if clock is None:
         return []
     times = clock.times + clock.offset
-    plot_clock(
-        out.path(PICTURE_RECORDED_WORDS), times, clock.pressure, clock.heights, taken.pressure
-    )
+    charts = clock_charts(times, clock.pressure, clock.heights, taken.pressure)
+    save(out.path(PICTURE_RECORDED_WORDS), charts)
     return [
         (
             out.name(PICTURE_RECORDED_WORDS),
@@ -616,7 +579,7 @@ def registration_picture(
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))
-    plot_registration(out.path(PICTURE_REGISTRATION), last.points, maps, outline.edge())
+    save(out.path(PICTURE_REGISTRATION), registration_charts(last.points, maps, outline.edge()))
     return out.name(
         PICTURE_REGISTRATION
     ), "measured points in the test's coordinates, the rim, warp and fill"
@@ -725,12 +688,8 @@ def simulate(
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
-        plot_profiles(
-            out.path(f"profiles{suffix}.png"),
-            test.pressures,
-            model.mesh.points,
-            history.displacement,
-        )
+        cuts = cut_charts(name, test.pressures, model.mesh.points, history.displacement)
+        save(out.path(f"profiles{suffix}.png"), cuts)
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [
             f"{p:8.1f} kPa   apex {z:8.3f} mm"

@@ -15,21 +15,20 @@ from numpy.typing import NDArray
 from ...materials.card import BAND, LEVEL, MaterialCard
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
-from ...notes import marks
+from ...notes import marks, percent
 from ...readers.bending import scatter
-from ...reports.beam import BeamBodies, plot_beam
-from ...reports.bending import (
+from ...reports.charts import Charts
+from ...reports.content import Exhibit, Part, Table, Words
+from ...reports.cylinders import (
+    BeamBodies,
     BendLine,
     BendPanel,
     BendReadings,
-    plot_bending,
-    plot_bending_cases,
-    plot_gas,
+    beam_charts,
+    bending_charts,
+    gas_charts,
 )
-from ...reports.bending_charts import bending_charts
-from ...reports.charts import Charts
-from ...reports.content import Exhibit, Part, Table, Words
-from ...reports.html import percent
+from ...reports.vega import save
 from ...reports.vtu import write_vtu
 from ...writing import replacing
 from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
@@ -110,8 +109,7 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
     top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
     inflated, bent = beam.mesh.points + beam.inflated, beam.mesh.points + beam.bent
-    plot_beam(
-        path,
+    charts = beam_charts(
         bent,
         beam.mesh.quads,
         surface_strain(beam.mesh, beam.bent)[:, 0],
@@ -120,6 +118,7 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
         bodies_of(model, beam, float(run.deflection[-1])),
         title,
     )
+    save(path, charts)
 
 
 def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
@@ -158,8 +157,9 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         if not ended:
             continue
         stem = f"{FIGURES}/{names[test.name]}"
-        plot_bending(out.path(f"{stem}-load.png"), panels[test.name])
-        plot_gas(out.path(f"{stem}-gas.png"), panels[test.name])
+        loads = bending_charts([panels[test.name]], misses=True, columns=1)
+        save(out.path(f"{stem}-load.png"), loads)
+        save(out.path(f"{stem}-gas.png"), gas_charts(panels[test.name]))
         first, run = outcome.runs[ended[0]], outcome.bent[ended[0]]
         drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
         draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
@@ -171,7 +171,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
         rows = _rows(tests)
         columns = max(map(len, rows))
         laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
-        plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
+        save(out.path(f"{FIGURES}/all-loads.png"), bending_charts(laid, columns=columns))
     return figures
 
 

@@ -18,12 +18,16 @@ from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
 from ...notes import Note, NoteKind
 from ...reports.content import Exhibit, Table
-from ...reports.curves import plot_curves
-from ...reports.load_charts import load_charts
-from ...reports.loads import StripCurves, plot_loads
-from ...reports.moduli_together import plot_moduli_together
-from ...reports.orders import OrderErrors, plot_orders
-from ...reports.strip import plot_strip
+from ...reports.moduli import moduli_together
+from ...reports.strips import (
+    OrderErrors,
+    StripCurves,
+    load_charts,
+    order_charts,
+    specimen_charts,
+    strip_charts,
+)
+from ...reports.vega import save
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
 from ...writing import replacing
@@ -183,7 +187,7 @@ def load_panels(
     models: Mapping[str, Sequence[Curve]],
     rms: Mapping[str, Sequence[float]],
 ) -> list[StripCurves]:
-    """What the panels of `plot_loads` show; `models` and their `rms` (N) by direction."""
+    """What the panels of `load_charts` show; `models` and their `rms` (N) by direction."""
     panels = []
     for strip in strips:
         curve = None
@@ -208,7 +212,8 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
     u = history.displacement[-1]
     strain = middle_strain(model.mesh, u, model.warp)
     mesh = model.mesh
-    plot_strip(picture, mesh.points, mesh.quads, u, strain[:, 2], mesh.node_sets["gauge"])
+    gauge = mesh.node_sets["gauge"]
+    save(picture, strip_charts(mesh.points, mesh.quads, u, strain[:, 2], gauge))
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
 
 
@@ -217,7 +222,7 @@ def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path
     ends = failure_strains(strips, fitted.valid)
     strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
     curves = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
-    plot_moduli_together(picture, strains, np.array(curves))
+    save(picture, moduli_together(strains, np.array(curves)))
 
 
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
@@ -269,7 +274,7 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
             )
         )
     if panels:
-        plot_orders(picture, panels)
+        save(picture, order_charts(panels))
     return bool(panels)
 
 
@@ -284,7 +289,8 @@ def exhibit(
     with replacing(out.path("loads.csv")) as path:
         load_table(strips).to_csv(path, index=False)
     panels = _panels(strips)
-    plot_loads(out.path("loads.png"), panels)
+    charts = load_charts(f"{test.name} loads", panels, LOADS)
+    save(out.path("loads.png"), charts)
     figures: list[Shown] = []
     files = [
         (out.name("loads.csv"), "load curves of the best fit"),
@@ -307,7 +313,7 @@ def exhibit(
         figures=figures,
         tables=[misfit_table(strips)],
         files=files,
-        parts=[load_charts(f"{test.name} loads", panels, LOADS)],
+        parts=[charts],
     )
 
 
@@ -325,7 +331,7 @@ CURVES = "curves.png"
 def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
     """Write the curves; a table of what each specimen holds."""
     curves = {direction: curves_of(strip) for direction, strip in test.strips.items()}
-    plot_curves(out.path(CURVES), curves)
+    save(out.path(CURVES), specimen_charts(curves))
     rows: list[list[object]] = [
         [
             direction,
@@ -461,7 +467,8 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
             part = slice(pull.shown)
             drawn[direction].append((name, pull.elongation[part], pull.history.load[part]))
             rms[direction] += [] if pull.rms is None else [pull.rms]
-    plot_loads(out.path("loads.png"), load_panels(list(test.strips.values()), drawn, rms))
+    panels = load_panels(list(test.strips.values()), drawn, rms)
+    save(out.path("loads.png"), load_charts("loads", panels))
     for number, name in enumerate(cards, start=1):
         if (name, "bias") in ended:
             stem = "bias" if len(cards) == 1 else f"bias-{number}"

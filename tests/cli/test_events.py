@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from bubblefit.cli import terminal
 from bubblefit.cli.main import COMMANDS, main
-from bubblefit.cli.terminal import EVENTS, Events, place_matplotlib
+from bubblefit.cli.terminal import EVENTS, Events
 from click import Context, Group
 from click.testing import CliRunner
 
@@ -112,16 +112,3 @@ def test_every_command_takes_it(name: str) -> None:
     each = found.commands.values() if isinstance(found, Group) else [found]
     for one in each:
         assert any("--events" in param.opts for param in one.params), one.name
-
-
-def test_fonts_are_kept_where_there_is_no_home(monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.delenv("MPLCONFIGDIR", raising=False)
-    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "c"))
-    place_matplotlib()
-    assert "MPLCONFIGDIR" not in os.environ and not (tmp_path / "c").exists()
-    monkeypatch.setenv("HOME", "/proc/none")
-    place_matplotlib()
-    assert os.environ["MPLCONFIGDIR"] == str(tmp_path / "c" / "matplotlib")
-    monkeypatch.setenv("MPLCONFIGDIR", "mine")
-    place_matplotlib()
-    assert os.environ["MPLCONFIGDIR"] == "mine"

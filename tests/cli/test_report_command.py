@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.reports import pdf
-from bubblefit.reports.content import Table
+from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
-from bubblefit.reports.page_file import read_page_data
 from bubblefit.reports.unfinished import UNFINISHED, page_of_folder
 from click.testing import CliRunner, Result
 

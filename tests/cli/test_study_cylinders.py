@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.reports.charts import Charts
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from matplotlib.figure import Figure
 
 from ..commands import in_process, one_line, result_in
 from ..cylinder_cases import STUDIED_PROJECT
-from ..drawings import check_convergence, data, legend, shown
+from ..drawings import check_convergence, data, named, shown
 from ..places import KNOWN
 
 
@@ -29,7 +29,7 @@ def study(*arguments, cwd: Path, code: int = 0):
     return in_process("study", *arguments, cwd=cwd, code=code)
 
 
-def test_increments_of_a_cylinder_converge(project: Path, drawn: list[Figure]) -> None:
+def test_increments_of_a_cylinder_converge(project: Path, drawn: list[Charts]) -> None:
     done = study("mesh", "project.toml", "--card", "known", "--test", "narrow", "--what",
                  "increments", "--levels", 3, "--out", "out", cwd=project.parent)  # fmt: skip
     result = result_in(project.parent / "out")
@@ -44,12 +44,13 @@ def test_increments_of_a_cylinder_converge(project: Path, drawn: list[Figure]) -
     table = pd.read_csv(project.parent / "out/convergence.csv")
     rms = result["models"]["narrow"]["rms_N"]
     check_convergence(drawn[-1], table, "increments", rms)
-    assert set(legend(drawn[-1])[:-2]) == {*found, "RMS along the load curve"}
+    names = {*found, "RMS along the load curve"}
+    assert {s.name for s in drawn[-1].charts[0].series[:-2]} == names
     assert "load at 40 mm" in done.stdout
 
 
 def test_levels_without_a_quantity_are_left_out_of_it(
-    project: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[Figure]
+    project: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[Charts]
 ) -> None:
     run = MembraneSolver.run
 
@@ -72,23 +73,23 @@ def test_levels_without_a_quantity_are_left_out_of_it(
     table = pd.read_csv(project.parent / "out/convergence.csv")
     assert (table.quantity == "load at 40 mm, N").sum() == 1
     # Its name is there, and no point of it.
-    names = legend(drawn[-1])
-    assert data(drawn[-1].axes[0])[names.index("load at 40 mm, N")].size == 0
+    assert not named(drawn[-1].charts[0])["load at 40 mm, N"].y
     assert "-" in done.stdout
 
 
-def test_nu12_of_all_cylinders(project: Path, drawn: list[Figure]) -> None:
+def test_nu12_of_all_cylinders(project: Path, drawn: list[Charts]) -> None:
     study("nu12", "project.toml", "--card", "known", "--nu12", 0.4, "--out", "out",
           cwd=project.parent)  # fmt: skip
     models = result_in(project.parent / "out")["models"]
     assert list(models) == ["narrow", "wide"]
     for model in models.values():
         assert list(model["responses"]) == ["load at 40 mm, N"]
-    for axes, (name, model) in zip(drawn[-1].axes, models.items(), strict=True):
+    for axes, (name, model) in zip(drawn[-1].charts, models.items(), strict=True):
         response = model["responses"]["load at 40 mm, N"]
-        np.testing.assert_allclose(data(axes)[1], [response["nu12"], response["to_base"]])
+        wanted = [response["nu12"], response["to_base"]]
+        np.testing.assert_allclose(data(axes)[0], wanted, rtol=1e-5)
         assert shown(axes)[::2] == ("nu12", name)
-    assert drawn[-1].axes[0].get_ylabel() == "load / that at nu12 = 0.24"
+    assert drawn[-1].charts[0].y_label == "load / that at nu12 = 0.24"
 
 
 @pytest.mark.parametrize(

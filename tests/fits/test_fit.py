@@ -21,10 +21,8 @@ from bubblefit.materials.card import CardCertainty, MaterialCard, read_card
 from bubblefit.materials.forms.registry import form_names
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, read_project
-from bubblefit.reports.content import Exhibit, Report, Table
+from bubblefit.reports.content import Exhibit, Report, Table, read_page_data
 from bubblefit.reports.maps import Maps, Solid
-from bubblefit.reports.page_file import read_page_data
-from bubblefit.reports.style import BLACK
 from bubblefit.runs import best
 from bubblefit.runs import check as room
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
@@ -39,7 +37,7 @@ from bubblefit.solvers import registry
 from ..commands import in_process, result_in
 from ..complaints import complaint, complaint_with
 from ..cylinder_cases import STOPS, Banded, Formula, write_project
-from ..drawings import data, lines, titles
+from ..drawings import data, lines
 from ..projects import constant_strips, project_file, small, with_form
 
 SECOND = """
@@ -114,20 +112,20 @@ def test_tables(fitted, tmp_path):
 
 def test_figures_show_what_the_tables_hold(fitted, tmp_path, drawn):
     fitted.report(tmp_path)
-    by_panel = {axes.get_ylabel(): axes for figure in drawn for axes in figure.axes}
+    by_panel = {c.y_label: c for charts in drawn[::-1] for c in charts.charts[::-1]}
     residuals = fitted.residuals()
     heights = residuals[residuals["quantity"] == "dz"]
     shown = np.concatenate(data(by_panel["modelled z, mm"])[1:], axis=1)
-    assert shown == pytest.approx(heights[["measured", "modelled"]].to_numpy().T)
-    off = np.concatenate(data(by_panel["modelled $-$ known solution, mm"])[1:], axis=1)
+    assert shown == pytest.approx(heights[["measured", "modelled"]].to_numpy().T, rel=1e-5)
+    off = np.concatenate(data(by_panel["modelled − known solution, mm"]), axis=1)
     assert off[1] == pytest.approx(heights["difference"].to_numpy(), abs=1e-12)
     moduli = fitted.moduli()
     e1 = moduli[moduli["modulus"] == "E1"]
-    (best,) = lines(by_panel["tangent modulus, MPa"], BLACK)
-    assert best[1] == pytest.approx(fitted.law.E1(best[0]))
-    assert (best[0].min(), best[0].max()) == pytest.approx((0.0, e1["strain"].max()))
-    (optima, *_) = data(next(f for f in drawn if "Optima" in titles(f)[0]).axes[0])
-    assert optima[1] == pytest.approx(sorted(fitted.starts()["objective"], reverse=True))
+    (best,) = lines(by_panel["tangent modulus, MPa"], "best")
+    assert best[1] == pytest.approx(fitted.law.E1(best[0]), rel=1e-4)
+    assert (best[0].min(), best[0].max()) == pytest.approx((0.0, e1["strain"].max()), rel=1e-5)
+    (optima,) = data(next(charts for charts in drawn if charts.name == "optima").charts[0])
+    assert optima[1] == pytest.approx(sorted(fitted.starts()["objective"], reverse=True), rel=1e-5)
 
 
 def test_the_listed_uncertainty_is_one_standard_deviation(fitted):

@@ -26,7 +26,6 @@ from bubblefit.project.project import Project, chosen_cards, read_project
 from bubblefit.reports import prediction_page
 from bubblefit.reports.content import Exhibit, Report, Words
 from bubblefit.reports.html import percent
-from bubblefit.reports.style import NAMED
 from bubblefit.runs import executor
 from bubblefit.runs import predictions as prediction_result
 from bubblefit.runs import predictions as predictions_module
@@ -39,7 +38,7 @@ from bubblefit.solvers.base import History
 from ..bars import BarTest, project_of
 from ..complaints import complaint
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
-from ..drawings import lines
+from ..drawings import data, lines
 
 CARDS = ("soft", "stiff")
 TESTS = ("150 mm, 90 kPa", "high")
@@ -90,15 +89,16 @@ def test_figures_show_the_curves_of_the_table(project, tmp_path, drawn):
     done = predict(project, ["high"], jobs=1)
     done.report(tmp_path / "out")
     curves = done.curves()
-    panels = {axes.get_ylabel(): axes for figure in drawn for axes in figure.axes}
+    panels = {c.y_label: c for charts in drawn for c in charts.charts}
+    (volumes,) = (charts.charts[0] for charts in drawn if charts.name == "gas")
     for rank, card in enumerate(CARDS):
         own = curves[curves["card"] == card]
-        load = lines(panels["load, N"], NAMED[rank])[0]
-        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T)
-        gas = lines(panels["gauge pressure, kPa"], NAMED[rank])[0]
-        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy())
+        load = lines(panels["load, N"], card)[0]
+        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T, rel=1e-5)
+        gas = data(volumes)[rank]
+        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy(), rel=1e-5)
         volume = own["volume_mm3"].to_numpy()
-        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6)
+        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6, rel=1e-5)
 
 
 def test_tests_and_cards_by_name(project):

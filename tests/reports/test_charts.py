@@ -1,25 +1,64 @@
-"""Charts, maps and surfaces as data and as SVG: every value in its place."""
+"""Charts, maps and surfaces as data, and what Vega is given of them: every value in its place."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.reports import map_svg as maps_drawn
-from bubblefit.reports import solid_svg as solids_drawn
-from bubblefit.reports.axes import Axis, axes_of
-from bubblefit.reports.chart_svg import FEW, LEFT, NARROW, RIGHT, WIDTH, chart_svg
-from bubblefit.reports.charts import MOST_POINTS, Chart, Series, dots, line
-from bubblefit.reports.map_svg import map_svg, row_ends, scale_bar
-from bubblefit.reports.maps import MOST_PLACES, Shade, Solid, maps_of
-from bubblefit.reports.packed import Packed, pack
-from bubblefit.reports.shades import CLASSES, classes
-from bubblefit.reports.solid_svg import BAR, CENTRE, scale_of, seen, solid_svg
-from bubblefit.reports.ticks import log_ticks, ticks, written
+from bubblefit.reports import maps as maps_drawn
+from bubblefit.reports.charts import (
+    MOST_POINTS,
+    Chart,
+    Charts,
+    axis_ends,
+    band,
+    dots,
+    ends_of,
+    faces,
+    line,
+    looks_of,
+    scale_ends,
+    shades_of,
+    spans_a_decade,
+)
+from bubblefit.reports.maps import (
+    BAR,
+    CENTRE,
+    CLASSES,
+    MOST_PLACES,
+    Packed,
+    Shade,
+    Solid,
+    classes,
+    map_chart,
+    maps_of,
+    pack,
+    row_ends,
+    scale_bar,
+    scale_of,
+    seen,
+    solid_svg,
+)
+from bubblefit.reports.vega import (
+    COLOURS,
+    DARK,
+    PALETTE,
+    RISING,
+    dark_style,
+    figure,
+    panel,
+    save,
+    view,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from PIL import Image
+
+from ..figure_checks import check_charts
 
 FINITE = st.floats(-1e6, 1e6)
 
@@ -39,62 +78,113 @@ def test_packed_numbers_of_another_shape(shape: tuple[int, ...]) -> None:
         _ = Packed(shape, whole.least, whole.step, whole.data).values
 
 
-@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
-def test_ticks_are_round_and_inside(low: float, span: float) -> None:
-    found = ticks(low, low + span)
-    assert 2 <= len(found) <= 11
-    assert all(low - 1e-6 * span <= value <= low + span * (1 + 1e-6) for value in found)
-    steps = np.diff(found)
-    np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
-    leading = steps[0] / 10 ** np.floor(np.log10(steps[0]) + 1e-9)
-    assert min(abs(leading - k) for k in (1, 2, 5, 10)) < 1e-5
+def test_ends_of_the_axes() -> None:
+    chart = Chart("t", "x", "y", [line("a", [0, 4], [0, 5], band=([1, 1], [90, 90]))], top=10.0)
+    assert axis_ends(chart) == ((0.0, 4.0), (0.0, 10.0))
+    bare = axis_ends(Chart("t", "x", "y", []))
+    assert all(high > low for low, high in bare)
+    log = axis_ends(Chart("t", "x", "y", [line("", [1, 10], [-1, 100])], log_x=True, log_y=True))
+    assert log[0] == (1.0, 10.0) and 0 < log[1][0] < 100 < log[1][1]
+    names = axis_ends(Chart("t", "x", "y", [dots("", [1, 2], [1, 2])], x_names=("a", "b")))
+    assert names[0] == (0.5, 2.5)
+    part = Chart("t", "x", "y", [line("", [0, 9], [0, 9])], x_range=(1, 2), y_range=(3, 4))
+    assert axis_ends(part) == ((1, 2), (3, 4))
 
 
-def test_ticks_of_decades() -> None:
-    assert log_ticks(1.0, 100.0) == pytest.approx([1, 2, 5, 10, 20, 50, 100])
-    assert log_ticks(1e-9, 1.0) == pytest.approx([1e-9, 1e-7, 1e-5, 1e-3, 1e-1])
-    assert [written(v) for v in (0.0, -0.05, 1e-9, 250.0)] == ["0", "\u22120.05", "1e-9", "250"]
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [([1.0, 10.0], False), ([1.0, 10.1], True), ([0.0, 50.0], False), ([-1.0, 50.0], False),
+     ([np.nan, 1.0, np.inf, 11.0], True), ([np.nan], False), ([], False), ([[1.0], [11.0]], True)],
+)  # fmt: skip
+def test_more_than_a_decade(values: list[float], wanted: bool) -> None:
+    assert spans_a_decade(values) is wanted
 
 
-def test_places_on_axes() -> None:
-    assert Axis(0.0, 2.0).place(0.5) == 250.0
-    assert Axis(1.0, 100.0, log=True).place(10.0) == pytest.approx(500.0)
-    assert Axis(1.0, 100.0, log=True).place(-1.0) is None
-    chart = Chart("t", "x", "y", [line("a", [0, 4], [3, 5], band=([1, 1], [90, 90]))], top=10.0)
-    x, y = axes_of(chart)
-    assert (x.low, x.high) == (0.0, 4.0) and y.high == 10.0
-    bare = axes_of(Chart("t", "x", "y", []))
-    assert all(axis.high > axis.low for axis in bare)
+@pytest.mark.parametrize(
+    ("strain", "shades", "ends"),
+    [([-0.05, 1.0], "from least", (-0.05, 1.0)), ([-0.06, 1.0], "about zero", (-1.0, 1.0)),
+     ([-1.0, 0.06], "about zero", (-1.0, 1.0)), ([-1.0, 0.05], "from least", (-1.0, 0.05)),
+     ([0.0, 0.0], "from least", (0.0, 1.0)), ([np.nan, 0.2], "from least", (0.2, 1.2))],
+)  # fmt: skip
+def test_colours_of_values(strain: list[float], shades: str, ends: tuple[float, float]) -> None:
+    assert shades_of(strain) == shades
+    assert ends_of(np.array(strain), shades_of(strain)) == pytest.approx(ends)
 
 
-def marks(svg: str, look: str) -> list[np.ndarray]:
-    """Places (n, 2) of every path of a look."""
-    found = re.findall(
-        rf'<path class="{look}[^"]*"[^>]*? d="([^"]+)"', svg.split('class="plot"')[1]
-    )
-    return [np.array(re.findall(r"([\d.-]+) ([\d.-]+)", d), dtype=float) for d in found]
-
-
-def test_every_value_is_drawn_in_its_place() -> None:
-    """y from 0 to 10 upwards, x from 0 to 4: a band, a curve with a gap and an end, dots."""
+def test_every_value_is_given_to_vega() -> None:
+    """A band, a curve with a gap and an end, dots with error bars: each a mark of its data."""
     curve = line(
         "a", [0, 1, 2, 4], [0, 5, np.nan, 10], band=([0, 4, 4, 9], [1, 6, 6, 10]), ends=True
     )
-    chart = Chart(
-        "T", "x", "y", [curve, dots("b", [2.0], [5.0], colour=1)], from_zero=True, top=10.0
-    )
-    svg = chart_svg(chart)
-    x, y = axes_of(chart)
-    (way,) = marks(svg, "line")
-    np.testing.assert_allclose(way[:, 0], [x.place(v) for v in (0, 1, 4)], atol=0.01)
-    np.testing.assert_allclose(way[:, 1], [1000 - y.place(v) for v in (0, 5, 10)], atol=0.01)
-    assert "L" in svg and svg.count("M0 ") >= 1
-    end, spot = marks(svg, "dot")
-    np.testing.assert_allclose(end, way[-1:], atol=0.01)
-    np.testing.assert_allclose(spot, [[x.place(2.0), 500.0]], atol=0.01)
-    (band,) = marks(svg, "band")
-    assert len(band) == 8  # there and back
-    assert svg.count('class="entry"') == 2 and 'aria-label="T"' in svg
+    spots = dots("b", [2.0], [5.0], ([4.0], [6.5]), colour=1)
+    spec = panel(Chart("T", "x, mm", "y, N", [curve, spots], level=3.0, log_y=True))
+    assert spec["data"][0]["values"] == [
+        {"x": [0, 1, 2, 4], "y": [0, 5, None, 10], "lower": [0, 4, 4, 9], "upper": [1, 6, 6, 10]}
+    ]
+    kinds = [mark["type"] for mark in spec["marks"]]
+    assert kinds == ["rule", "area", "rule", "line", "symbol", "symbol"]
+    assert spec["marks"][3]["encode"]["update"]["defined"]["signal"].endswith("datum.y > 0")
+    colours = [mark["encode"]["update"].get("stroke", {}).get("value") for mark in spec["marks"]]
+    assert colours[2:4] == [PALETTE[1], PALETTE[0]]
+    assert [scale["type"] for scale in spec["scales"][:2]] == ["linear", "log"]
+    assert [axis["title"] for axis in spec["axes"]] == ["x, mm", "y, N"]
+    legend = {scale["name"]: scale for scale in spec["scales"]}["legend-shape"]
+    assert (legend["domain"], legend["range"]) == (["a", "b"], ["stroke", "circle"])
+
+
+def test_one_legend_of_all_charts_where_names_have_one_look() -> None:
+    first = Chart("1", "x, mm", "y, N", [line("a", [0, 1], [0, 1]), band("b", [0], [0], [1])])
+    other = Chart("2", "x, mm", "y, N", [line("a", [0, 1], [0, 1], colour=2)])
+    assert list(looks_of([first, first]) or ()) == ["a", "b"]
+    assert looks_of([first, other]) is None
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_files(tmp_path: Path, suffix: str) -> None:
+    corners = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]])
+    shape = Chart("s", "x, mm", "y, mm", [faces("", corners, [1, 2])], equal=True, scale="N")
+    names = Chart("", "test", "E1, %", [dots("a", [1, 2], [3, 4])], x_names=("one & <two>", "b"))
+    charts = Charts("c", [shape, names, Chart("", "", "", [])], "")
+    check_charts(charts)
+    content = save(tmp_path / f"c{suffix}", charts).read_bytes()
+    starts = {".png": b"\x89PNG", ".svg": b"<svg", ".pdf": b"%PDF"}
+    assert content.startswith(starts[suffix]) and len(content) > 2000
+    if suffix == ".png":
+        with Image.open(tmp_path / "c.png") as picture:
+            assert picture.width > 1000 and len(picture.convert("RGB").getcolors(1 << 20)) > 4
+    if suffix == ".svg":
+        text = content.decode()
+        # Two squares, true to scale, in the colours of the least and the largest value.
+        assert text.count(f'fill="{COLOURS["from least"][0]}"') >= 1
+        assert "one &amp; &lt;two&gt;" in text
+    with pytest.raises(ValueError, match="nothing to draw"):
+        save(tmp_path / "none.png", Charts("c", [], ""))
+    with pytest.raises(ValueError, match=r"expected \.png"):
+        save(tmp_path / "c.bmp", charts)
+
+
+def test_a_drawing_true_to_scale() -> None:
+    chart = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
+    width, height = (signal["value"] for signal in panel(chart)["signals"][:2])
+    (x0, x1), (y0, y1) = axis_ends(chart)
+    assert width / (x1 - x0) == pytest.approx(height / (y1 - y0), rel=1e-3)
+
+
+def test_the_figure_of_the_page() -> None:
+    """Named parts have names of their own; words are escaped."""
+    chart = Chart("<t>", "x, mm", "y, N", [line("<a>", [0, 1], [0, 1]), line("b", [0, 1], [1, 1])])
+    other = replace(chart, title="other")
+    one, two = figure(view(chart)), figure(view(other))
+    assert one.startswith('<svg class="chart" viewBox="0 0 ') and 'aria-label="&lt;t&gt;"' in one
+    assert "&lt;a&gt;" in one and "<a>" not in one
+    names = [set(re.findall(r'id="([^"]+)"', text)) for text in (one, two)]
+    assert names[0] and not names[0] & names[1]
+
+
+def test_a_dark_screen_has_a_colour_for_each() -> None:
+    style = dark_style()
+    for light in (*PALETTE, *RISING):
+        assert f'svg [stroke="{light}"]' in style and DARK[light] != light
 
 
 def test_many_points_are_thinned() -> None:
@@ -117,9 +207,11 @@ def test_maps_of_a_row_share_their_colours() -> None:
     assert row_ends(found, measured, 0) == row_ends(found, modelled, 0) == pytest.approx((0, 4))
     assert row_ends(found, left, 0) == pytest.approx((-2, 2))
     assert classes(np.array([-2.0, 0.0, 2.0, np.nan]), -2, 2).tolist() == [0, 6, CLASSES - 1, -1]
-    svg = map_svg(found, left, 0)
-    assert svg.count("h0") == 3 and svg.count("<rect") == CLASSES
-    assert re.findall(r'class="end"[^>]*>([^<]*)<', svg) == ["2", "0", "\u22122"]
+    chart = map_chart(found, left, 0)
+    (spots,) = chart.series
+    np.testing.assert_allclose(np.transpose([spots.x, spots.y]), places, atol=1e-4)
+    assert spots.values == pytest.approx([0, 1, 2], abs=1e-4)
+    assert scale_ends(chart) == pytest.approx((-2, 2)) and chart.scale == "mm" and chart.equal
 
 
 def test_a_surface_from_the_front_and_from_above() -> None:
@@ -132,31 +224,10 @@ def test_a_surface_from_the_front_and_from_above() -> None:
     np.testing.assert_allclose(flat, [[1, 0], [0, 1], [0, 0]], atol=1e-12)
     np.testing.assert_allclose(near, [0, 0, 1], atol=1e-12)
     corners = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1], [2, 1, 1]]], float)
-    faces = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    quads = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
     shade = Shade("s", "mm", pack([[1.0, np.nan]]))
-    svg = solid_svg(Solid("n", ["1"], "p", pack(corners), pack(faces), [shade], "c"), 0)
+    svg = solid_svg(Solid("n", ["1"], "p", pack(corners), pack(quads), [shade], "c"), 0)
     assert svg.count("Z") == 2 and 'fill="#999"' in svg
-
-
-def test_three_charts_in_a_row_keep_the_size_of_letters() -> None:
-    """Narrower in the same unit; legend and plot keep within."""
-    series = [line(f"a name that is long, {k}", [0, 1], [0, k]) for k in range(4)]
-    chart = Chart("t", "x", "y", series)
-    for beside, width in ((1, WIDTH), (2, WIDTH), (3, NARROW), (6, NARROW)):
-        svg = chart_svg(chart, beside)
-        assert svg.startswith(f'<svg class="chart" viewBox="0 0 {width:g} ')
-        assert f'width="{width - LEFT - RIGHT:g}"' in svg
-        starts = re.findall(r'class="entry" transform="translate\(([\d.]+) ', svg)
-        assert len(starts) == 4 and all(float(start) < 0.6 * width for start in starts)
-
-
-def test_few_dots_alone_are_large() -> None:
-    def drawn(count: int, *more: Series) -> str:
-        return chart_svg(Chart("", "x", "y", [dots("", range(count), range(count)), *more]))
-
-    assert 'class="chart few"' in drawn(FEW)
-    assert 'class="chart"' in drawn(FEW + 1)
-    assert 'class="chart"' in drawn(3, line("", [0, 1], [0, 1]))
 
 
 #: As wide as a digit of 12 px is in the widest of the usual fonts.
@@ -164,19 +235,16 @@ DIGIT = 7.7
 
 
 def test_numbers_of_a_colour_bar_have_room() -> None:
-    """The longest there are, "-7.43e-11", beside a map and beside a surface."""
+    """The longest there are, "-7.43e-11", beside a surface."""
     words = re.findall(r'x="16"[^>]*>([^<]*)<', scale_bar("about zero", "mm", -7.43e-11, 7.43e-11))
-    need = 16 + DIGIT * max(map(len, words))
-    assert len(words[-1]) == 9
-    assert maps_drawn.RIGHT - 8 >= need and BAR - 8 >= need
+    assert len(words[-1]) == 9 and BAR - 8 >= 16 + DIGIT * max(map(len, words))
 
 
 def test_a_surface_is_whole_and_clear_of_its_colour_bar() -> None:
     """However it is turned, from straight above, too."""
     turn = np.linspace(0, 2 * np.pi, 25)
     rim = np.column_stack([100 * np.cos(turn), 100 * np.sin(turn), 0 * turn])[None]
-    assert CENTRE[0] + scale_of(rim) * 100 <= solids_drawn.WIDTH - BAR
-    assert CENTRE[0] >= scale_of(rim) * 100
-    assert CENTRE[1] >= scale_of(rim) * 100
+    assert CENTRE[0] + scale_of(rim) * 100 <= maps_drawn.WIDTH - BAR
+    assert min(CENTRE) >= scale_of(rim) * 100
     # And as large as that allows.
     assert scale_of(rim) * 100 > 0.9 * min(CENTRE)

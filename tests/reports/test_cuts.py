@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.reports.cuts import node_cut, point_cut
+from bubblefit.reports.bubbles import node_cut, point_cut
 
 #: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
 ALONG = np.arange(0.0, 100.0, 10.0)

@@ -123,9 +123,9 @@ def test_a_level_that_fails_is_named_and_left_out(bars, tmp_path, drawn):
     # The figure shows the levels of the table that ended, each beside the next finer one.
     rows = table[table.quantity == END]
     change = 100 * np.abs(np.diff(rows.value)) / rows.value.iloc[-1]
-    shown = data(drawn[0].axes[0])[0]
-    assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1])
-    assert shown[1] == pytest.approx(change)
+    shown = data(drawn[0].charts[0])[0]
+    assert shown[0] == pytest.approx(rows["size"].to_numpy()[:-1], rel=1e-5)
+    assert shown[1] == pytest.approx(change, rel=1e-5)
     first = charts_of(tmp_path)["convergence"][0]
     (own,) = (series for series in first.series if series.name == END)
     assert own.x == pytest.approx(shown[0], rel=1e-5)

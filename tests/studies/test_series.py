@@ -18,7 +18,7 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
-from bubblefit.reports.page_file import read_page_data
+from bubblefit.reports.content import read_page_data
 from bubblefit.runs import simulation as analyses
 from bubblefit.runs.folder import FOLDER
 from bubblefit.runs.series import (

@@ -1,76 +1,118 @@
-// A chart that can be looked into: a window on its places, and the axes that belong to it.
-const WHOLE = { x: 0, y: 0, w: PLACES, h: PLACES };
+// A chart that Vega draws: the value under the pointer, zoom, saving.
+const OPTIONS = { mode: "vega", ast: true, renderer: "svg", actions: false, defaultStyle: false,
+  tooltip: false, hover: false };
 
-// About so wide is a letter.
-const LETTER = 6.4;
-// A value along the axis across, or the name that stands there.
-const across = (data, x) => data.names[Math.round(x) - 1] ?? x;
-
-const windowOn = (svg, data) => {
-  const plot = svg.querySelector(".plot"), grid = svg.querySelector(".axes");
-  const [left, top, width, height] =
-    ["x", "y", "width", "height"].map((name) => Number(plot.getAttribute(name)));
-  const view = { ...WHOLE };
-  const [across, up] = data.axes;
-  const onPaper = (x, y) => [
-    left + width * (x - view.x) / view.w,
-    top + height * (1 - (y - view.y) / view.h),
-  ];
-  const onPlot = (event) => {
-    const box = plot.getBoundingClientRect(), whole = svg.getBoundingClientRect();
-    const unit = whole.width / svg.viewBox.baseVal.width;
-    const x = (event.clientX - whole.left) / unit - left;
-    const y = (event.clientY - whole.top) / unit - top;
-    if (box.width === 0 || x < 0 || y < 0 || x > width || y > height) return null;
-    return { x: view.x + view.w * x / width, y: view.y + view.h * (1 - y / height) };
-  };
-  const axes = () => {
-    grid.replaceChildren();
-    const within = ([at]) => at >= left - 1e-6 && at <= left + width + 1e-6;
-    const named = data.names.map((name, k) => k + 1)
-      .filter((value) => within(onPaper(placeOf(across, value), 0)));
-    const most = Math.max(3, Math.floor(width / named.length / LETTER) - 1);
-    const short = (name) => (name.length <= most ? name : `${name.slice(0, most - 1)}…`);
-    for (const value of data.names.length ? named : ticksOf(across, view.x, view.x + view.w)) {
-      const [at] = onPaper(placeOf(across, value), 0);
-      const words = data.names.length ? short(data.names[value - 1]) : shown(value);
-      grid.append(make("path", { d: `M${at} ${top}v${height}` }), make("text",
-        { x: at, y: top + height + 16, "text-anchor": "middle" }, words));
-      if (data.names.length) grid.lastChild.append(make("title", {}, data.names[value - 1]));
-    }
-    for (const value of ticksOf(up, view.y, view.y + view.h)) {
-      const [, at] = onPaper(0, placeOf(up, value));
-      grid.append(make("path", { d: `M${left} ${at}h${width}` }), make("text",
-        { x: left - 6, y: at + 4, "text-anchor": "end" }, shown(value)));
-    }
-  };
-  const look = (to) => {
-    Object.assign(view, to);
-    plot.setAttribute("viewBox", `${view.x} ${PLACES - view.y - view.h} ${view.w} ${view.h}`);
-    axes();
-  };
-  const zoom = (factor, about) => {
-    const w = Math.min(view.w * factor, PLACES), h = Math.min(view.h * factor, PLACES);
-    if (w < 1 || h < 1) return;
-    const { x, y } = about ?? { x: view.x + view.w / 2, y: view.y + view.h / 2 };
-    const within = (value, size) => Math.min(Math.max(value, 0), PLACES - size);
-    look({ w, h, x: within(x - (x - view.x) / view.w * w, w),
-      y: within(y - (y - view.y) / view.h * h, h) });
-  };
-  return { look, zoom, onPaper, onPlot, view };
+const viewIn = async (box, spec) => {
+  const { view } = await vegaEmbed(box, spec, OPTIONS);
+  const svg = box.querySelector("svg");
+  const [width, height] = ["width", "height"].map((name) => svg.getAttribute(name));
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  for (const name of ["width", "height"]) svg.removeAttribute(name);
+  svg.setAttribute("class", "chart");
+  svg.setAttribute("role", "img");
+  svg.setAttribute("tabindex", "0");
+  svg.setAttribute("aria-label", spec.usermeta.alt);
+  return { view, svg };
 };
 
-// Every value that is drawn, with its place.
-const placed = (data) => data.series.flatMap((own) => {
-  const y = own.y.length ? own.y : own.upper;
-  return own.x.map((value, k) => ({
-    name: own.name, x: value, y: y[k], lower: own.lower[k], upper: own.upper[k],
-    at: [placeOf(data.axes[0], value), placeOf(data.axes[1], y[k])],
-  }));
-}).filter((one) => Number.isFinite(one.at[0]) && Number.isFinite(one.at[1]));
+// Where an event is in the plot, in its own units; null beside it.
+const placeOf = (view, svg, event) => {
+  const all = svg.getBoundingClientRect(), unit = all.width / svg.viewBox.baseVal.width;
+  const [left, top] = view.origin();
+  const x = (event.clientX - all.left) / unit - left, y = (event.clientY - all.top) / unit - top;
+  return x < 0 || y < 0 || x > view.width() || y > view.height() ? null : [x, y];
+};
 
-const chartRows = (data) => [
-  ["series", ...data.labels, "lower", "upper"],
-  ...data.series.flatMap((own) => own.x.map((value, k) =>
-    [own.name, across(data, value), own.y[k], own.lower[k], own.upper[k]])),
-];
+const rowsOf = (spec) => spec.data.flatMap(({ values: [own] }, k) => (own.x ?? []).map((x, i) => ({
+  name: spec.usermeta.series[k], x, y: (own.y ?? own.upper)[i], lower: own.lower?.[i] ?? null,
+  upper: own.upper?.[i] ?? null, value: own.values?.[i] ?? null })));
+
+const enliven = (view, svg, spec, name, bar) => {
+  const { labels: [across, up], names, scale, title } = spec.usermeta;
+  const { said, button } = bar, whole = [view.signal("xs"), view.signal("ys")];
+  let rows = [], current = -1, begun = null;
+  const placed = (row) => [view.scale("x")(row.x), view.scale("y")(row.y)];
+  const known = (row) => row.x !== null && row.y !== null && placed(row).every(Number.isFinite);
+  const fill = () => { rows = rowsOf(spec).filter(known); };
+  const set = (signals) => {
+    for (const [key, value] of Object.entries(signals)) view.signal(key, value);
+    return view.run();
+  };
+  const tell = (k) => {
+    const one = rows[current = k];
+    set({ spot: one ? placed(one) : null, box: [0, 0, 0, 0] });
+    if (!one) { said.textContent = ""; return; }
+    const band = one.lower === null || one.upper === null ? ""
+      : ` (${shown(one.lower)} to ${shown(one.upper)})`;
+    const value = one.value === null ? "" : `; ${title} ${shown(one.value)} ${scale}`;
+    said.textContent = `${one.name ? `${one.name}: ` : ""}${across} ` +
+      `${names[Math.round(one.x) - 1] ?? shown(one.x)}; ${up} ${shown(one.y)}${band}${value}`;
+  };
+  const nearest = ([px, py]) => {
+    let best = -1, least = Infinity;
+    rows.forEach((row, k) => {
+      const [x, y] = placed(row), far = (x - px) ** 2 + (y - py) ** 2;
+      if (far < least) { least = far; best = k; }
+    });
+    return best;
+  };
+  const part = (x0, y0, x1, y1) => {
+    const [x, y] = ["x", "y"].map((key) => view.scale(key));
+    set({ xs: [x.invert(x0), x.invert(x1)], ys: [y.invert(y1), y.invert(y0)] });
+    tell(current);
+  };
+  const zoom = (factor) => {
+    const [w, h] = [view.width(), view.height()];
+    const [x, y] = rows[current] ? placed(rows[current]) : [w / 2, h / 2];
+    part(x - x * factor, y - y * factor, x + (w - x) * factor, y + (h - y) * factor);
+  };
+  const reset = () => { set({ xs: whole[0], ys: whole[1] }); tell(-1); };
+  fill();
+  svg.addEventListener("pointermove", (event) => {
+    const at = placeOf(view, svg, event);
+    if (at && begun) set({ box: [...begun, ...at] });
+    else if (at) tell(nearest(at));
+  });
+  svg.addEventListener("pointerdown", (event) => {
+    if (event.pointerType !== "mouse" || event.button) return;
+    begun = placeOf(view, svg, event);
+    if (begun) event.preventDefault();
+  });
+  svg.addEventListener("pointerup", (event) => {
+    const at = placeOf(view, svg, event), from = begun;
+    begun = null;
+    if (!from || !at || Math.abs(at[0] - from[0]) < 8 || Math.abs(at[1] - from[1]) < 8) return;
+    current = -1;
+    part(...[0, 1].map((k) => Math.min(at[k], from[k])),
+      ...[0, 1].map((k) => Math.max(at[k], from[k])));
+  });
+  svg.addEventListener("pointerleave", () => { begun = null; tell(-1); });
+  svg.addEventListener("dblclick", reset);
+  onKeys(svg, {
+    ArrowRight: () => tell(Math.min(current + 1, rows.length - 1)),
+    ArrowLeft: () => tell(Math.max(current - 1, 0)),
+    "+": () => zoom(0.5), "-": () => zoom(2), 0: reset, Escape: reset,
+  });
+  if (button) {
+    button("+", "zoom in", () => zoom(0.5));
+    button("−", "zoom out", () => zoom(2));
+    button("whole", "show the whole chart", reset);
+    button("SVG", "save as SVG", () => saveView(fileName(name, title), view));
+    button("CSV", "save the values as CSV", () => saveCsv(fileName(name, title), [
+      ["series", across, up, "lower", "upper"],
+      ...rowsOf(spec).map((row) => [row.name, names[Math.round(row.x) - 1] ?? row.x, row.y,
+        row.lower, row.upper]),
+    ]));
+  }
+  return { set, fill };
+};
+
+const saveView = async (name, view) => save(`${name}.svg`, "image/svg+xml", await view.toSVG());
+
+const enlivenCharts = async (figure, data) => {
+  for (const [k, spec] of data.views.entries()) {
+    const box = figure.querySelectorAll(".view")[k];
+    const { view, svg } = await viewIn(box, spec);
+    enliven(view, svg, spec, data.name, toolbar(box.parentElement));
+  }
+};

@@ -1,63 +1,43 @@
 // Maps: another load, the value under the pointer, saving.
 const enlivenMaps = async (figure, data) => {
-  const places = await unpack(data.places);
-  const panels = await Promise.all(data.panels.map((panel) => unpack(panel.values)));
-  const maps = [...figure.querySelectorAll("svg.map")];
+  const { maps, views } = data, places = await unpack(maps.places);
+  const panels = await Promise.all(maps.panels.map((panel) => unpack(panel.values)));
   const slider = figure.querySelector("input"), label = figure.querySelector(".slider output");
   const firsts = [0];
-  for (const count of data.counts) firsts.push(firsts.at(-1) + count);
+  for (const count of maps.counts) firsts.push(firsts.at(-1) + count);
   const { said, button } = toolbar(figure);
   figure.querySelector(".grid").after(said.parentElement);
-  said.setAttribute("aria-live", "polite");
-  const size = Number(maps[0].querySelector(".spots").getAttribute("stroke-width"));
-  const scale = (data.side - size) / data.span;
-  const spot = (k) => [
-    data.side / 2 + scale * (places[2 * k] - data.middle[0]),
-    data.side / 2 - scale * (places[2 * k + 1] - data.middle[1]),
-  ];
-  const range = () => [firsts[slider.value], firsts[Number(slider.value) + 1]];
-
+  const drawn = [];
+  for (const [k, spec] of views.entries()) {
+    const { view, svg } = await viewIn(figure.querySelectorAll(".view")[k], spec);
+    drawn.push({ view, svg, spec, ...enliven(view, svg, spec, maps.name, { said }) });
+  }
+  const short = (value) => (Number.isNaN(value) ? null : Number(value.toPrecision(6)));
   const draw = () => {
-    const [from, to] = range();
-    label.textContent = data.loads[slider.value];
-    maps.forEach((svg, m) => {
-      const panel = data.panels[m], colours = data.colours[panel.shades];
-      const alike = data.panels.flatMap((p, k) =>
-        p.row === panel.row && p.shades === panel.shades ? [...panels[k].slice(from, to)] : []);
-      const ends = endsOf(alike, panel.shades), marks = colours.map(() => "");
-      for (let k = from; k < to; k++) {
-        const value = panels[m][k];
-        if (Number.isNaN(value)) continue;
-        const [x, y] = spot(k);
-        marks[classOf(value, ends, colours.length)] += `M${x.toFixed(1)} ${y.toFixed(1)}h0`;
-      }
-      svg.querySelectorAll(".spots path").forEach((path, c) => path.setAttribute("d", marks[c]));
-      svg.setAttribute("aria-label", `${panel.name}, ${panel.unit}, ${data.loads[slider.value]}`);
-      tellScale(svg, ends, panel.unit, colours);
+    const load = Number(slider.value), x = [], y = [];
+    label.textContent = maps.loads[load];
+    for (let k = firsts[load]; k < firsts[load + 1]; k++) {
+      x.push(short(places[2 * k]));
+      y.push(short(places[2 * k + 1]));
+    }
+    drawn.forEach(({ view, svg, spec, set, fill }, m) => {
+      const values = [...panels[m].slice(firsts[load], firsts[load + 1])].map(short);
+      const own = { x, y, values }, { name, unit } = maps.panels[m];
+      spec.data[0].values = [own];
+      view.data("s0", [{ ...own }]);
+      set({ ends: maps.ends[load][m] });
+      fill();
+      svg.setAttribute("aria-label", `${name}, ${unit}, ${maps.loads[load]}`);
     });
   };
-  maps.forEach((svg, m) => svg.addEventListener("pointermove", (event) => {
-    const area = svg.querySelector(".spots").getScreenCTM();
-    if (!area) return;
-    const x = (event.clientX - area.e) / area.a, y = (event.clientY - area.f) / area.d;
-    const [from, to] = range();
-    let best = -1, least = size ** 2 * 4;
-    for (let k = from; k < to; k++) {
-      const [a, b] = spot(k), far = (a - x) ** 2 + (b - y) ** 2;
-      if (far < least) { least = far; best = k; }
-    }
-    said.textContent = best < 0 ? "" : `${data.panels[m].name} at x ${shown(places[2 * best])}, ` +
-      `y ${shown(places[2 * best + 1])}: ${shown(panels[m][best])} ${data.panels[m].unit}`;
-  }));
   slider.addEventListener("input", draw);
-  button("SVG", "save the maps as SVG files", () => maps.forEach((svg, m) =>
-    saveSvg(fileName(data.name, data.panels[m].name, data.loads[slider.value]), svg)));
-  button("CSV", "save the values of all loads as CSV", () => saveCsv(fileName(data.name), [
-    ["load", data.x_label, data.y_label, ...data.panels.map((p) => `${p.name}, ${p.unit}`)],
-    ...data.loads.flatMap((load, f) => Array.from({ length: data.counts[f] }, (_, j) => {
-      const k = firsts[f] + j, short = (value) => Number(value.toPrecision(6));
-      return [load, short(places[2 * k]), short(places[2 * k + 1]),
-        ...panels.map((own) => short(own[k]))];
+  button("SVG", "save the maps as SVG files", () => drawn.forEach(({ view }, m) =>
+    saveView(fileName(maps.name, maps.panels[m].name, maps.loads[slider.value]), view)));
+  button("CSV", "save the values of all loads as CSV", () => saveCsv(fileName(maps.name), [
+    ["load", maps.x_label, maps.y_label, ...maps.panels.map((p) => `${p.name}, ${p.unit}`)],
+    ...maps.loads.flatMap((load, f) => Array.from({ length: maps.counts[f] }, (_, j) => {
+      const k = firsts[f] + j;
+      return [load, ...[places[2 * k], places[2 * k + 1], ...panels.map((own) => own[k])].map(short)];
     })),
   ]));
   draw();

@@ -7,7 +7,6 @@ const enlivenSolid = async (figure, data) => {
   const slider = figure.querySelector("input"), label = figure.querySelector(".slider output");
   const choice = figure.querySelector("select");
   const { said, button } = toolbar(figure.querySelector(".one"));
-  said.setAttribute("aria-live", "polite");
   svg.setAttribute("tabindex", "0");
   const [loads, nodes] = data.points.shape, faces = data.faces.shape[0];
   const paths = [...group.children], order = Array.from({ length: faces }, (_, k) => k);
@@ -69,18 +68,27 @@ const enlivenSolid = async (figure, data) => {
     said.textContent = place < 0 ? "" : `${data.shades[own].name}: ` +
       `${shown(shades[own][load * faces + order[place]])} ${data.shades[own].unit}`;
   });
-  svg.addEventListener("keydown", (event) => {
-    const keys = {
-      ArrowLeft: () => turn(5, 0), ArrowRight: () => turn(-5, 0), ArrowUp: () => turn(0, 5),
-      ArrowDown: () => turn(0, -5), "+": () => zoom(1.2), "-": () => zoom(1 / 1.2), 0: reset,
-    };
-    if (event.key in keys) { keys[event.key](); event.preventDefault(); }
+  onKeys(svg, {
+    ArrowLeft: () => turn(5, 0), ArrowRight: () => turn(-5, 0), ArrowUp: () => turn(0, 5),
+    ArrowDown: () => turn(0, -5), "+": () => zoom(1.2), "-": () => zoom(1 / 1.2), 0: reset,
   });
   slider.addEventListener("input", later);
   choice.addEventListener("input", later);
   button("+", "larger", () => zoom(1.2));
   button("−", "smaller", () => zoom(1 / 1.2));
   button("as at first", "turn it back", reset);
-  button("SVG", "save as SVG", () => saveSvg(fileName(data.name, data.loads[slider.value]), svg));
+  button("SVG", "save as SVG", () => saveSurface(svg, data));
   draw();
+};
+
+// The surface as a file: with the letters' look, which the page's style holds.
+const saveSurface = (svg, data) => {
+  const copy = svg.cloneNode(true), [, , width, height] = svg.getAttribute("viewBox").split(" ");
+  for (const [key, value] of Object.entries({ xmlns: "http://www.w3.org/2000/svg", width, height,
+    "font-family": "sans-serif", "font-size": 12 })) copy.setAttribute(key, value);
+  copy.querySelector(".faces").setAttribute("stroke", "#0006");
+  copy.querySelector(".faces").setAttribute("stroke-width", "0.5");
+  copy.prepend(make("rect", { width, height, fill: "#fff" }));
+  const load = data.loads[svg.closest("figure").querySelector("input").value];
+  save(`${fileName(data.name, load)}.svg`, "image/svg+xml", new XMLSerializer().serializeToString(copy));
 };

@@ -10,6 +10,7 @@ const toolbar = (below) => {
   const bar = document.createElement("div");
   bar.className = "tools";
   const said = document.createElement("output");
+  said.setAttribute("aria-live", "polite");
   bar.append(said);
   below.append(bar);
   const button = (words, title, action) => {
@@ -47,28 +48,9 @@ const saveCsv = (name, rows) => {
   save(`${name}.csv`, "text/csv", rows.map((row) => row.map(cell).join(",") + "\n").join(""));
 };
 
-// As it looks on paper, whatever the screen: every mark carries its own look.
-const LOOKS = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap",
-  "stroke-linejoin", "opacity", "font-size", "font-weight", "font-family"];
-const saveSvg = (name, svg) => {
-  const root = document.documentElement;
-  root.dataset.look = "light";
-  const copy = svg.cloneNode(true);
-  const own = [svg, ...svg.querySelectorAll("*")];
-  const copies = [copy, ...copy.querySelectorAll("*")];
-  own.forEach((node, k) => {
-    const look = getComputedStyle(node);
-    for (const key of LOOKS) copies[k].setAttribute(key, look.getPropertyValue(key));
-    copies[k].removeAttribute("class");
-  });
-  delete root.dataset.look;
-  const [, , width, height] = svg.getAttribute("viewBox").split(" ");
-  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
-  copy.setAttribute("width", width);
-  copy.setAttribute("height", height);
-  copy.prepend(make("rect", { width, height, fill: "#fff" }));
-  save(`${name}.svg`, "image/svg+xml", new XMLSerializer().serializeToString(copy));
-};
+const onKeys = (node, keys) => node.addEventListener("keydown", (event) => {
+  if (event.key in keys) { keys[event.key](); event.preventDefault(); }
+});
 
 // Sixteen bits a number, deflated, in base 64.
 const MISSING = 65535;

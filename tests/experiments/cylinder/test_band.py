@@ -12,9 +12,9 @@ from bubblefit.experiments.cylinder import report as figures
 from bubblefit.experiments.cylinder import report as page
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.experiments.kinds import Output
-from bubblefit.reports.bending import BendPanel
 
 from ...cylinder_cases import ENDS
+from ...drawings import caught
 from .test_page import BENT, CURVE, LOAD, WAY, case, run, unbroken
 from .test_tables import MEASURES
 
@@ -71,9 +71,7 @@ def test_the_terminal_says_which_wall(outcome: CylinderOutcome) -> None:
 def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     outcome: CylinderOutcome, tmp_path: Path, monkeypatch
 ) -> None:
-    panels: list[BendPanel] = []
-    monkeypatch.setattr(figures, "plot_bending", lambda path, panel: panels.append(panel))
-    monkeypatch.setattr(figures, "plot_gas", lambda *_: None)
+    calls = caught(monkeypatch, figures, "bending_charts", "gas_charts")
     beams: list[tuple[str, str]] = []
     monkeypatch.setattr(
         figures, "draw_beam", lambda m, r, path, title: beams.append((path.name, title))
@@ -82,7 +80,7 @@ def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     for one in outcome.runs:
         one.model = None
     shown = dict(figures.draw_figures(outcome, Output(tmp_path)))
-    (panel,) = panels
+    panel = calls[0][1][0]
     assert panel.band == "from slack to rigid wall"
     soft, hard = panel.lines
     np.testing.assert_array_equal([soft.deflection, soft.load], [WAY, LOAD])

@@ -13,6 +13,7 @@ from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.experiments.kinds import Output
 from bubblefit.readers.bending import BendingCurve
 
+from ...drawings import caught
 from .test_page import BENT, WAY, case, run
 from .test_tables import MEASURES
 
@@ -22,11 +23,10 @@ READ = (BendingCurve("1", WAY, 2 * WAY), BendingCurve("2", WAY[:2], 2 * WAY[:2] 
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
-    names = ("plot_bending", "plot_bending_cases", "plot_gas", "draw_beam", "write_beam")
-    calls: dict[str, list[Any]] = {name: [] for name in names}
-    for name in names:
-        monkeypatch.setattr(figures, name, lambda *what, own=calls[name]: own.append(what))
-    return calls
+    calls: dict[str, list[Any]] = {"draw_beam": [], "write_beam": []}
+    for name, found in calls.items():
+        monkeypatch.setattr(figures, name, lambda *what, own=found: own.append(what))
+    return {**calls, "saved": caught(monkeypatch, figures, "bending_charts", "gas_charts")}
 
 
 def outcome(*runs: Any, bent: tuple[int, ...]) -> CylinderOutcome:
@@ -54,9 +54,9 @@ def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
         ("c/figures/a-b-2-beam.png", "a/b: the bent beam, card stiff"),
         ("c/figures/a-b-2-gas.png", "a/b: the gas while bending"),
     ]
-    (path, panel), (_, other) = drawn["plot_bending"]
+    (path, (panel,)), gas, (_, (other,)), more, all_loads = drawn["saved"]
     assert path == tmp_path / "c/figures/a-b-load.png"
-    assert [path.name for path, _ in drawn["plot_gas"]] == ["a-b-gas.png", "a-b-2-gas.png"]
+    assert [path.name for path, _ in (gas, more)] == ["a-b-gas.png", "a-b-2-gas.png"]
     assert [(line.name, line.rank) for line in panel.lines] == [("soft", 0), ("stiff", 1)]
     assert [(line.name, line.rank) for line in other.lines] == [("stiff", 1)]
     one, two = panel.lines
@@ -75,15 +75,15 @@ def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
     np.testing.assert_allclose(readings.mean[whole], 2 * readings.deflection[whole] + 2.0)
     np.testing.assert_allclose(readings.deviation[whole], np.sqrt(8.0))
     assert other.measured is None
-    ((path, laid, columns),) = drawn["plot_bending_cases"]
-    assert path == tmp_path / "c/figures/all-loads.png" and columns == 2
+    path, laid = all_loads
+    assert path == tmp_path / "c/figures/all-loads.png" and len(laid) == 4
     assert [panel.title for panel in laid] == ["a b", "broken", "a/b", ""]
 
 
 def test_one_test_has_no_figure_of_all(tmp_path: Path, drawn) -> None:
     both = outcome(run(case("a"), "soft"), run(case("b"), "soft"), bent=(0,))
     assert len(figures.draw_figures(both, Output(tmp_path))) == 2
-    assert not drawn["plot_bending_cases"]
+    assert [path.name for path, _ in drawn["saved"]] == ["a-load.png", "a-gas.png"]
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from bubblefit.readers.polynomials import fit_load_polynomial
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
+from ...drawings import caught
 from ...projects import project_file
 from ...published_laws import TABLE_4_2
 from .sections import CURVES, PUBLISHED, SMALL, read, write_exports
@@ -274,8 +275,7 @@ def test_no_modulus_is_shown_beyond_where_it_is_fitted(published):
 def test_orders_are_those_of_polynomials_as_they_are_fitted(
     exported, tmp_path, monkeypatch, through_origin
 ):
-    told = []
-    monkeypatch.setattr(figures, "plot_orders", lambda path, panels: told.extend(panels))
+    drawn = caught(monkeypatch, figures, "order_charts")
     write = functools.partial(write_offset, tmp_path)
     write()
     prepared = exported(("[data]", f"[data]\nthrough_origin = {str(through_origin).lower()}"))
@@ -285,6 +285,7 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
         *strip.points, range(1, 9), through_origin=through_origin,
         specimens=strip.specimen_of.tolist(),
     )  # fmt: skip
+    ((_, told),) = drawn
     assert told[0].rmse == [s.rmse for s in expected.scores]
     assert told[0].left_out == [s.left_out for s in expected.scores]
     # A load at rest of 50 N: only a polynomial with a constant can follow it.
@@ -342,8 +343,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> Non
 
     monkeypatch.setattr(figures, "middle_strain", middle)
     assert figures._gauge_shear(model, history) == pytest.approx(0.3)
-    drawn: list[Any] = []
-    monkeypatch.setattr(figures, "plot_strip", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, figures, "strip_charts")
     monkeypatch.setattr(figures, "write_vtu", lambda *what, **more: drawn.append((what, more)))
     figures.draw_bias(model, history, Path("b.png"), Path("b.vtu"))
     picture, (written, more) = drawn
@@ -355,8 +355,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> Non
 
 
 def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> None:
-    drawn: list[Any] = []
-    monkeypatch.setattr(figures, "plot_moduli_together", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, figures, "moduli_together")
     law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), strain_range=np.full(3, 0.13))
     prepared = published()
     fit = fitted(prepared)
@@ -374,8 +373,7 @@ def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> No
 
 
 def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeypatch) -> None:
-    told: list[Any] = []
-    monkeypatch.setattr(figures, "plot_orders", lambda path, panels: told.extend(panels))
+    drawn = caught(monkeypatch, figures, "order_charts")
     test = exported(("[data]", "[data]\norder = 3")).test
     strips = [
         test.strips["warp"],
@@ -383,6 +381,7 @@ def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeyp
         test.strips["fill"],
     ]
     assert figures.draw_orders(strips, Path("o.png"))
+    ((_, told),) = drawn
     assert [(p.direction, p.orders, p.chosen) for p in told] == [
         ("warp", list(range(1, 9)), 3), ("fill", list(range(1, 9)), 3)
     ]  # fmt: skip

@@ -28,6 +28,8 @@ from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.polynomials import fit_load_polynomial
 from bubblefit.solvers.base import History
 
+from ...drawings import caught
+
 WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])
 CURVES = (
     LoadCurve("warp", "1", WAY, 100 * WAY, Path("w.csv"), notes=("a note", "another")),
@@ -155,10 +157,9 @@ def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
-    calls: dict[str, list[Any]] = {"plot_loads": [], "draw_bias": []}
-    for name, found in calls.items():
-        monkeypatch.setattr(simulated, name, lambda *what, found=found: found.append(what))
-    return calls
+    biases: list[Any] = []
+    monkeypatch.setattr(simulated, "draw_bias", lambda *what: biases.append(what))
+    return {"loads": caught(monkeypatch, simulated, "load_charts"), "draw_bias": biases}
 
 
 def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = False) -> Any:
@@ -201,7 +202,7 @@ def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
         ["soft", "bias", 2.0, 10.0], ["soft", "bias", 4.0, 20.0],
         ["hard", "bias", 2.0, 11.0], ["hard", "bias", 4.0, 21.5],
     ]  # fmt: skip
-    ((path, (first, second)),) = drawn["plot_loads"]
+    ((path, _, (first, second)),) = drawn["loads"]
     assert path == tmp_path / "loads.png"
     assert [(name, load.tolist()) for name, _, load in first.models] == [("soft", [223.0, 436.0])]
     assert list(first.rms) == pytest.approx([rms]) and list(second.rms) == []
@@ -237,7 +238,7 @@ def test_curves_end_where_the_range_of_the_card_does(
     assert warp["shown_to_mm"] == 2.0 * shown and warp["end_load_N"] == 436.0
     assert warp["rms_N"] == pytest.approx(3.0 if shown == 1 else np.sqrt(12.5))
     assert (card["e_uniaxial_N"] is None) == (shown == 1)
-    ((_, (panel,)),) = drawn["plot_loads"]
+    ((_, _, (panel,)),) = drawn["loads"]
     assert len(panel.models[0][1]) == shown
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
 
@@ -247,5 +248,5 @@ def test_a_card_whose_range_ends_at_once(tmp_path: Path, drawn, monkeypatch) -> 
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     warp = said.numbers["cards"]["soft"]["directions"]["warp"]
     assert (warp["shown_to_mm"], warp["rms_N"]) == (0.0, None)
-    ((_, (panel,)),) = drawn["plot_loads"]
+    ((_, _, (panel,)),) = drawn["loads"]
     assert not panel.models

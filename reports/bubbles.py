@@ -1,0 +1,257 @@
+"""Charts of bubble tests: cuts, heights, what was recorded, and values over the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import Delaunay, cKDTree
+
+from .charts import Array, Chart, Charts, Series, dots, faces, line
+
+#: Title, points, how far off, which were used.
+Sphere = tuple[str, Array, Array, NDArray[np.bool_]]
+
+#: Pressures drawn in one chart; of more, as many spread over all, the last among them.
+MOST = 8
+#: Points drawn of one map; spheres in one picture.
+POINTS, FRAMES = 6000, 6
+AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
+
+#: Points that must lie on an axis before they are taken as its profile.
+ENOUGH = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Deformed positions along an axis and heights above the reference plane, (k,) mm each."""
+
+    position: Array
+    height: Array
+
+
+def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
+    """Return the profile of a mesh along x (axis 0) or y (axis 1).
+
+    points (n, 2 or 3), displacement (n, 3), mm. Nodes on the axis where there are some, else
+    (free meshes) linear interpolation between the nodes beside it.
+    """
+    xy, u = np.asarray(points, dtype=float)[:, :2], np.asarray(displacement, dtype=float)
+    on = _on_axis(xy, axis)
+    if on.sum() >= ENOUGH:
+        return _sorted(xy[on, axis], u[on], axis)
+    along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
+    line = np.zeros((len(along), 2))
+    line[:, axis] = along
+    between = LinearNDInterpolator(xy, u)(line)
+    inside = np.isfinite(between).all(axis=1)
+    return _sorted(along[inside], between[inside], axis)
+
+
+def point_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
+    """Return measured points on the axis, or else those within half a point distance of it."""
+    xy, u = np.asarray(points, dtype=float)[:, :2], np.asarray(displacement, dtype=float)
+    on = _on_axis(xy, axis)
+    if on.sum() < ENOUGH and len(xy) > 1:
+        spacing = float(np.median(cKDTree(xy).query(xy, k=2)[0][:, 1]))
+        on = np.abs(xy[:, 1 - axis]) <= 0.51 * spacing
+    return _sorted(xy[on, axis], u[on], axis)
+
+
+def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
+    size = float(np.abs(xy).max(initial=0.0))
+    return np.asarray(np.abs(xy[:, 1 - axis]) <= 1e-6 * size)
+
+
+def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
+    order = np.argsort(along)
+    return Cut((along + displacement[:, axis])[order], displacement[order, 2])
+
+
+def chosen(count: int) -> list[int]:
+    """Return the numbers of the pressures that are drawn."""
+    return np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int)).tolist()
+
+
+def ranks(count: int) -> list[float]:
+    """Return the places of rising pressures along their colours."""
+    return np.linspace(0.1, 1.0, count).tolist()
+
+
+def kilo(pressure: float) -> str:
+    """Return a pressure (MPa) in kPa."""
+    return f"{1e3 * pressure:.4g} kPa"
+
+
+def left_out(count: int) -> str:
+    """Return the sentence that not every pressure is drawn; "" where all are."""
+    return f" Of {count} pressures {MOST} are drawn." if count > MOST else ""
+
+
+def cut_charts(
+    name: str,
+    pressures: ArrayLike,
+    points: ArrayLike,
+    displacement: ArrayLike,
+    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (),
+    caption: str = "",
+) -> Charts:
+    """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
+
+    Parameters
+    ----------
+    pressures : (frames,) MPa. points : (n, 2 or 3) mm, nodes of a full or a quarter mesh.
+    displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements
+    (k, 3) mm, drawn as dots.
+    """
+    frames, shown = np.asarray(pressures, dtype=float), np.asarray(displacement, dtype=float)
+    numbers, charts = chosen(len(frames)), []
+    for axis, (title, label) in enumerate(AXES):
+        series: list[Series] = []
+        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
+            cut, words = node_cut(points, shown[k], axis), kilo(frames[k])
+            series.append(line(words, cut.position, cut.height, rank=rank))
+            if measured:
+                spots = point_cut(*measured[k], axis)
+                series.append(dots(words, spots.position, spots.height, rank=rank))
+        what = "modelled and measured " if measured else ""
+        alt = f"{title}: heights {what}at {len(numbers)} pressures"
+        charts.append(Chart(title, label, "height z, mm", series, alt))
+    return Charts(name, charts, f"{caption}{left_out(len(frames))}")
+
+
+def height_charts(
+    pressures: ArrayLike,
+    measured: Sequence[ArrayLike],
+    modelled: Sequence[ArrayLike],
+    measured_label: str = "measured",
+) -> Charts:
+    """Return modelled against measured z, and their difference (as Figs 4.7 and 5.5).
+
+    pressures : (frames,) MPa. measured, modelled : for each frame (k,) mm, at the same points.
+    measured_label : "known" where the data were computed.
+    """
+    frames = np.asarray(pressures, dtype=float)
+    pairs = [
+        (np.asarray(a, dtype=float).ravel(), np.asarray(b, dtype=float).ravel())
+        for a, b in zip(measured, modelled, strict=True)
+    ]
+    seen, computed = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    rms = float(np.sqrt(np.mean((computed - seen) ** 2)))
+    spread = float(np.sum((seen - seen.mean()) ** 2))
+    fit = 1.0 - float(np.sum((computed - seen) ** 2)) / spread if spread > 0 else float("nan")
+    ends = [min(0.0, seen.min(), computed.min()), 1.03 * max(seen.max(), computed.max())]
+    left: list[Series] = [line("", ends, ends, colour=3)]
+    right: list[Series] = []
+    for (z, model), p, rank in zip(pairs, frames, ranks(len(frames)), strict=True):
+        left.append(dots(kilo(p), z, model, rank=rank))
+        right.append(dots(kilo(p), z, model - z, rank=rank))
+    across, alt = f"{measured_label} z, mm", f"modelled heights, {rms:.2g} mm RMS off"
+    charts = [
+        Chart(f"R² = {_below_one(fit)}", across, "modelled z, mm", left, alt),
+        Chart(f"RMS {rms:.2g} mm", across, f"modelled − {measured_label}, mm", right, alt,
+              level=0.0),
+    ]  # fmt: skip
+    return Charts("heights", charts, "")
+
+
+def _below_one(value: float) -> str:
+    """Return three decimals, or the distance from 1 where those would hide it."""
+    return f"{value:.3f}" if not value > 0.999 else f"1 − {1.0 - value:.1e}"
+
+
+def rise_charts(pressures: ArrayLike, rises: ArrayLike) -> Charts:
+    """Return the rises (frames,) mm of the centre over pressures (frames,) MPa."""
+    kilos = 1e3 * np.asarray(pressures, dtype=float)
+    series = [line("", kilos, rises, marks=True)]
+    chart = Chart("", "pressure, kPa", "rise about the centre, mm", series, from_zero=True)
+    return Charts("rises", [chart], "")
+
+
+def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
+    """Return pressure and height of every frame over time, and one over the other.
+
+    Parameters
+    ----------
+    times : (frames,) s, by the log's clock. pressures : (frames,) MPa, NaN beyond the log.
+    heights : (frames,) mm, of the apex. taken : (n,) MPa, pressures of the frames that are used.
+    """
+    kilos, known = 1e3 * pressures, np.isfinite(pressures)
+    near = [int(np.argmin(np.where(known, np.abs(pressures - p), np.inf))) for p in taken]
+    time, pressure, height = "time by the log's clock, s", "pressure, kPa", "height of the apex, mm"
+    both: list[Series] = [
+        dots("all frames", kilos, heights),
+        dots("taken", kilos[near], heights[near], colour=1, hollow=True),
+    ]
+    charts = [
+        Chart("pressure of the log", time, pressure, [line("", times, kilos, marks=True)]),
+        Chart("height", time, height, [line("", times, heights, marks=True, colour=1)]),
+        Chart("", pressure, height, both),
+    ]
+    return Charts("clock", charts, "")
+
+
+def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: Array) -> Charts:
+    """Return a map a quantity over the points (n, 2) mm, with rim, warp and fill.
+
+    maps : title with its unit, and values (n,). edge : (m, 2) mm, the rim once around.
+    """
+    arrow, charts = 0.5 * float(np.hypot(*edge.T).min()), []
+    for title, values in maps:
+        series = [
+            dots("", points[:, 0], points[:, 1], most=POINTS, values=values),
+            line("rim", *edge.T, colour=3),
+            line("warp", [0.0, arrow], [0.0, 0.0], colour=1, ends=True),
+            line("fill", [0.0, 0.0], [0.0, arrow], colour=0, ends=True),
+        ]
+        name, _, unit = title.rpartition(", ")
+        charts.append(Chart(name, "x, mm", "y, mm", series, title, equal=True, scale=unit))
+    return Charts("registration", charts, "")
+
+
+def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts:
+    """Return a map a quantity over the disk, zero in the middle of the colours.
+
+    maps : title with its unit, places (n, 2) mm, and values (n,). edge : (m, 2) mm, the rim once
+    around.
+    """
+    charts = []
+    for title, places, values in maps:
+        most = max(float(np.abs(values).max()), 1e-9)
+        corners = Delaunay(places).simplices
+        series = [faces("", places[corners], values[corners].mean(axis=1)),
+                  line("", *edge.T, colour=3)]  # fmt: skip
+        name, _, unit = title.rpartition(", ")
+        charts.append(
+            Chart(name, "x (warp), mm", "y (fill), mm", series, title, equal=True, scale=unit,
+                  shades="about zero", ends=(-most, most))
+        )  # fmt: skip
+    return Charts("disk", charts, "")
+
+
+def sphere_charts(frames: Sequence[Sphere]) -> Charts:
+    """Return how far points lie beyond their sphere: the first few frames, in one scale.
+
+    frames : title, points (n, 3) mm, distance beyond the sphere (n,) mm, which were used (n,).
+    """
+    shown, charts = frames[:FRAMES], []
+    most = max(float(np.abs(off[used]).max()) for _, _, off, used in shown) or 1.0
+    for title, points, off, used in shown:
+        series = [
+            dots("", points[used, 0], points[used, 1], most=POINTS, values=off[used]),
+            dots(
+                "left out", points[~used, 0], points[~used, 1], most=POINTS, colour=7, shape="cross"
+            ),
+        ]
+        # However far off others are, the picture stays that of the ball.
+        x, y = ((float(p.min()), float(p.max())) for p in points[used, :2].T)
+        edge = 0.05 * max(x[1] - x[0], y[1] - y[0])
+        charts.append(
+            Chart(title, "x, mm", "y, mm", series, title, equal=True, shades="about zero",
+                  scale="beyond the sphere, mm", ends=(-most, most),
+                  x_range=(x[0] - edge, x[1] + edge), y_range=(y[0] - edge, y[1] + edge))
+        )  # fmt: skip
+    return Charts("spheres", charts, "")

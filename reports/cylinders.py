@@ -1,0 +1,264 @@
+"""Charts of bent cylinders: load over deflection, their gas, and the bent beam."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .charts import Array, Chart, Charts, Series, band, dots, faces, line, shades_of
+
+Point = tuple[float, float]
+
+MM3_PER_LITRE = 1e6
+ALONG = "deflection of the collar, mm"
+#: mm of the collar's wall, which the model does not have: only for the eye.
+WALL = 12.0
+#: Beside the collar, in its lengths: how far the close view goes.
+CLOSE = 2.2
+
+
+@dataclass(frozen=True, eq=False)
+class BendLine:
+    """The curve of one card.
+
+    Parameters
+    ----------
+    name : of the card. rank : of its colour, the same in every figure.
+    deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3.
+    knee, limit : where they are, mm and N.
+    rms : N, against what was measured.
+    other : deflection (mm) and load (N) of the other end of a band that begins at the curve.
+    off : (frames,) N, how far the load may be off to either side by what the card leaves open.
+    """
+
+    name: str
+    rank: int
+    deflection: ArrayLike
+    load: ArrayLike
+    pressure: ArrayLike = ()
+    volume: ArrayLike = ()
+    knee: Point | None = None
+    limit: Point | None = None
+    rms: float | None = None
+    other: tuple[ArrayLike, ArrayLike] | None = None
+    off: ArrayLike | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BendReadings:
+    """What was measured: every repetition's readings, their mean and scatter on one grid (k,)."""
+
+    readings: Sequence[tuple[ArrayLike, ArrayLike]]
+    deflection: ArrayLike
+    mean: ArrayLike
+    deviation: ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class BendPanel:
+    """One case: what it is called, a curve a card, what was measured, what a band goes between,
+    and what the curves may be off by.
+    """
+
+    title: str
+    lines: Sequence[BendLine] = ()
+    measured: BendReadings | None = None
+    band: str = ""
+    spread: str = ""
+
+
+@dataclass(frozen=True)
+class BeamBodies:
+    """Where the rigid bodies are at the end, mm.
+
+    supports : (z, y) of both axes and the radius. collar : y of its axis, inner radius, length.
+    """
+
+    supports: tuple[tuple[float, float], ...]
+    support_radius: float
+    collar_height: float
+    collar_radius: float
+    collar_length: float
+
+
+def bending_charts(
+    panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
+) -> Charts:
+    """Return load over deflection, a chart a case; cases without curves are left out of a page.
+
+    In a file of several columns charts of one row have the same loads; a panel without a title
+    leaves its place free.
+
+    A band is what the card leaves open; the other end of the solver's band is a dashed curve of
+    the card's colour. misses : whether charts of model less mean follow, of
+    cases that were measured.
+
+    Raises
+    ------
+    ValueError : no case with a curve.
+    """
+    if not any(panel.lines for panel in panels):
+        raise ValueError("bending_charts: no cases to draw")
+    drawn = [panel for panel in panels if panel.lines or columns > 1]
+    charts = [_loads(panel) for panel in drawn]
+    if columns > 1:
+        charts = [
+            replace(chart, x_range=_range(charts, "x"), y_range=_range(row, "y"))
+            for row in (charts[k : k + columns] for k in range(0, len(charts), columns))
+            for chart in row
+        ]
+    charts += [_misses(panel) for panel in drawn if misses and panel.measured is not None]
+    return Charts("loads", charts, caption, columns)
+
+
+def _range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
+    """Return the range of an axis that holds all that several charts draw."""
+    fields = ("x",) if axis == "x" else ("y", "upper")
+    every = [v for c in charts for s in c.series for f in fields for v in getattr(s, f)]
+    return 0.0, 1.06 * max([v for v in every if v is not None], default=0.0) or 1.0
+
+
+def _loads(panel: BendPanel) -> Chart:
+    series: list[Series] = []
+    if panel.measured is not None:
+        seen = panel.measured
+        mean, spread = np.asarray(seen.mean, float), np.asarray(seen.deviation, float)
+        grid, ends = seen.deflection, (mean - spread, mean + spread)
+        series.append(band("scatter of repetitions (±)", grid, *ends, colour=7))
+        series.append(line("mean", grid, mean, colour=7, wide=True))
+        for elongation, load in seen.readings:
+            series.append(dots("measured", elongation, load, colour=7))
+    known = [(own.name, own.rms) for own in panel.lines if own.rms is not None]
+    for own in panel.lines:
+        load, look = np.asarray(own.load, dtype=float), 1 + own.rank % 6
+        sure = None if own.off is None else (load - np.asarray(own.off), load + np.asarray(own.off))
+        series.append(line(own.name, own.deflection, load, sure, colour=look))
+        if own.other is not None:
+            series.append(line(f"{own.name}, other end", *own.other, colour=look, dashes=1))
+        for words, point, shape in (
+            ("knee", own.knee, "diamond"), ("limit point", own.limit, "triangle-up")
+        ):  # fmt: skip
+            if point is not None:
+                at = [point[0]], [point[1]]
+                series.append(dots(words, *at, colour=look, shape=shape, hollow=True))
+    sides = [panel.spread] if any(own.off is not None for own in panel.lines) else []
+    series += [band(name, (), (), (), colour=1 + panel.lines[0].rank % 6) for name in sides if name]
+    highest = max((float(np.max(np.asarray(own.load))) for own in panel.lines), default=0.0)
+    alt = f"{panel.title}: load over deflection, up to {highest:.4g} N"
+    alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in known)
+    title = panel.title
+    if len(known) == 1:
+        title += f": RMS error {known[0][1]:.3g} N"
+    return Chart(title, ALONG, "load, N", series, alt, from_zero=True)
+
+
+def _misses(panel: BendPanel) -> Chart:
+    seen = panel.measured
+    assert seen is not None
+    grid, mean = np.asarray(seen.deflection, float), np.asarray(seen.mean, float)
+    spread = np.asarray(seen.deviation, float)
+    series = [band("scatter of repetitions (±)", grid, -spread, spread, colour=7)]
+    for own in panel.lines:
+        x, y = np.asarray(own.deflection, float), np.asarray(own.load, float)
+        off = np.interp(grid, x, y, left=np.nan, right=np.nan) - mean
+        series.append(line(own.name, grid, off, colour=1 + own.rank % 6))
+    known = [f"{own.name} {own.rms:.3g} N" for own in panel.lines if own.rms is not None]
+    title = f"RMS error: {', '.join(known)}" if known else ""
+    alt = f"{panel.title}: model less mean of the readings"
+    return Chart(title, ALONG, "model − mean, N", series, alt, level=0.0)
+
+
+def gas_charts(panel: BendPanel) -> Charts:
+    """Return gauge pressure against change of volume and against deflection."""
+    by_volume: list[Series] = []
+    by_way: list[Series] = []
+    for own in panel.lines:
+        pressure = 1e3 * np.asarray(own.pressure, dtype=float)
+        volume = np.asarray(own.volume, dtype=float) / MM3_PER_LITRE
+        name, look = f"{own.name}, from {volume[0]:.4g} litres", 1 + own.rank % 6
+        by_volume.append(line(name, volume - volume[0], pressure, colour=look))
+        by_way.append(line(name, own.deflection, pressure, colour=look))
+    across, up = "volume less that when inflated, litres", "gauge pressure, kPa"
+    charts = [
+        Chart(panel.title, across, up, by_volume, f"{panel.title}: pressure over volume"),
+        Chart("", ALONG, up, by_way, f"{panel.title}: pressure over deflection"),
+    ]
+    return Charts("gas", charts, "")
+
+
+def beam_charts(
+    bent: ArrayLike,
+    quads: ArrayLike,
+    strain: ArrayLike,
+    outline: ArrayLike,
+    section: tuple[ArrayLike, ArrayLike],
+    bodies: BeamBodies,
+    title: str = "",
+) -> Charts:
+    """Return a whole beam true to scale, coloured by its strain along the axis.
+
+    Parameters
+    ----------
+    bent : (n, 3) mm, positions; z along the axis, y up.
+    quads : (m, 4). strain : (m,) log strain along the axis when bent.
+    outline : (k, 2) mm, the inflated beam from the side as a closed line (z, y).
+    section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
+    bodies : supports and collar when bent.
+    """
+    now, before = np.asarray(bent, dtype=float), np.asarray(outline, dtype=float)
+    cells, values = np.asarray(quads, dtype=int), np.asarray(strain, dtype=float)
+    # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
+    most = max(float(values.max()), 1e-6)
+    values = np.clip(values, -most, most)
+    # Of the two halves the eye sees one; what is nearer hides what is behind.
+    seen = np.flatnonzero(now[cells, 0].mean(axis=1) >= 0)
+    seen = seen[np.argsort(now[cells[seen], 0].mean(axis=1))]
+    body = faces("", now[cells[seen]][:, :, [2, 1]], values[seen])
+    side = [body, line("inflated", *before.T, colour=7, dashes=1), *_supports(bodies)]
+    ring, middle = bodies.collar_radius + WALL, bodies.collar_height
+    feet = [y - bodies.support_radius for _, y in bodies.supports]
+    low = min(float(now[:, 1].min()), middle - ring, *feet)
+    high = max(float(now[:, 1].max()), float(before[:, 1].max()), middle + ring)
+    ends, reach = float(np.abs(now[:, 2]).max()), CLOSE * bodies.collar_length
+    tall, axes = bodies.collar_radius + 4 * WALL, ("z, mm", "y, mm")
+    shades = shades_of(values)
+    scale: dict[str, Any] = {"equal": True, "scale": "log strain along the axis", "shades": shades}
+    whole = Chart(title, *axes, side, f"{title}: the bent beam from the side",
+                  x_range=(-1.03 * ends, 1.03 * ends), y_range=(low - 20, high + 20),
+                  **scale)  # fmt: skip
+    close = Chart("at the collar", *axes, side, "the bent beam at the collar",
+                  x_range=(-reach, reach), y_range=(middle - tall, middle + tall),
+                  **scale)  # fmt: skip
+    return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=1)
+
+
+def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
+    turn = np.linspace(0.0, 2.0 * np.pi, 73)
+    return x + radius * np.cos(turn), y + radius * np.sin(turn)
+
+
+def _supports(bodies: BeamBodies) -> list[Series]:
+    """Return supports and collar from the side."""
+    series = [
+        line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
+    ]
+    half, r = 0.5 * bodies.collar_length, bodies.collar_radius
+    for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
+        x = [-half, half, half, -half, -half]
+        series.append(line("collar", x, [y, y, y + WALL, y + WALL, y], colour=0))
+    return series
+
+
+def _cut(section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies) -> Chart:
+    before, now = (np.asarray(ring, dtype=float) for ring in section)
+    series = [
+        line("collar", *_circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * WALL)),
+        line("inflated", *before.T, colour=7, dashes=1),
+        line("bent", *now.T, colour=3),
+    ]
+    alt = "the beam cut at mid-span, inflated and bent"
+    return Chart("cut at mid-span", "x, mm", "y, mm", series, alt, equal=True)

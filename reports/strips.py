@@ -1,0 +1,298 @@
+"""Charts of strip and biaxial tests: loads, orders of polynomials, the deformed strip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .charts import (
+    TITLES,
+    Array,
+    Chart,
+    Charts,
+    Series,
+    band,
+    dots,
+    faces,
+    line,
+    shades_of,
+    spans_a_decade,
+)
+
+Curve = tuple[ArrayLike, ArrayLike]
+
+ALONG = "gauge elongation, mm"
+YARNS = ("warp", "fill")
+#: Specimens that the legend of a chart names; more are drawn without a name.
+NAMED = 6
+#: Height of a drawn grip, as a share of the strip's length.
+GRIP = 0.06
+
+
+@dataclass(frozen=True, eq=False)
+class StripCurves:
+    """Loads of one direction; a curve is a pair of elongation (mm) and load (N).
+
+    Parameters
+    ----------
+    direction : "warp", "fill", "bias" (or "bias45").
+    models : (name, elongation, load), best first; each may end where it likes. Where it starts
+        above zero it is taken to have started unloaded at zero elongation.
+    points : measured, of any number of specimens, in any order.
+    polynomial : the load curve fitted to them, on increasing elongations.
+    scatter : N, of the specimens about their curve.
+    rms : N, of each model in turn (Eqs 3.4-3.6), as far as known.
+    """
+
+    direction: str
+    models: Sequence[tuple[str, ArrayLike, ArrayLike]] = ()
+    points: Curve | None = None
+    polynomial: Curve | None = None
+    scatter: float | None = None
+    rms: Sequence[float] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class OrderErrors:
+    """One direction's load polynomials: orders (k,), rmse and left_out (k,) N, and the choice.
+
+    `left_out` is the root mean square of the errors at points left out of the fit one by one.
+    """
+
+    direction: str
+    orders: Sequence[int]
+    rmse: ArrayLike
+    left_out: ArrayLike
+    chosen: int
+
+
+@dataclass(frozen=True, eq=False)
+class BiaxialPanel:
+    """One ratio: the larger load (n,) kN/m and the strains (n, 2) % along warp and fill; models by
+    name with loads and strains of their own, best first."""
+
+    ratio: str
+    load: ArrayLike
+    strain: ArrayLike
+    models: Sequence[tuple[str, ArrayLike, ArrayLike]] = ()
+
+
+def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
+    """Return the loads of each strip over gauge elongation, and what the models miss.
+
+    Differences are those from the polynomial, with the measured points' own as dots; from the
+    points where there is no polynomial. There is none where a strip has neither.
+
+    Raises
+    ------
+    ValueError : no curves.
+    """
+    if not curves:
+        raise ValueError("load_charts: no strips to draw")
+    # The same model has the same colour in every chart.
+    names = list(dict.fromkeys(model for c in curves for model, _, _ in c.models))
+    compared = [c for c in curves if c.models and (c.polynomial or c.points)]
+    charts = [_loads(c, names) for c in curves] + [_differences(c, names) for c in compared]
+    columns = len(curves) if len(compared) in (0, len(curves)) else 0
+    return Charts(name, charts, caption, columns)
+
+
+def _loads(strip: StripCurves, names: Sequence[str]) -> Chart:
+    series: list[Series] = []
+    if strip.polynomial is not None:
+        series.append(line("load polynomial", *strip.polynomial, colour=6, wide=True))
+    if strip.points is not None:
+        series.append(dots("measured", *strip.points, colour=7))
+    for own, elongation, load in strip.models:
+        rank = names.index(own)
+        curve = _from_zero(elongation, load)
+        series.append(line(own, *curve, colour=(rank + 1) % 6, dashes=rank // 6))
+    title = TITLES.get(strip.direction, strip.direction)
+    alt = f"{title}; load over elongation, measured and modelled"
+    if len(strip.rms) == 1:
+        title += f": RMS error {strip.rms[0]:.3g} N"
+        if strip.scatter is not None:
+            title += f", scatter {strip.scatter:.3g} N"
+    return Chart(title, ALONG, "load, N", series, alt, from_zero=True)
+
+
+def _differences(strip: StripCurves, names: Sequence[str]) -> Chart:
+    series: list[Series] = []
+    points = None if strip.points is None else _from_zero(*strip.points)
+    every = np.concatenate([np.ravel(x) for _, x, _ in strip.models])
+    if strip.scatter is not None:
+        ends, off = [0.0, float(every.max())], np.full(2, strip.scatter)
+        series.append(band("scatter of specimens (±)", ends, -off, off, colour=7))
+    if strip.polynomial is not None and points is not None:
+        off = points[1] - _at(strip.polynomial, points[0])
+        series.append(dots("measured", points[0], off, colour=7))
+    for own, *model in strip.models:
+        rank = names.index(own)
+        x, y = _from_zero(*model)
+        if strip.polynomial is not None:
+            off = y - _at(strip.polynomial, x)
+            series.append(line(own, x, off, colour=(rank + 1) % 6, dashes=rank // 6))
+        elif points is not None:
+            off = _at((x, y), points[0]) - points[1]
+            series.append(dots(own, points[0], off, colour=(rank + 1) % 6))
+    title = TITLES.get(strip.direction, strip.direction)
+    models = [own for own, _, _ in strip.models]
+    known = [f"{own} {e:.3g} N" for own, e in zip(models, strip.rms, strict=False)]
+    title += f": RMS error {', '.join(known)}" if len(known) > 1 else ""
+    label = "difference, N"
+    return Chart(title, ALONG, label, series, f"{title}: {label}", level=0.0)
+
+
+def _from_zero(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
+    """Return a curve in rising order, from the unloaded strip on."""
+    x = np.atleast_1d(np.asarray(elongation, dtype=float))
+    order = np.argsort(x, kind="stable")
+    x, y = x[order], np.atleast_1d(np.asarray(load, dtype=float))[order]
+    return (np.r_[0.0, x], np.r_[0.0, y]) if len(x) and x[0] > 0 else (x, y)
+
+
+def _at(curve: Curve, elongation: Array) -> Array:
+    """Return the load (N) of the curve there; NaN, which is not drawn, beyond its end."""
+    return np.interp(elongation, *_from_zero(*curve), left=np.nan, right=np.nan)
+
+
+def specimen_charts(
+    curves: Mapping[str, Sequence[tuple[str, ArrayLike, ArrayLike]]],
+) -> Charts:
+    """Return load curves as they were read, a chart a direction: name, mm and N of specimens."""
+    charts = []
+    for direction, specimens in curves.items():
+        series = [
+            line(name if rank < NAMED else "", x, y, colour=rank, dashes=rank // 8)
+            for rank, (name, x, y) in enumerate(specimens)
+        ]
+        alt = f"{direction}: loads of {len(series)} specimens"
+        charts.append(Chart(direction, "elongation of the gauge, mm", "load, N", series, alt))
+    return Charts("curves", charts, "")
+
+
+def order_charts(directions: Sequence[OrderErrors]) -> Charts:
+    """Return RMSE and leave-one-out error over the polynomial order, a chart a direction.
+
+    A ring marks the chosen order. An axis is logarithmic where its errors span a decade.
+
+    Raises
+    ------
+    ValueError : no directions.
+    """
+    if not directions:
+        raise ValueError("order_charts: no directions to draw")
+    charts = []
+    for row in directions:
+        errors = [np.asarray(values, dtype=float) for values in (row.rmse, row.left_out)]
+        words, log = ("RMSE of the fit", "leave-one-out error"), spans_a_decade(errors)
+        series = [
+            line(name, row.orders, values, colour=k, marks=True)
+            for k, (name, values) in enumerate(zip(words, errors, strict=True))
+        ]
+        at = list(row.orders).index(row.chosen) if row.chosen in row.orders else None
+        if at is not None:
+            both = [own[at] for own in errors]
+            series.append(dots("chosen order", [row.chosen] * 2, both, colour=3, hollow=True))
+        title = f"{TITLES.get(row.direction, row.direction)}: order {row.chosen}"
+        axes = "order of the polynomial", "error of the load, N"
+        charts.append(Chart(title, *axes, series, title, log_y=log, from_zero=not log))
+    return Charts("orders", charts, "")
+
+
+def strip_charts(
+    points: ArrayLike,
+    quads: ArrayLike,
+    displacement: ArrayLike,
+    shear: ArrayLike,
+    gauge: ArrayLike,
+    title: str = "",
+    grips: bool = True,
+) -> Charts:
+    """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
+
+    Parameters
+    ----------
+    points : (n, 3) or (n, 2) mm, at rest.
+    quads : (m, 4) nodes.
+    displacement : (n, 3) or (n, 2) mm.
+    shear : (m,) gamma12 of each quad, signed or its magnitude.
+    gauge : (2,) nodes of the virtual strain gauge.
+    grips : whether the ends are held in grips, to be drawn.
+
+    Raises
+    ------
+    ValueError : not one shear strain a quad.
+    """
+    rest = np.asarray(points, dtype=float)[:, :2]
+    now = rest + np.asarray(displacement, dtype=float)[:, :2]
+    cells, gamma = np.asarray(quads, dtype=int), np.asarray(shear, dtype=float)
+    if gamma.shape != (len(cells),):
+        raise ValueError(f"strip_charts: {gamma.size} shear strains for {len(cells)} quads")
+    outline, ends = _outline(cells), np.asarray(gauge, dtype=int)
+    series = [
+        faces("", now[cells], gamma),
+        line("at rest", *_segments(rest[outline]), colour=7, dashes=1),
+        line("", *_segments(now[outline]), colour=3),
+        *(_grips(rest, now) if grips else ()),
+    ]
+    for place, colour, words in ((rest, 7, "gauge at rest"), (now, 3, "gauge")):
+        long = float(np.linalg.norm(np.diff(place[ends], axis=0)))
+        series.append(dots(f"{words}, {long:.2f} mm", *place[ends].T, colour=colour, hollow=True))
+    alt = f"the strip, its shear strain from {gamma.min():.3g} to {gamma.max():.3g}"
+    chart = Chart(
+        title, "x, mm", "y, mm", series, alt, equal=True, scale="shear strain γ12",
+        shades=shades_of(gamma),
+    )  # fmt: skip
+    return Charts("strip", [chart], "")
+
+
+def _outline(quads: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the edges (k, 2) that belong to one quad only."""
+    edges = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return unique[count == 1]
+
+
+def _segments(edges: Array) -> tuple[Array, Array]:
+    """Return x and y of edges (k, 2, 2), with a gap after each."""
+    gaps = np.full((len(edges), 1, 2), np.nan)
+    flat = np.concatenate([edges, gaps], axis=1).reshape(-1, 2)
+    return flat[:, 0], flat[:, 1]
+
+
+def _grips(rest: Array, now: Array) -> list[Series]:
+    y, long = rest[:, 1], float(np.ptp(rest[:, 1]))
+    series = []
+    for end, by in ((y > y.max() - 1e-6 * long, GRIP), (y < y.min() + 1e-6 * long, -GRIP)):
+        x0, x1, at = now[end, 0].min(), now[end, 0].max(), float(now[end, 1].mean())
+        far = at + by * long
+        series.append(line("grips", [x0, x0, x1, x1, x0], [at, far, far, at, at], colour=0))
+    return series
+
+
+def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
+    """Return the strains of both yarns over the larger load, a chart a ratio.
+
+    Raises
+    ------
+    ValueError : no panels.
+    """
+    if not panels:
+        raise ValueError("biaxial_charts: no ratio to draw")
+    charts = []
+    for panel in panels:
+        series: list[Series] = []
+        for k, yarn in enumerate(YARNS):
+            measured = np.asarray(panel.strain)[:, k]
+            series.append(dots(f"{yarn}, measured", panel.load, measured, colour=k))
+        for rank, (model, load, strain) in enumerate(panel.models):
+            for k, yarn in enumerate(YARNS):
+                own = np.asarray(strain)[:, k]
+                series.append(line(f"{yarn}, {model}", load, own, colour=k, dashes=rank))
+        alt = f"ratio {panel.ratio}: strains along warp and fill over the larger load"
+        charts.append(Chart(f"ratio {panel.ratio}", "larger load, kN/m", "strain, %", series, alt))
+    return Charts(name, charts, caption)
