@@ -29,7 +29,7 @@ from common import (
 from scipy.integrate import quad
 
 Modulus = Callable[[float], float]
-PROFILES = ROOT / "studies" / "verification" / "published" / "marc_bubble_profiles.csv"
+PROFILES = ROOT / "runs" / "verification" / "published" / "marc_bubble_profiles.csv"
 STAND_IN = ROOT / "tests" / "marc_stand_in" / "run_marc"
 MODELS = {
     "bubble": BubbleModel(disk_mesh(100.0, 48, "quarter"), 0.81, (0.006, 0.022, 0.059, 0.097)),

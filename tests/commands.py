@@ -27,8 +27,8 @@ TIMEOUT_S = 300.0
 ENDING_S = 30.0
 #: np.float64(0.5), array([0.5, 1. ]), [0.5 1. ]
 NUMPY = re.compile(r"\bnp\.\w+\(|\barray\(|\[ ?-?\d+\.\d* +-?\d+\.\d*[\]\s]")
-#: Rooms that commands import as they go.
-ROOMS = ("cli", "data", "experiments", "fits", "materials", "reports", "solvers", "studies")
+#: Packages that commands import as they go.
+PACKAGES = ("cli", "experiments", "inference", "materials", "project", "readers", "reports", "runs", "solvers")
 
 
 def bubblefit(
@@ -77,7 +77,7 @@ def plain(text: str) -> None:
 @cache
 def _import_all() -> None:
     """What commands import when they are called: once here, not in every copy."""
-    for name in ROOMS:
+    for name in PACKAGES:
         room = importlib.import_module(f"bubblefit.{name}")
         for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
             if not module.name.endswith("__main__"):

@@ -31,7 +31,7 @@ from scipy.interpolate import PchipInterpolator
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
-PROFILES = ROOT / "studies" / "verification" / "published" / "marc_bubble_profiles.csv"
+PROFILES = ROOT / "runs" / "verification" / "published" / "marc_bubble_profiles.csv"
 #: The normal times the deformed area, and its derivative, by what takes their place.
 NORMAL = (
     ("nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]", "nx = 0.0"),
