@@ -64,6 +64,8 @@ FEW = 60
 ROUND = (
     "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
 )
+#: Characters that XML forbids.
+UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 #: Pixels of a file for each of Vega's.
 DOTS = 2.0
 CONFIG: Spec = {
@@ -129,7 +131,7 @@ def picture(charts: Charts) -> Spec:
     }
     if looks:
         spec |= _legend(list(looks.values()), (width + 60) * min(columns, len(charts.charts)))
-    return spec
+    return _printable(spec)
 
 
 def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
@@ -156,7 +158,19 @@ def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
         "scale": chart.scale, "series": [s.name for s in chart.series],
         "alt": chart.alt or chart.title,
     }  # fmt: skip
-    return _outline() | {"width": width, "height": height, "usermeta": said, **group}
+    return _printable(_outline() | {"width": width, "height": height, "usermeta": said, **group})
+
+
+def _printable(value: Any) -> Any:
+    """Return a specification whose texts hold no characters that XML forbids.
+
+    vl-convert ends the whole process where a text has one.
+    """
+    if isinstance(value, str):
+        return UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", value)
+    if isinstance(value, dict):
+        return {_printable(key): _printable(item) for key, item in value.items()}
+    return [_printable(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def figure(spec: Spec) -> Markup:

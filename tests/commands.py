@@ -28,7 +28,17 @@ ENDING_S = 30.0
 #: np.float64(0.5), array([0.5, 1. ]), [0.5 1. ]
 NUMPY = re.compile(r"\bnp\.\w+\(|\barray\(|\[ ?-?\d+\.\d* +-?\d+\.\d*[\]\s]")
 #: Packages that commands import as they go.
-PACKAGES = ("cli", "experiments", "inference", "materials", "project", "readers", "reports", "runs", "solvers")
+PACKAGES = (
+    "cli",
+    "experiments",
+    "inference",
+    "materials",
+    "project",
+    "readers",
+    "reports",
+    "runs",
+    "solvers",
+)
 
 
 def bubblefit(
