@@ -7,8 +7,12 @@ browser, and carries the scripts that the page holds.
 
 from __future__ import annotations
 
+import base64
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
@@ -98,16 +102,57 @@ def save(path: Path | str, charts: Charts) -> Path:
 
 def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
-    import vl_convert
+    if suffix not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
+    return _converted(picture(charts), suffix[1:])
 
-    spec = picture(charts)
-    if suffix == ".png":
-        return bytes(vl_convert.vega_to_png(spec, scale=DOTS))
-    if suffix == ".svg":
-        return vl_convert.vega_to_svg(spec).encode()
-    if suffix == ".pdf":
-        return bytes(vl_convert.vega_to_pdf(spec))
-    raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
+
+class _Converter:
+    """vl-convert, in this process or, where a fork has left its thread behind, in one beside it."""
+
+    #: Reads a line of JSON a drawing, writes a line of base64.
+    PROGRAM = """
+import base64, json, sys
+import vl_convert
+for line in sys.stdin:
+    name, spec, options = json.loads(line)
+    made = getattr(vl_convert, name)(spec, **options)
+    made = made.encode() if isinstance(made, str) else made
+    print(base64.b64encode(made).decode(), flush=True)
+"""
+
+    def __init__(self) -> None:
+        self.owner = 0
+        self.beside: tuple[int, subprocess.Popen[str]] | None = None
+
+    def __call__(self, name: str, spec: Spec | str, options: Spec) -> bytes:
+        """Return what the function of vl-convert makes of a specification."""
+        self.owner = self.owner or os.getpid()
+        if self.owner == os.getpid():
+            import vl_convert
+
+            made = getattr(vl_convert, name)(spec, **options)
+            return made.encode() if isinstance(made, str) else bytes(made)
+        if self.beside is None or self.beside[0] != os.getpid():
+            command = [sys.executable, "-c", self.PROGRAM]
+            pipe = subprocess.PIPE
+            self.beside = os.getpid(), subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+        program = self.beside[1]
+        assert program.stdin is not None and program.stdout is not None
+        program.stdin.write(json.dumps([name, spec, options]) + "\n")
+        program.stdin.flush()
+        line = program.stdout.readline()
+        if not line:
+            raise OutputError("vl-convert ended before it had drawn a chart")
+        return base64.b64decode(line)
+
+
+_convert = _Converter()
+
+
+def _converted(spec: Spec, kind: str) -> bytes:
+    """Return a drawing as bytes; kind : "png", "svg" or "pdf"."""
+    return _convert(f"vega_to_{kind}", spec, {"scale": DOTS} if kind == "png" else {})
 
 
 def picture(charts: Charts) -> Spec:
@@ -175,9 +220,7 @@ def _printable(value: Any) -> Any:
 
 def figure(spec: Spec) -> Markup:
     """Return a view as SVG that stands in the page: on paper, and until the script takes over."""
-    import vl_convert
-
-    text = vl_convert.vega_to_svg(spec)
+    text = _converted(spec, "svg").decode()
     alt = escape(spec["usermeta"]["alt"])
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
     assert head is not None
@@ -210,15 +253,13 @@ def library() -> str:
     ------
     OutputError : vl-convert does not give it.
     """
-    import vl_convert
-
     path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         pass
     try:
-        text = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
+        text = _convert("javascript_bundle", "window.vegaEmbed = vegaEmbed;", {}).decode()
     except ValueError as error:
         raise OutputError(f"the scripts of vl-convert: {error}") from None
     # Nothing in it may end the element of the page that holds it.
