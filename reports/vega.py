@@ -8,8 +8,12 @@ browser, and carries the scripts that the page holds.
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -60,12 +64,23 @@ THREE = 3
 LETTER, SAMPLE = 6.2, 34
 #: Dots of a chart of nothing else: up to so many are drawn large.
 FEW = 60
+#: Characters that XML, and so SVG, cannot hold.
+UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 #: Whether the first digit of a tick of a logarithmic axis is 1, 2 or 5.
 ROUND = (
     "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
 )
 #: Pixels of a file for each of Vega's.
 DOTS = 2.0
+#: Processes that have drawn: this one and those that it was forked from.
+users: set[int] = set()
+#: What a process of its own runs to draw.
+ALONE = f"""import json, sys, vl_convert
+kind = sys.argv[1]
+more = {{"scale": {DOTS}}} if kind == "png" else {{}}
+made = getattr(vl_convert, "vega_to_" + kind)(json.load(sys.stdin), **more)
+sys.stdout.buffer.write(made.encode() if isinstance(made, str) else made)
+"""
 CONFIG: Spec = {
     "aria": False,
     "axis": {
@@ -96,20 +111,34 @@ def save(path: Path | str, charts: Charts) -> Path:
 
 def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
-    import vl_convert
+    if suffix not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
+    return _drawn(suffix[1:], picture(charts))
 
-    spec = picture(charts)
-    if suffix == ".png":
-        return bytes(vl_convert.vega_to_png(spec, scale=DOTS))
-    if suffix == ".svg":
-        return vl_convert.vega_to_svg(spec).encode()
-    if suffix == ".pdf":
-        return bytes(vl_convert.vega_to_pdf(spec))
-    raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
+
+def _drawn(kind: str, spec: Spec) -> bytes:
+    """Return what vl-convert draws.
+
+    Its threads do not live on in a forked process, where a call would wait for ever: there a
+    process of its own draws.
+    """
+    users.add(os.getpid())
+    if users == {os.getpid()}:
+        import vl_convert
+
+        scale = {"scale": DOTS} if kind == "png" else {}
+        made = getattr(vl_convert, f"vega_to_{kind}")(spec, **scale)
+        return made.encode() if isinstance(made, str) else bytes(made)
+    command = [sys.executable, "-c", ALONE, kind]
+    done = subprocess.run(command, input=json.dumps(spec).encode(), capture_output=True)
+    if done.returncode:
+        raise OutputError(f"a drawing: {done.stderr.decode(errors='replace')[-300:]}")
+    return done.stdout
 
 
 def picture(charts: Charts) -> Spec:
     """Return Vega's specification of all charts beside each other, with one legend if it can."""
+    charts = replace(charts, charts=[printable(chart) for chart in charts.charts])
     columns = charts.columns or min(THREE, len(charts.charts))
     width = NARROW if columns >= THREE else WIDE
     looks = looks_of(charts.charts) if len(charts.charts) > 1 else None
@@ -134,6 +163,7 @@ def picture(charts: Charts) -> Spec:
 
 def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
     """Return Vega's specification of one chart of the page; dot : area of its dots."""
+    chart = printable(chart)
     group = panel(chart, width, dot=dot)
     for mark in group["marks"]:
         mark["clip"] = True
@@ -161,9 +191,7 @@ def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
 
 def figure(spec: Spec) -> Markup:
     """Return a view as SVG that stands in the page: on paper, and until the script takes over."""
-    import vl_convert
-
-    text = vl_convert.vega_to_svg(spec)
+    text = _drawn("svg", spec).decode()
     alt = escape(spec["usermeta"]["alt"])
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
     assert head is not None
@@ -196,17 +224,18 @@ def library() -> str:
     ------
     OutputError : vl-convert does not give it.
     """
-    import vl_convert
-
     path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         pass
-    try:
-        text = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")
-    except ValueError as error:
-        raise OutputError(f"the scripts of vl-convert: {error}") from None
+    # In a process of its own: once a version, and also in a forked process.
+    call = "import sys, vl_convert; sys.stdout.write(vl_convert.javascript_bundle(sys.argv[1]))"
+    command = [sys.executable, "-c", call, "window.vegaEmbed = vegaEmbed;"]
+    done = subprocess.run(command, capture_output=True)
+    if done.returncode:
+        raise OutputError(f"the scripts of vl-convert: {done.stderr.decode()[-300:]}")
+    text = done.stdout.decode()
     # Nothing in it may end the element of the page that holds it.
     text = text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
     try:
@@ -266,6 +295,23 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
         spec["scales"] += own["scales"]
         spec["legends"] += own["legends"]
     return spec
+
+
+def printable(chart: Chart) -> Chart:
+    """Return the chart with every character replaced that no drawing may hold.
+
+    vl-convert ends the whole process at them.
+    """
+
+    def words(text: str) -> str:
+        return UNPRINTABLE.sub("\ufffd", text)
+
+    return replace(
+        chart, title=words(chart.title), x_label=words(chart.x_label), alt=words(chart.alt),
+        y_label=words(chart.y_label), scale=words(chart.scale),
+        x_names=tuple(words(name) for name in chart.x_names),
+        series=[replace(s, name=words(s.name)) for s in chart.series],
+    )  # fmt: skip
 
 
 def colour(s: Series) -> str:
