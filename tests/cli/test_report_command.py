@@ -117,8 +117,8 @@ def test_two_side_by_side(folder: Path, tmp_path: Path, monkeypatch: pytest.Monk
     text = (tmp_path / "one-beside-two.html").read_text()
     assert "one: Good. two: Good." in text and text.count("data:image/png") == 2
     # Told apart by colour and dashes.
-    assert 'class="line c0 d0"' in text and 'class="line c1 d1"' in text
-    assert '"name":"measured, one"' in text and '"name":"measured, two"' in text
+    assert 'class="chart"' in text and "#d55e00" in text
+    assert '"measured, one"' in text and '"measured, two"' in text
     assert '<tr><td>one</td><td class="text">22</td><td>0.9997</td>' in text
     assert '<td>two</td><td class="text">22</td><td>0.5</td>' in text
     assert '<td>two</td><td class="text">59</td><td>1</td>' in text

@@ -181,6 +181,16 @@ def test_the_figure_of_the_page() -> None:
     assert names[0] and not names[0] & names[1]
 
 
+@pytest.mark.parametrize("bad", ["\x00", "\x1b", "\x01", "\ud800", "\uffff"])
+def test_characters_that_no_drawing_may_hold(tmp_path: Path, bad: str) -> None:
+    """They would end the process."""
+    words = f"a{bad}b"
+    series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
+    chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
+    assert "a\ufffdb" in figure(view(chart))
+    assert save(tmp_path / "c.png", Charts(words, [chart, chart], words)).stat().st_size > 1000
+
+
 def test_a_dark_screen_has_a_colour_for_each() -> None:
     style = dark_style()
     for light in (*PALETTE, *RISING):

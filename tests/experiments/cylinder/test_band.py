@@ -12,6 +12,7 @@ from bubblefit.experiments.cylinder import report as figures
 from bubblefit.experiments.cylinder import report as page
 from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.experiments.kinds import Output
+from bubblefit.reports.cylinders import bending_charts
 
 from ...cylinder_cases import ENDS
 from ...drawings import caught
@@ -87,11 +88,12 @@ def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     assert soft.other is not None and hard.other is None
     np.testing.assert_array_equal(soft.other, [WAY, 1.5 * LOAD])
     assert "figures/150-90-load.png" not in shown  # a chart on the page
+    monkeypatch.setattr(figures, "bending_charts", bending_charts)
     (charts,) = figures.load_charts(outcome)
     assert charts.caption == "Load over deflection; line: slack, dashed: rigid wall"
     (chart,) = charts.charts
     curves = {s.name: s for s in chart.series if s.look == "line"}
-    assert list(curves) == ["soft", "soft, other end", "hard"]
+    assert list(curves) == ["mean", "soft", "soft, other end", "hard"]
     assert curves["soft, other end"].y == pytest.approx(1.5 * LOAD)
     assert curves["soft, other end"].dashes == 1 and curves["soft"].y == pytest.approx(LOAD)
     assert beams == [("150-90-beam.png", "150/90, soft, 80 mm")]

@@ -72,7 +72,7 @@ def test_the_dashed_outline_is_the_inflated_tube_from_the_side(beam: Drawn) -> N
         assert same(outline.T, expected)
         # Once there along the top, down, and back along the bottom: no way is crossed.
         np.testing.assert_array_equal(outline[:, 0], outline[:, -1])
-        assert length(outline) == pytest.approx(around)
+        assert length(outline) == pytest.approx(around, rel=1e-4)
 
 
 def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(beam: Drawn) -> None:
@@ -83,7 +83,7 @@ def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(beam: Drawn) ->
         np.testing.assert_array_equal(ring[:, 0], ring[:, -1])
         # In turn around the ring: twice the length of the half that was meshed.
         half = in_turn(model, moved, "mid_span", along=1)[:, :2].T
-        assert length(ring) == pytest.approx(2 * length(half))
+        assert length(ring) == pytest.approx(2 * length(half), rel=1e-4)
     assert now[1].max() < before[1].max() - 200.0  # went down with the collar
 
 
