@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -64,12 +65,12 @@ THREE = 3
 LETTER, SAMPLE = 6.2, 34
 #: Dots of a chart of nothing else: up to so many are drawn large.
 FEW = 60
+#: Characters that XML, and so SVG, cannot hold.
+UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 #: Whether the first digit of a tick of a logarithmic axis is 1, 2 or 5.
 ROUND = (
     "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
 )
-#: Characters that XML forbids.
-UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 #: Pixels of a file for each of Vega's.
 DOTS = 2.0
 CONFIG: Spec = {
@@ -104,7 +105,7 @@ def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
     if suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
-    return _converted(picture(charts), suffix[1:])
+    return _drawn(suffix[1:], picture(charts))
 
 
 class _Converter:
@@ -150,13 +151,14 @@ for line in sys.stdin:
 _convert = _Converter()
 
 
-def _converted(spec: Spec, kind: str) -> bytes:
+def _drawn(kind: str, spec: Spec) -> bytes:
     """Return a drawing as bytes; kind : "png", "svg" or "pdf"."""
     return _convert(f"vega_to_{kind}", spec, {"scale": DOTS} if kind == "png" else {})
 
 
 def picture(charts: Charts) -> Spec:
     """Return Vega's specification of all charts beside each other, with one legend if it can."""
+    charts = replace(charts, charts=[printable(chart) for chart in charts.charts])
     columns = charts.columns or min(THREE, len(charts.charts))
     width = NARROW if columns >= THREE else WIDE
     looks = looks_of(charts.charts) if len(charts.charts) > 1 else None
@@ -176,11 +178,12 @@ def picture(charts: Charts) -> Spec:
     }
     if looks:
         spec |= _legend(list(looks.values()), (width + 60) * min(columns, len(charts.charts)))
-    return _printable(spec)
+    return spec
 
 
 def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
     """Return Vega's specification of one chart of the page; dot : area of its dots."""
+    chart = printable(chart)
     group = panel(chart, width, dot=dot)
     for mark in group["marks"]:
         mark["clip"] = True
@@ -203,24 +206,12 @@ def view(chart: Chart, width: float = WIDE, dot: float | None = None) -> Spec:
         "scale": chart.scale, "series": [s.name for s in chart.series],
         "alt": chart.alt or chart.title,
     }  # fmt: skip
-    return _printable(_outline() | {"width": width, "height": height, "usermeta": said, **group})
-
-
-def _printable(value: Any) -> Any:
-    """Return a specification whose texts hold no characters that XML forbids.
-
-    vl-convert ends the whole process where a text has one.
-    """
-    if isinstance(value, str):
-        return UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", value)
-    if isinstance(value, dict):
-        return {_printable(key): _printable(item) for key, item in value.items()}
-    return [_printable(item) for item in value] if isinstance(value, list | tuple) else value
+    return _outline() | {"width": width, "height": height, "usermeta": said, **group}
 
 
 def figure(spec: Spec) -> Markup:
     """Return a view as SVG that stands in the page: on paper, and until the script takes over."""
-    text = _converted(spec, "svg").decode()
+    text = _drawn("svg", spec).decode()
     alt = escape(spec["usermeta"]["alt"])
     head = re.match(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', text)
     assert head is not None
@@ -258,10 +249,13 @@ def library() -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         pass
-    try:
-        text = _convert("javascript_bundle", "window.vegaEmbed = vegaEmbed;", {}).decode()
-    except ValueError as error:
-        raise OutputError(f"the scripts of vl-convert: {error}") from None
+    # In a process of its own: once a version, and also in a forked process.
+    call = "import sys, vl_convert; sys.stdout.write(vl_convert.javascript_bundle(sys.argv[1]))"
+    command = [sys.executable, "-c", call, "window.vegaEmbed = vegaEmbed;"]
+    done = subprocess.run(command, capture_output=True)
+    if done.returncode:
+        raise OutputError(f"the scripts of vl-convert: {done.stderr.decode()[-300:]}")
+    text = done.stdout.decode()
     # Nothing in it may end the element of the page that holds it.
     text = text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
     try:
@@ -321,6 +315,23 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
         spec["scales"] += own["scales"]
         spec["legends"] += own["legends"]
     return spec
+
+
+def printable(chart: Chart) -> Chart:
+    """Return the chart with every character replaced that no drawing may hold.
+
+    vl-convert ends the whole process at them.
+    """
+
+    def words(text: str) -> str:
+        return UNPRINTABLE.sub("\ufffd", text)
+
+    return replace(
+        chart, title=words(chart.title), x_label=words(chart.x_label), alt=words(chart.alt),
+        y_label=words(chart.y_label), scale=words(chart.scale),
+        x_names=tuple(words(name) for name in chart.x_names),
+        series=[replace(s, name=words(s.name)) for s in chart.series],
+    )  # fmt: skip
 
 
 def colour(s: Series) -> str:
