@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
+from ..inference.methods import method_names
 from .arguments import (
     AS_JSON,
     DATA,
@@ -55,7 +56,9 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--earlier", type=PATH, metavar="DIR", help="That fit's output folder."),
         JOBS,
         SCHEDULER,
-        click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
+        click.option(
+            "--method", metavar="NAME", help="Optimiser: " + ", ".join(method_names()) + "."
+        ),
         solver_choice,
         click.option(
             "--fail-above",

@@ -39,11 +39,10 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "tests": ("Kinds of test", ("experiments.base", "experiments.fittable", "experiments.predicted",
                                 "experiments.exhibit", "experiments.candidates",
                                 "identification.comparison:Comparison,Objective")),
-    "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base",
-                      "materials.forms.registry")),
+    "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base")),
     "readers": ("Readers of data", ("data.registry",)),
     "solvers": ("Solvers", ("solvers.base", "solvers.registry")),
-    "methods": ("Optimisers", ("identification.methods.base", "identification.methods.registry")),
+    "methods": ("Optimisers", ("inference.methods",)),
 }  # fmt: skip
 HEAD = "<!-- Written by docs/make_api.py from the docstrings. -->\n"
 #: "name : words" at the start of a line, and after the end of another entry.

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..experiments.kinds import by_strain
 from ..files import __version__
+from ..inference.descent import descend
 from ..inference.linear import moduli_of, summary
-from ..inference.methods.descent import descend
 from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
 from ..inference.resampling import Group, Unit, drawn, factors_of, rows_of

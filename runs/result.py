@@ -26,8 +26,7 @@ from ..experiments.kinds import (
 from ..experiments.registry import report_of
 from ..files import __version__
 from ..inference.assessment import Verdict, notes_of_verdicts, pinned_by, verdicts
-from ..inference.misfit import NoiseTest, noise_tests, notes_of_noise
-from ..inference.noise import Misfit, misfits
+from ..inference.noise import Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import Posterior
 from ..inference.problem import FitProblem
 from ..materials.card import MaterialCard

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.materials.forms.base import Form, pieces_of
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import Form, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -1,4 +1,8 @@
-"""Linear constants per width, for programs that designers of membrane structures type them into."""
+"""Export linear constants per width, for programs that designers of membranes type them into.
+
+Oasys GSA takes stiffnesses per width (its reference on theory, "Fabric Material"); Dlubal RFEM
+force over area and a thickness: the stiffness per width over that thickness (Dlubal, FAQ 004396).
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,7 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "n
 
 @dataclass(frozen=True)
 class ConstantsOptions:
-    """Over which loads the law is made linear, and how."""
+    """The loads over which the law is made linear, and how."""
 
     lowest: float = field(
         default=0.0, metadata=option("kN/m, where the paths of each load ratio begin [0].", least=0)
@@ -76,7 +80,7 @@ class Linear:
 
     @property
     def says(self) -> Says:
-        """What constants carry and lose."""
+        """Return what constants carry and lose."""
         found = self.found
         least, largest = found.shear
         unknown: tuple[str, ...] = ()
@@ -108,12 +112,10 @@ class Linear:
 
 
 def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
-    """The constants of a card.
+    """Return the constants of a card.
 
-    Raises
-    ------
-    InputError : no end of the loads is said or known, a law that does not carry them, or constants
-        that no program takes (nu_warp nu_fill of 1 or more).
+    Raises InputError without a known end of the loads, for a law that does not carry them, or for
+    nu_warp nu_fill of 1 or more.
     """
     law, thickness = card.law, card.thickness
     highest = options.highest
@@ -136,17 +138,12 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
 
 
 def evaluations(linear: Linear) -> list[Evaluation]:
-    """That was asked for, then the others."""
+    """Return the requested evaluation, then the others."""
     return [linear.found.evaluation, *linear.found.others]
 
 
 def _end_of_range(card: MaterialCard) -> float:
-    """kN/m, the largest load that every ratio carries within the card's strains.
-
-    Raises
-    ------
-    InputError : the card has no range along warp or fill.
-    """
+    """Return the largest load (kN/m) that every ratio carries within the card's strains."""
     ends = card.law.strain_range[:2]
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
@@ -178,7 +175,7 @@ def _with(says: Says, *confirm: str) -> Says:
 
 
 def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """The four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
+    """Write the four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
     linear = linear_card(card, options)
     c = linear.found.constants
     rows = [
@@ -191,7 +188,7 @@ def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """An orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
+    """Write an orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
     linear = linear_card(card, options)
     c, t = linear.found.constants, card.thickness
     assert c.shear is not None
@@ -207,12 +204,6 @@ def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
     return _sheet(card, "Orthotropic membrane of Dlubal RFEM", says, rows)
 
 
-FORMATS = (
-    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
-    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
-)
-
-
 COLUMNS = (
     "chosen", "minimise", "reciprocal", "unloaded_yarns", "ratios", "paths", "E_warp_kN_per_m",
     "E_fill_kN_per_m", "nu_warp", "nu_fill", "A_warp_kN_per_m", "A_fill_kN_per_m",
@@ -221,7 +212,7 @@ COLUMNS = (
 
 
 def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """Inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
+    """Write inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
     linear = linear_card(card, options)
     rows = []
     for number, one in enumerate(evaluations(linear)):
@@ -242,10 +233,14 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def _text(value: Any) -> str:
-    """As the table has it: yes or no, nine digits, words."""
+    """Format a value: yes or no, nine digits, words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
-FORMAT = Format("constants", constants, ConstantsOptions, load_ratios=True)
+FORMATS = (
+    Format("constants", constants, ConstantsOptions, load_ratios=True),
+    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
+    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
+)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.kinds import Reach
 from bubblefit.inference.unknowns import Unknowns, allowed, draw
-from bubblefit.materials.forms.registry import form_names
+from bubblefit.materials.forms.base import form_names
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, read_project
 from bubblefit.runs.setup import bounds_of, law_of

@@ -7,14 +7,21 @@ import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import Certainty, _on_bounds, certainty, moduli_error, pinned_by
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
-from bubblefit.inference.discretisation import Limit
-from bubblefit.inference.linear import Asked, information, summary
-from bubblefit.inference.methods.descent import descend
-from bubblefit.inference.misfit import CHANCE, NoiseTest, noise_tests, notes_of_noise
-from bubblefit.inference.noise import Misfit, Noise, alike, alike_in
+from bubblefit.inference.descent import descend
+from bubblefit.inference.linear import Asked, Limit, information, summary
+from bubblefit.inference.noise import (
+    CHANCE,
+    Misfit,
+    Noise,
+    NoiseTest,
+    alike,
+    alike_in,
+    noise_tests,
+    notes_of_noise,
+)
 from bubblefit.inference.problem import Evaluation, FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.notes import NoteKind

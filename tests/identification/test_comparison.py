@@ -11,8 +11,7 @@ from bubblefit.experiments.strips.objective import LoadObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.misfit import alike_in_all, notes_of_discrepancies
-from bubblefit.inference.noise import Noise
+from bubblefit.inference.noise import Noise, alike_in_all, notes_of_discrepancies
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.resampling import folds_of
 from bubblefit.inference.unknowns import Unknowns

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from bubblefit.inference import posterior as truncated
 from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
-from bubblefit.inference.discretisation import Limit
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
+from bubblefit.inference.linear import Limit, posteriors_of
 from bubblefit.inference.linear import Linear as LinearFit
-from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.misfit import (
+from bubblefit.inference.noise import (
     Discrepancy,
+    Noise,
     discrepancy,
     notes_of_discrepancies,
     smooth_shapes,
 )
-from bubblefit.inference.noise import Noise
 from bubblefit.inference.posterior import Posterior, bands_of, truncated_draws
 from bubblefit.inference.problem import Evaluation, WeightedProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns

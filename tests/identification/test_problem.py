@@ -12,7 +12,7 @@ from bubblefit.inference import search as room
 from bubblefit.inference.search import feasible_start
 from bubblefit.inference.unknowns import LawBounds, Unknowns, _between, allowed, draw
 from bubblefit.materials.forms import polynomial as forms
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

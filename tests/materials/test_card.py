@@ -22,9 +22,8 @@ from bubblefit.materials.card import (
     write_card,
 )
 from bubblefit.materials.exports.base import BAND_COLUMNS
-from bubblefit.materials.forms.base import UNLIMITED
+from bubblefit.materials.forms.base import UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC
-from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.exports import FORMATS

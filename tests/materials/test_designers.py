@@ -21,7 +21,7 @@ from bubblefit.materials.designers import (
     line_of,
     shares,
 )
-from bubblefit.materials.exports.radioss import yarn_of
+from bubblefit.materials.exports.curves import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response, trellis_curve, uniaxial_curve
 from bubblefit.solvers.exports import FORMATS

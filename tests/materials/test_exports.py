@@ -13,8 +13,15 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import trellis_angle, trellis_curve, uniaxial_curve
-from bubblefit.materials.tables import JUMP, REACH, modulus_table, modulus_tables
+from bubblefit.materials.responses import (
+    JUMP,
+    REACH,
+    modulus_table,
+    modulus_tables,
+    trellis_angle,
+    trellis_curve,
+    uniaxial_curve,
+)
 from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
 from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.inference.assessment import certainty, pinned_by
-from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.descent import descend
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from bubblefit.inference.assessment import moduli_error
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.search import feasible_start, fit_from
 

@@ -10,6 +10,9 @@ from bubblefit.materials.forms.base import (
     ORDER,
     UNLIMITED,
     Form,
+    form_named,
+    form_names,
+    form_settings,
     map_in_range,
     moduli_on_grid,
     modulus_rows,
@@ -19,7 +22,6 @@ from bubblefit.materials.forms.base import (
 )
 from bubblefit.materials.forms.polynomial import CUBIC, DEGREES, LINEAR
 from bubblefit.materials.forms.ratio import LoadRatio
-from bubblefit.materials.forms.registry import form_named, form_names, form_settings
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus

@@ -1,4 +1,4 @@
-"""One descent of Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
+"""Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
 
 Damping is scaled by diag(J'J) (Marquardt), modulus values at control strains are the unknowns,
 positivity and bounds the constraints, so every iterate is feasible; and every iterate is a stable
@@ -12,9 +12,9 @@ import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
-from ..problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
+from ..materials.forms.base import Array
+from .problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FIRST_DAMPING = 1e-2
@@ -37,17 +37,10 @@ def descend(
 ) -> tuple[Evaluation, str]:
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
 
-    Parameters
-    ----------
-    point : evaluated with its Jacobian.
-    norms : minimise e itself, the sum of the blocks' norms, not that of their squares.
-    only : (unknowns,) which may change; all unless given.
-    damping : to begin with. negligible : predicted relative decrease of the sum of squares that is
-        not worth an analysis.
-
-    Returns
-    -------
-    The last (best) point, and how it ended: CONVERGED, LEVEL or ANALYSES_USED_UP.
+    point : with its Jacobian. norms : minimise e itself, the sum of the blocks' norms, instead of
+    their squares. only : (unknowns,) which may change. damping : of the first step. negligible :
+    predicted relative decrease of the sum of squares that is not worth an analysis. Returns the
+    best point, and CONVERGED, LEVEL or ANALYSES_USED_UP.
     """
     end = CONVERGED if norms else LEVEL
     growth, idle = 2.0, 0
@@ -103,10 +96,10 @@ def descend(
 
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
-    """An inequality that keeps the next step half as far from the largest drop in shear.
+    """Return an inequality that keeps the next step half as far from the largest drop in shear.
 
-    A membrane loses its stability in shear: so a refused step says where that modulus was too low,
-    and the fit can slide along that border instead of stopping at it. None when it did not drop.
+    A membrane loses its stability in shear: a refused step shows where that modulus was too low,
+    and the fit can slide along that border. None when it did not drop.
     """
     rows = problem.unknowns.stability_rows
     before, after = rows @ stable, rows @ unstable
@@ -123,7 +116,7 @@ def _jacobian(point: Evaluation) -> Array:
 
 
 def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:
-    """Square roots of the weights of the squared residuals, (m,).
+    """Return (m,) square roots of the weights of the squared residuals.
 
     1/norm of each block majorises e: its weighted sum of squares decreases only if e does.
     """
