@@ -1,7 +1,5 @@
 """Assess a fit: moduli against a known solution, uncertainty, and what lies on a bound."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

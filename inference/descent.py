@@ -6,8 +6,6 @@ equilibrium (Eq. 4.9's "analysis ends well"): a soft membrane can fold, and what
 pressure can show must not lead the fit astray.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import quadprog
 from numpy.typing import NDArray

@@ -7,8 +7,6 @@ level just where the fit's own posterior does. Beyond that it shows curvature: e
 unevenly about the best, or that do not exist.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ have no slope; COBYLA can return an infeasible point as a success. So NLopt neve
 infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import nlopt

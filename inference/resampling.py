@@ -5,8 +5,6 @@ of the objective that is of one unit counts as often as that was drawn; in a blo
 units share, the mean of the squares is over what was drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Fit from one start, by any method, for any solver."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

@@ -6,8 +6,6 @@ products add up to the covariance of the free coefficients; kept like that it is
 file without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Mapping, Sequence

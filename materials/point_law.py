@@ -9,8 +9,6 @@ The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 i
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
 """
 
-from __future__ import annotations
-
 import math
 
 from ..caching import compiled
@@ -389,15 +387,9 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
 
 @compiled()
 def stress_update(
-    pieces: Array,
-    coupling: Array,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    s_new: Array,
-    tangent: Array,
-    slopes: Array,
-) -> bool:
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array, s_new: Array,
+    tangent: Array, slopes: Array,
+) -> bool:  # fmt: skip
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
     pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
@@ -460,19 +452,9 @@ def stress_update(
 
 @compiled()
 def referred_stress(
-    m: float,
-    q: float,
-    c: float,
-    ratio: float,
-    growth: tuple[float, float, float],
-    s: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    pull: Array,
-    work: Array,
-) -> None:
+    m: float, q: float, c: float, ratio: float, growth: tuple[float, float, float], s: Array,
+    pk2: Array, stiffness: Array, p: Array, law_tangent: Array, pull: Array, work: Array,
+) -> None:  # fmt: skip
     """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s, law_tangent = ds/dh.
 
     ratio: the stress resultant over s t0; growth (3,): the derivative of its logarithm by h. The
@@ -502,24 +484,10 @@ def referred_stress(
 
 @compiled()
 def membrane_stress(
-    m: float,
-    q: float,
-    c: float,
-    pieces: Array,
-    coupling: Array,
-    area_power: float,
-    h_old: Array,
-    s_old: Array,
-    h: Array,
-    s_new: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    slopes: Array,
-    pull: Array,
-    work: Array,
-) -> bool:
+    m: float, q: float, c: float, pieces: Array, coupling: Array, area_power: float, h_old: Array,
+    s_old: Array, h: Array, s_new: Array, pk2: Array, stiffness: Array, p: Array,
+    law_tangent: Array, slopes: Array, pull: Array, work: Array,
+) -> bool:  # fmt: skip
     """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy-Green components.
 
     `area_power` is 1 for constant thickness and 0 for incompressible thickness (the resultant is

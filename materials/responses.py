@@ -9,8 +9,6 @@ shear, at loads per width before the test, as a cruciform's machine counts them:
 J2 = lambda1 lambda2 the area ratio, p the law's `area_power`, one increment of the law a load.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -13,8 +13,6 @@ to the wrinkle strain, so that wrinkled and slack parts keep a tangent. The sear
 iteration on size and angle of the wrinkle strain.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quadrilateral surface meshes as plain data: interpolation, strain, enclosed volume."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """The uniaxial strip tests (thesis chapter 3.3) and the biaxial patch as plain data."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

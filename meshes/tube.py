@@ -6,8 +6,6 @@ of the axis. Angles go from the bottom (y < 0), where the seam lies on the suppo
 vertical one through the axis, and z = 0, mid-span.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -49,7 +49,7 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
     put(
         house / "materials/forms/saturating.py",
         "saturating.py",
-        "from bubblefit.materials.forms.registry import register_form\n\nregister_form(SATURATING)",
+        "from bubblefit.materials.forms.base import register_form\n\nregister_form(SATURATING)",
     )
     put(
         house / "readers/formats/riglog.py",

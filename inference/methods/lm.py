@@ -4,8 +4,6 @@ The sum of squared blocks is minimised while e is far from its least; once that 
 residual that is not zero, the blocks are weighted so that e itself (a sum of norms) is minimised.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...materials.forms.base import Array

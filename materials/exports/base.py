@@ -1,7 +1,5 @@
 """Describe formats of exports and their options, head their text, and write CSV tables."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -108,8 +106,11 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
 
 def title_of(card: MaterialCard, most: int) -> str:
     """Return the card's name as a title of at most so many letters of ASCII, on one line."""
-    words = " ".join(card.name.encode("ascii", "replace").decode().split())
-    return one_line(words)[:most] or "fabric"
+    return one_line(_ascii(card.name))[:most] or "fabric"
+
+
+def _ascii(text: str) -> str:
+    return " ".join(text.encode("ascii", "replace").decode().split())
 
 
 def band_lines(card: MaterialCard) -> list[str]:
@@ -134,8 +135,7 @@ def band_table(card: MaterialCard) -> str:
     """Return every modulus over the card's strains, with the ends of its band, as CSV."""
     sure, law = card.certainty, card.law
     assert sure is not None
-    words = " ".join(f"{sure.words}".split()).encode("ascii", "replace").decode()
-    rows = [f"# {100 * LEVEL:g} % band of the moduli: {words}", BAND_COLUMNS]
+    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
     for name, strain in strains_of(law).items():
         values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
         for row in zip(*values, strict=True):
@@ -176,9 +176,9 @@ class Option:
     choices: tuple[str, ...] = ()
 
 
-def option(text: str, kind: type = float, **limits: Any) -> dict[str, Option]:
-    """Return metadata of a field of a format's options; as Option."""
-    return {"option": Option(text, kind, **limits)}
+def option(default: Any, text: str, kind: type = float, **limits: Any) -> Any:
+    """Return a field of a format's options with a default; the rest as `Option`."""
+    return field(default=default, metadata={"option": Option(text, kind, **limits)})
 
 
 @dataclass(frozen=True)
@@ -190,14 +190,12 @@ class NoOptions:
 class TableOptions:
     """The options of every format with tables or curves."""
 
-    points: int = field(
-        default=POINTS, metadata=option(f"Points of a table or curve [{POINTS}].", int, least=2)
-    )
-    reach: float = field(
-        default=REACH,
-        metadata=option(
-            f"Log strain where a table ends if the card has no range [{REACH}].", above=0, most=10
-        ),
+    points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
+    reach: float = option(
+        REACH,
+        f"Log strain where a table ends if the card has no range [{REACH}].",
+        above=0,
+        most=10,
     )
 
 
@@ -205,9 +203,7 @@ class TableOptions:
 class CurveOptions(TableOptions):
     """The options of the fabric materials of explicit programs."""
 
-    density: float | None = field(
-        default=None, metadata=option("t/mm3, where the target needs one.", above=0)
-    )
+    density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
 
 
 @dataclass(frozen=True)

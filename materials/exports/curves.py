@@ -7,8 +7,6 @@ by which a yarn is 16 % softer at 5 % of strain than its modulus says; they are 
 not to count.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -163,9 +161,8 @@ NAMES = {
 class Mat34Options(CurveOptions):
     """The options of curves, and their measure: public sources disagree."""
 
-    measure: Measure = field(
-        default=MEASURE,
-        metadata=option(f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES),
+    measure: Measure = option(  # noqa: RUF009
+        MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
     )
 
 

@@ -4,11 +4,9 @@ Oasys GSA takes stiffnesses per width (its reference on theory, "Fabric Material
 force over area and a thickness: the stiffness per width over that thickness (Dlubal, FAQ 004396).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from ...errors import InputError
@@ -38,33 +36,22 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "n
 class ConstantsOptions:
     """The loads over which the law is made linear, and how."""
 
-    lowest: float = field(
-        default=0.0, metadata=option("kN/m, where the paths of each load ratio begin [0].", least=0)
-    )
-    highest: float | None = field(
-        default=None,
-        metadata=option(
-            "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
-            above=0,
-        ),
-    )
-    shear: float | None = field(
-        default=None,
-        metadata=option(
-            "Shear strain up to which G is averaged [the end of the card's range].", above=0, most=1
-        ),
-    )
-    paths: Literal["8", "10"] = field(
-        default="8",
-        metadata=option(
-            "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].",
-            str,
-            choices=("8", "10"),
-        ),
-    )
-    minimise: Literal["strain", "load"] = field(
-        default="strain",
-        metadata=option("Whose squares are least [strain].", str, choices=("strain", "load")),
+    lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", least=0)
+    highest: float | None = option(
+        None,
+        "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
+        above=0,
+    )  # fmt: skip
+    shear: float | None = option(
+        None, "Shear strain up to which G is averaged [the end of the card's range].",
+        above=0, most=1,
+    )  # fmt: skip
+    paths: Literal["8", "10"] = option(
+        "8", "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].", str,
+        choices=("8", "10"),
+    )  # fmt: skip
+    minimise: Literal["strain", "load"] = option(
+        "strain", "Whose squares are least [strain].", str, choices=("strain", "load")
     )
 
 

@@ -1,7 +1,5 @@
 """Export the law as user subroutines (Marc HYPELA2, Abaqus UMAT), and as Marc's NLELAST tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -119,7 +117,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
     largest = max(table.error for table in tables.values())
     loses = [
         f"moduli are straight lines between {options.points} points (more where a modulus has "
-        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most",
+        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most"
     ]
     if any(len(table.jumps) for table in tables.values()):
         loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")

@@ -11,8 +11,6 @@ on its size). A piece holds for strains up to its upper end, which belongs to it
 range, and below zero strain, a modulus is held.
 """
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -164,11 +162,7 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
 
 
 def modulus_rows(
-    form: Form,
-    name: str,
-    strain: ArrayLike,
-    strain_range: Sequence[float],
-    ratio: float = EVEN,
+    form: Form, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
 ) -> Array:
     """Return (n, size), d modulus / d beta at strains (n,), held ones included.
 

@@ -1,8 +1,6 @@
 """Moduli that are one polynomial each, of degree 0 to 3 (Eqs 3.1-3.3)."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,12 +72,6 @@ class Polynomial:
 CONSTANT, LINEAR, QUADRATIC, CUBIC = (Polynomial(degree) for degree in range(4))
 
 
-def polynomial_named(
-    name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
-) -> Polynomial:
-    """Return the polynomial of that name; it takes no settings."""
-    return Polynomial(DEGREES.index(name))
-
-
-for _name in DEGREES:
-    register_form(Offer(_name, polynomial_named, of_strain=_name != DEGREES[0]))
+for _degree, _form_name in enumerate(DEGREES):
+    _made = Polynomial(_degree)
+    register_form(Offer(_form_name, lambda *_, form=_made: form, of_strain=_degree > 0))

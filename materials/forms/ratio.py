@@ -11,9 +11,7 @@ at every ratio. Here they are tangent moduli: on a path on which the stresses gr
 they are also the secant ones.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,10 +74,4 @@ class LoadRatio:
         )
 
 
-def load_ratio_named(
-    name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
-) -> LoadRatio:
-    return LoadRatio()
-
-
-register_form(Offer("load-ratio", load_ratio_named, of_strain=False, of_load_ratio=True))
+register_form(Offer("load-ratio", lambda *_: LoadRatio(), of_strain=False, of_load_ratio=True))

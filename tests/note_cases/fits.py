@@ -36,7 +36,7 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..identification import cases
+from ..inference import cases
 from ..projects import constant_strips, small
 
 

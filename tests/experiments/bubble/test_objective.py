@@ -13,7 +13,7 @@ from bubblefit.inference.comparison import Blocks
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...identification.cases import MODEL, reference, targets
+from ...inference.cases import MODEL, reference, targets
 
 
 def direct_e(model: np.ndarray, data: list[FieldTarget]) -> float:

@@ -9,7 +9,7 @@ from bubblefit.inference.descent import descend
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 
-from ...identification.scatter import follows, scatter_of
+from ...inference.scatter import follows, scatter_of
 from .problems import CONSTANT, CONSTANTS, CUBIC, LAW, STRIPS, joint, near, strips
 
 

@@ -10,7 +10,7 @@ from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.search import feasible_start, fit_from
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, found_beta, gauge_strains, joint, led, near, strips
 
 

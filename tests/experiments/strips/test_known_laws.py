@@ -10,7 +10,7 @@ from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import (
     BUBBLE,
     CUBIC,

@@ -6,7 +6,7 @@ import pytest
 from bubblefit.inference.methods import FitOptions, method_named
 from bubblefit.inference.search import approach, feasible_start, fit_from
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, joint, led, near
 
 

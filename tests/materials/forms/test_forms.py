@@ -385,7 +385,7 @@ ENDS = (0.1, 0.2, 0.5)
 WORKING = """
 from dataclasses import dataclass, replace
 from bubblefit.materials.forms.polynomial import LINEAR
-from bubblefit.materials.forms.registry import Offer
+from bubblefit.materials.forms.base import Offer
 
 def make(name, settings, strain_range):
     {body}
