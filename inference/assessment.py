@@ -32,13 +32,11 @@ ON_BOUND = 1e-6
 
 def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
     """Return the largest relative error of each modulus up to the strains reached (3,)."""
-    errors = {}
-    for name, component in COMPONENTS.items():
-        strain = np.linspace(0.0, reached[component], POINTS)
-        errors[name] = float(
-            np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
-        )
-    return errors
+    strains = {name: np.linspace(0.0, reached[k], POINTS) for name, k in COMPONENTS.items()}
+    return {
+        name: float(np.max(np.abs(law.modulus(name, x) / known.modulus(name, x) - 1.0)))
+        for name, x in strains.items()
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,26 +134,17 @@ def certainty(
     left = best.residual if limit is None else limit.residual
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
     wrong |= differences_of_all(problem, left, best.jacobian)
-    told = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
+    notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)
         there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
         mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
+    bands = bands_of(fine or posterior, law, strains)
     return Certainty(
-        noise.level,
-        strains,
-        sigmas,
-        told,
-        mesh,
-        noise.alike,
-        posterior,
-        fine,
-        noise.rows,
-        bands_of(fine or posterior, law, strains),
-        discrepancy=wrong,
-        second=second,
-    )
+        noise.level, strains, sigmas, notes, mesh, noise.alike, posterior, fine, noise.rows, bands,
+        discrepancy=wrong, second=second,
+    )  # fmt: skip
 
 
 def pinned_by(
@@ -269,10 +258,8 @@ class Verdict:
 
     @property
     def _together(self) -> str:
-        name = max(self.correlation, key=lambda name: abs(self.correlation[name]))
-        if abs(self.correlation[name]) < CORRELATED:
-            return ""
-        return f", correlation {self.correlation[name]:.2f} with {name}"
+        name, value = max(self.correlation.items(), key=lambda item: abs(item[1]))
+        return "" if abs(value) < CORRELATED else f", correlation {value:.2f} with {name}"
 
     @property
     def numbers(self) -> dict[str, Any]:

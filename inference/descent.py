@@ -46,8 +46,9 @@ def descend(
     while True:
         if point.value < tolerance:
             return point, CONVERGED
+        assert point.jacobian is not None
         root = _block_weights(problem, point, norms)
-        r, j = point.residual * root, _jacobian(point) * root[:, None]
+        r, j = point.residual * root, point.jacobian * root[:, None]
         if only is not None:
             j[:, ~only] = 0.0
         merit = float(r @ r)
@@ -106,11 +107,6 @@ def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, fl
     if drop[k] < SMALLEST_DROP:
         return None
     return rows[k], float(0.5 * (before[k] + after[k]))
-
-
-def _jacobian(point: Evaluation) -> Array:
-    assert point.jacobian is not None
-    return point.jacobian
 
 
 def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:

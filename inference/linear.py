@@ -184,15 +184,6 @@ def along(
     return strains, sigmas
 
 
-# What a fit's objective has of second order beside the squares of its slopes.
-#
-# Where much is left of the residual, two things are no longer small. The slopes change from place
-# to place, and each counts by what is left there: that comes from differences of the exact slopes,
-# each over half of a standard deviation, along the directions that the data determine worst (the
-# others have curvature enough). And the norm of a block is not curved along the block's own
-# residual: a fit of the sum of norms follows noise otherwise than one of squares with fixed
-# weights. That costs nothing. Near a residual of noise alone both are nothing.
-
 #: Times the noise of the data that is left of a comparison, from which on it is looked at.
 LARGE = 2.0
 #: Directions that are looked at, an analysis each.
@@ -262,8 +253,10 @@ def large(problem: FitProblem, residual: Array) -> bool:
 def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
     """Return second-order terms from differences of the slopes along the least certain directions.
 
-    A direction along which no analysis ends well, to neither side, counts as if its slopes did not
-    change.
+    Where much is left of the residual, its slopes change from place to place (by differences over
+    half of a standard deviation; directions that the data determine well have curvature enough),
+    and the norm of a block is not curved along the block's own residual. A direction along which no
+    analysis ends well, to neither side, counts as if its slopes did not change.
     """
     assert best.jacobian is not None
     before, linear = problem.analyses, Linear.of(problem, best, noise)

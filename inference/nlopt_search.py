@@ -66,12 +66,6 @@ class Record:
         """Return NLopt's variables of unknowns."""
         return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
-    def box(self) -> tuple[Array, Array]:
-        """Return bounds of the variables where the constraints are boolean."""
-        p = self.problem.unknowns
-        low, high = p.nuisance.bounds
-        return np.concatenate([np.zeros(p.size), low]), np.concatenate([np.ones(p.size), high])
-
     def at(self, x: Array, with_slope: bool) -> Look:
         """Evaluate the variables `x`, a repeated point once; NoMoreAnalyses or BelowTolerance ends
         it."""
@@ -159,7 +153,8 @@ def nlopt_minimise(
     if options.constraints == "margin":
         _constrain(optimiser, record)
     else:
-        low, high = record.box()
+        size, (low, high) = problem.unknowns.size, problem.unknowns.nuisance.bounds
+        low, high = np.concatenate([np.zeros(size), low]), np.concatenate([np.ones(size), high])
         x = np.clip(x, low, high)
         optimiser.set_lower_bounds(low)
         optimiser.set_upper_bounds(high)

@@ -179,15 +179,9 @@ class FitProblem:
             of_priors = cost[:, None] * np.eye(self.unknowns.count)[places]
             jacobian = np.concatenate([*jacobians, of_priors])
         pairs = zip(self.comparisons, histories, strict=True)
-        point = Evaluation(
-            y.copy(),
-            law.beta[list(free)],
-            whole,
-            value,
-            jacobian,
-            tuple(histories),
-            all(h.stable is not False for c, h in pairs if c.must_be_stable),
-        )
+        stable = all(h.stable is not False for c, h in pairs if c.must_be_stable)
+        coefficients = law.beta[list(free)]
+        point = Evaluation(y.copy(), coefficients, whole, value, jacobian, tuple(histories), stable)
         self.unstable += not point.stable
         self.cached += point.from_cache
         self._report(y, value, point.status)

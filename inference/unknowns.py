@@ -138,8 +138,6 @@ class Unknowns:
             most if any(c.contracts for c in several) else None,
         )
 
-    # Their places and names
-
     @property
     def free(self) -> tuple[int, ...]:
         """Return the place of each free coefficient in the law's beta."""
@@ -176,8 +174,6 @@ class Unknowns:
         """Return (count,) which unknowns make the modulus that a loss of stability depends on."""
         extra = self.count - self.size
         return np.array([*(name == SHEAR for name in self.form.modulus_of), *[False] * extra])
-
-    # From unknowns to the law and back
 
     @cached_property
     def from_values(self) -> Array:
@@ -220,8 +216,6 @@ class Unknowns:
         """Return unknowns (count,) of free coefficients (size,) MPa, nuisance at its start."""
         values = np.linalg.solve(self.to_coefficients, coefficients)
         return np.concatenate([values, self.nuisance.start])
-
-    # What is allowed
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

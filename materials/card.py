@@ -35,12 +35,6 @@ from .forms.base import (
 )
 from .law import HypoelasticLaw, ThicknessChange
 
-# How sure a card is: laws one standard deviation off, along directions independent of each other.
-#
-# The covariance of the free coefficients is the sum of the products of the directions with
-# themselves. Kept like that it is never indefinite, and the first directions are those in which
-# the moduli are least certain.
-
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
 #: Of the largest: a direction in which the moduli are so much surer is left out.

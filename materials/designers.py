@@ -102,14 +102,6 @@ class DesignersConstants:
         return np.asarray(np.asarray(loads, dtype=float) @ self.compliance.T)
 
 
-# Constants from biaxial paths by least squares, as the trade does it.
-#
-# Of every path each yarn's strain is replaced by its regression line over the larger of the two
-# loads (through the beginning of the path), likewise the loads. Constants are then those with the
-# least sum of squares, at points evenly spread along these lines, of strains (inverse form) or of
-# loads (direct form). Two yarns of five ratios are ten strain paths; the eight without the
-# unloaded yarns of 1:0 and 0:1 are the usual choice.
-
 Minimise = Literal["strain", "load"]
 
 #: Points of a line whose squares are added.

@@ -69,30 +69,24 @@ class HypoelasticLaw:
     def __post_init__(self) -> None:
         beta, form = np.array(self.beta, dtype=float), self.form
         if beta.shape != (form.size,) or not np.isfinite(beta).all():
-            raise InputError(
-                None, "beta", f"expected {form.size} finite coefficients, got shape {beta.shape}"
-            )
+            problem = f"expected {form.size} finite coefficients, got shape {beta.shape}"
+            raise InputError(None, "beta", problem)
         surplus = [i for i in range(form.size) if i not in form.free and beta[i] != 0.0]
         if surplus:
             names = ", ".join(form.labels[i] for i in surplus)
             values = ", ".join(f"{beta[i]:g}" for i in surplus)
-            raise InputError(
-                None, "beta", f"a {form.name} law has no {names}: expected 0, got {values}"
-            )
-        unlimited = [UNLIMITED] * 3
-        ends = np.array(unlimited if self.strain_range is None else self.strain_range, dtype=float)
+            problem = f"a {form.name} law has no {names}: expected 0, got {values}"
+            raise InputError(None, "beta", problem)
+        given = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
+        ends = np.array(given, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
-            raise InputError(
-                None, "strain_range", f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
-            )
+            problem = f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
+            raise InputError(None, "strain_range", problem)
         if not 0 <= self.nu12 < 1:
             raise InputError(None, "nu12", f"expected 0 <= nu12 < 1, got {self.nu12}")
         if self.thickness_change not in ("constant", "incompressible"):
-            raise InputError(
-                None,
-                "thickness_change",
-                f"expected 'constant' or 'incompressible', got {self.thickness_change!r}",
-            )
+            problem = f"expected 'constant' or 'incompressible', got {self.thickness_change!r}"
+            raise InputError(None, "thickness_change", problem)
         pieces = pieces_of(form, beta, ends.tolist())
         beta.flags.writeable = ends.flags.writeable = False
         for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):

@@ -7,23 +7,17 @@ The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 i
 (warp, fill) frame, through  m = (C11 + C22)/2,  q = (C11 - C22)/2,  c = C12.  Strain vectors are
 (eps1, eps2, gamma12) with the engineering shear; Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
+
+`pieces` (3, P, 5) is a law's three moduli as `forms.base.pieces_of` writes them. The modulus of an
+increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F its integral. So a
+bar has the exact stress in any number of increments, a modulus that jumps gives a stress that does
+not, and d(stress)/d(strain) is the modulus at the END of the increment.
 """
 
 import math
 
 from ..caching import compiled
 from .forms.base import EVEN, Array
-
-# The tangent modulus of one increment at one integration point, compiled.
-#
-# `pieces` (3, P, 5) is a law's three moduli as piecewise cubics, as `forms.base.pieces_of` writes
-# them: by component 0 (E1 of eps1), 1 (E2 of eps2) and 2 (G12 of gamma12, even in it) the upper
-# end of each piece and its four coefficients, highest power of the strain first. Below zero strain
-# and beyond the last end a modulus is held.
-#
-# The modulus of an increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F
-# its integral. So a bar has the exact stress in any number of increments, a modulus that jumps
-# gives a stress that does not, and d(stress)/d(strain) is the modulus at the END of the increment.
 
 #: An increment of strain across the end of a piece is not divided by where it is smaller.
 TINY = 1e-12

@@ -156,17 +156,6 @@ def _at(ends: Array, fine: Array) -> Array:
     return fine[STEPS - 1 :: STEPS][: len(ends)]
 
 
-# What the law answers in a biaxial test: strains of a patch at loads per width along its yarns.
-#
-# The patch is homogeneous, and warp and fill stay perpendicular: the shear is zero. A load per
-# width is a force over the width that the sheet had before the test, as a cruciform's machine
-# counts it:
-#
-#     n1 = t0 (J2)^p sigma1 / lambda1,    n2 = t0 (J2)^p sigma2 / lambda2,
-#
-# J2 = lambda1 lambda2 the area ratio, p the law's `area_power`. The law is integrated from load to
-# load, one increment each.
-
 #: Newton iterations of one load, and halvings of a step that does not come nearer.
 ROUNDS_BIAXIAL_RESPONSE, HALVINGS = 60, 40
 #: Of the largest load: what is left of an equilibrium's forces.

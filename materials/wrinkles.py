@@ -215,20 +215,6 @@ def wrinkled(
     return True
 
 
-# Tension field: a membrane that wrinkles instead of carrying compression, compiled.
-#
-# A wrinkle takes up strain across itself without stress. At a point with total strain h the fabric
-# itself is strained by h + w, the wrinkle strain w = size n n' (n its normal), or any contraction
-# where it is slack, such that the Cauchy stress s obeys
-#
-#     s >= 0 (no principal compression),  w >= 0,  s : w = 0,
-#
-# which for a linear law is the projection of the trial stress on the tensile ones in the norm of
-# the compliance (Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)).
-# The law is integrated along the strain of the fabric, h + w. What is left to the wrinkle strain
-# is a share of the stiffness at zero strain, so that wrinkled and slack parts keep a tangent.
-
-
 @compiled()
 def relaxed_update(
     pieces: Array, coupling: Array, share: float, h: Array, h_old: Array, s_old: Array,

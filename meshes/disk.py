@@ -30,18 +30,11 @@ THINNEST, THICKEST = 1 / 3, 1.0
 RING_TO_CORE = 1.2
 
 
-def quarter_disk(elements: float) -> tuple[Array, NDArray[np.intp]]:
-    """Mesh the quarter x, y >= 0 of the unit disk with about `elements` quads of good shape.
-
-    Returns points (p, 2), quads (q, 4) counter-clockwise.
-    """
-    return divided_quarter_disk(*divisions(elements))
-
-
 def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
-    """Mesh it with n divisions of the core and m layers of the ring: n^2 + 2 n m quads.
+    """Mesh the quarter x, y >= 0 of the unit disk with n^2 + 2 n m quads.
 
-    The 2 n + 1 nodes of the rim lie at equal angles.
+    n : divisions of the core. m : layers of the ring; the 2 n + 1 nodes of the rim lie at equal
+    angles. Returns points (p, 2), quads (q, 4) counter-clockwise.
     """
     core, ring = _core_and_ring(n, m)
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
@@ -139,11 +132,9 @@ def disk_mesh(
     """
     _check(radius, elements, symmetry, generator)
     if generator == "gmsh":
-        pass  # PACKED  # loads X and GL libraries
-
         points, quads = quarter_disk_by_gmsh(elements / 4)
     else:
-        points, quads = quarter_disk(elements / 4)
+        points, quads = divided_quarter_disk(*divisions(elements / 4))
     points = snapped(points, NEAR)
     if symmetry == "full":
         for axis in (0, 1):

@@ -157,13 +157,6 @@ def log_strain_of(gradient: Array) -> Array:
     return np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1)
 
 
-# The volume that a surface of quads encloses, and its derivative.
-#
-# By the divergence theorem V = 1/3 * integral of x . n over the surface. A plane of symmetry
-# through the origin adds nothing, so that a quarter needs no lids: its volume is a quarter of the
-# whole for as long as its open edges stay in their planes. One compiled loop serves meshes,
-# CalculiX' results and every iteration of the membrane solver.
-
 _G = 1 / np.sqrt(3)
 _AT = _G * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 _CORNER = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -186,19 +179,16 @@ def enclosed_volume(points: Array, quads: NDArray[np.intp]) -> float:
     return volume_and_gradient(points, quads)[0]
 
 
-def volume_gradient(points: Array, quads: NDArray[np.intp]) -> Array:
-    """Return the derivative (n, 3) mm^2 of the enclosed volume by the nodes' positions.
-
-    Times a pressure it is the force of that pressure on each node. On an open edge it is the
-    derivative for moves in the plane of that edge, and the force on the part that is meshed.
-    """
-    return volume_and_gradient(points, quads)[1]
-
-
 def volume_and_gradient(
     points: Array, quads: NDArray[np.intp], weight: Array = _EVEN, origin: Array = _ORIGIN
 ) -> tuple[float, Array]:
     """Return the volume (mm^3) and its derivative (n, 3) mm^2, exact for bilinear quads.
+
+    V = 1/3 * integral of x . n: a plane of symmetry through the origin adds nothing, so that a
+    quarter needs no lids as long as its open edges stay in their planes.
+
+    Times a pressure the latter is the force of that pressure on each node. On an open edge it is
+    for moves in the plane of that edge.
 
     weight : (3,) adding to one: V = sum_k weight_k * integral of (x_k - origin_k) n_k. A surface
     that is open in direction k at both ends has weight 0 there. origin : (3,) mm, in the planes of

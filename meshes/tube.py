@@ -294,14 +294,6 @@ def _lines(
     return {name: np.isin(np.arange(count), nodes) for name, nodes in members.items()}
 
 
-def merged(points: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge nodes at one place."""
-    _, first, inverse = np.unique(
-        np.round(points, 6), axis=0, return_index=True, return_inverse=True
-    )
-    return points[first], inverse.ravel()[quads]
-
-
 def block(surface: np.ndarray, first: int) -> np.ndarray:
     """Return quads of a grid of points (rows, columns, 3) numbered from `first`."""
     rows, columns = surface.shape[:2]
@@ -314,7 +306,9 @@ def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
     starts = np.cumsum([0] + [b.shape[0] * b.shape[1] for b in blocks])
     points = np.concatenate([b.reshape(-1, 3) for b in blocks])
     quads = np.concatenate([block(b, s) for b, s in zip(blocks, starts, strict=False)])
-    points, quads = merged(points, quads)
+    rounded = np.round(points, 6)
+    _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    points, quads = points[first], inverse.ravel()[quads]
     p = points[quads]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     inward = np.einsum("mk,mk->m", normal, p.mean(axis=1)) < 0

@@ -76,9 +76,7 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     ends = [float(end) if end < UNLIMITED else options.reach for end in law.strain_range]
     sheared = ends[2] >= SHEARED
     ends[2] = ends[2] if sheared else options.reach
-    unknown = () if sheared else (
-        "G0, GT: nothing that the card was fitted to sheared the fabric; type in others",
-    )  # fmt: skip
+    unknown = "G0, GT: nothing that the card was fitted to sheared the fabric; type in others"
     yarns = []
     for pulled in range(2):
         strain = np.linspace(0.0, ends[pulled], options.points)
@@ -94,10 +92,9 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     shear_off = float(np.sqrt(np.mean((tau - g0 * tangent) ** 2)) / tau.max())
     curves: FabricCurves = fabric_curves(card, options, "nominal")
     straight = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
-    stiffens = (
-        (f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is "
-         "written",) if straight else ()
-    )  # fmt: skip
+    stiff = (
+        f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is written"
+    )
     says = Says(
         carries=(
             f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
@@ -108,8 +105,8 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
         loses=(
             f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
             f" {curves.uncoupled}",
-            *unknown,
-            *stiffens,
+            *(() if sheared else [unknown]),
+            *([f"{stiff} is written"] if straight else ()),
             f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
             "hypoelasticity: the curves are total ones; unloading is along the same curve",
             *density_remarks(options.density),

@@ -138,11 +138,6 @@ def _end_of_range(card: MaterialCard) -> float:
     return largest_load(card.law, card.thickness, [shares(ratio) for ratio in RATIOS], ends)
 
 
-# What to type into programs whose material is a form: Oasys GSA's fabric, Dlubal RFEM's membrane.
-#
-# GSA: stiffnesses per width (its reference on theory, "Fabric Material"). RFEM takes force over
-# area and a thickness: the stiffness per width over a reference thickness (Dlubal, FAQ 004396).
-
 WHICH_NU = (
     "which of both Poisson's ratios the program means: pull a strip along the warp and compare its "
     "width"

@@ -145,7 +145,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
         ],
         nu12=card.law.nu12,
         name=_name(card),
-        real=_real,
+        real=lambda value: f"{value:20.13E}",
     )
     return Export({".dat": text}, says)
 
@@ -161,10 +161,6 @@ def _name(card: MaterialCard) -> str:
     """Return a name of at most 24 characters that Marc takes."""
     kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
     return kept.strip("_")[:24] or "fabric"
-
-
-def _real(value: float) -> str:
-    return f"{value:20.13E}"
 
 
 NLELAST = Format("marc", nlelast, TableOptions)
