@@ -32,7 +32,6 @@ from . import cases
 from .cases import CONSTANT, CUBIC, LAW, MODEL, PRESSURES, problem, reference, single, targets
 from .scatter import follows, scatter_of
 
-# --- assessment ---
 REACHED = np.array([0.08, 0.08, 0.08])
 FLAT_LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 PRESSURE = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
@@ -150,7 +149,6 @@ def test_bounds_are_touched_within_a_millionth_of_their_width():
     assert {note.kind for note in notes} == {NoteKind.BOUND}
 
 
-# --- information ---
 INFORMATION_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 UNKNOWNS = Unknowns.of(
     INFORMATION_LAW.form, 0.24, [0.1] * 3,
@@ -210,7 +208,6 @@ def test_a_direction_of_which_nothing_is_known_is_unknown():
     assert found["E2"] == pytest.approx(0.01, rel=1e-4)
 
 
-# --- correlation ---
 SIDE, STEP = 40, 2.5
 NODES = MODEL.mesh.points[:, :2]
 PLACES = STEP * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
@@ -314,7 +311,6 @@ def test_along_a_curve():
         assert np.median(found) == 1.0 and np.mean(found) < 1.15
 
 
-# --- chi square ---
 NOISE = 0.05
 
 

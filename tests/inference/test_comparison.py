@@ -26,7 +26,6 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ..complaints import complaint
 from .cases import CUBIC, LAW, RANGE, levenberg_marquardt
 
-# --- comparison ---
 TIGHT = 1e-10
 PRESSURE = Nuisance("pressure_offset", -18.0, 50.0, "kPa", "pressure_offset", 1e-3)
 SHIFTS = tuple(Nuisance(f"offset_{axis}", -20.0, 20.0, "mm") for axis in "xyz")
@@ -178,7 +177,6 @@ def test_only_a_near_guess_is_a_warm_start():
     assert plain._guess(np.zeros(1)) is None
 
 
-# --- shared ---
 NU12 = Nuisance("nu12", 0.0, 0.5, "", start=0.3, law_parameter="nu12", shared=True)
 THICKNESS = Nuisance(
     "thickness", 0.6, 1.0, "mm", "thickness", prior=0.02, weight=1e-3, start=0.8, shared=True,
@@ -297,7 +295,6 @@ def test_verdicts_of_bounds_and_of_offsets():
     assert abs(rho) <= 1 and all(abs(value) <= 1 for value in nu12.correlation.values())
 
 
-# --- specimens ---
 PLACES = np.linspace(0.1, 3.0, 30)
 #: Of a law whose modulus is a constant: the load is proportional.
 SLOPES = 100.0 * PLACES[:, None] @ np.array([[1.0, 0.0, 0.0]])
@@ -372,7 +369,6 @@ def test_too_few_to_compare():
     assert alike_in_all([np.ones(1)] * 5, [np.ones(1)] * 5, [np.ones((1, 1))] * 5, "N") is None
 
 
-# --- validation ---
 @pytest.mark.parametrize(
     ("specimens", "count"), [({"warp": [3, 3, 8]}, 2), ({"warp": [5, 5, 5, 5, 5]}, 3), ({}, 2)]
 )

@@ -64,7 +64,6 @@ from .cases import (
 )
 
 
-# --- methods ---
 def test_methods_by_name():
     fit = problem()
     start = fit.unknowns.at(LAW.beta * 1.001)
@@ -155,7 +154,6 @@ def test_an_unstable_trial_is_never_accepted(method, constraints):
     assert optimum.value == pytest.approx(again.value, rel=1e-3)
 
 
-# --- lm ---
 known = pytest.mark.parametrize("number", range(4))
 
 
@@ -242,7 +240,6 @@ def test_noise_in_e_is_about_what_was_put_in():
     assert optimum is not None and 0.9 * truth < optimum.value < truth
 
 
-# --- nlopt ---
 @pytest.mark.parametrize("number", [0, 1])
 def test_slsqp_with_exact_gradient_and_margin(number):
     fit = problem()
@@ -308,7 +305,6 @@ def test_nlopt_sees_only_finite_numbers(monkeypatch, how, algorithm, constraints
     assert fit.analyses <= limit
 
 
-# --- starts ---
 def first(starts: Any, number: int, seed: int = 1, unknowns: Any = CUBIC) -> np.ndarray:
     return next(iter(starts.candidates(unknowns, seed, number)))
 
@@ -405,7 +401,6 @@ def test_places_are_the_logarithms_of_moduli_of_any_form():
     )
 
 
-# --- second order ---
 #: mm of noise beside 0.5 mm that constants leave of the fields of cubics.
 NOISE, REFITS = 0.02, 40
 
@@ -505,7 +500,6 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
     assert budget._certainty(fit, quiet, law, np.full(3, 0.08), None).order is None
 
 
-# --- correction ---
 class Thicker:
     """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes.
 

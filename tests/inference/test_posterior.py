@@ -28,7 +28,6 @@ from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
 
 from .cases import CONSTANT, EVERYTHING, levenberg_marquardt, problem
 
-# --- posterior ---
 OFFSET = Nuisance("offset", -2.0, 2.0, "mm")
 BOUNDS = LawBounds.of_entries(
     [1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0], {"E1": 5.0, "E2": 5.0, "G12": 0.5}
@@ -168,7 +167,6 @@ def test_bands_hold_their_share_and_the_law_itself():
     assert bands_of(posterior, other, strains)["E1"][1] == pytest.approx([600.0, 600.0])
 
 
-# --- truncated ---
 COUNT = 4000
 COVARIANCE = np.array([[4.0, 1.5], [1.5, 1.0]])
 NOTHING = (np.zeros((0, 2)), np.zeros(0))
@@ -258,7 +256,6 @@ def test_oblique_bounds_that_nearly_meet(width):
     assert along.std() == pytest.approx(1.0, abs=0.05)
 
 
-# --- likelihood ---
 #: mm: so much that G12 is off its first order.
 NOISE = 0.3
 
@@ -326,7 +323,6 @@ def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
     assert start + 0.5 * sigma <= side.values[-1] <= start + 0.7 * sigma
 
 
-# --- discrepancy ---
 SIDE, BLOCKS = 32, 9
 PLACES = 4.0 * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
 SHAPES = smooth_shapes(PLACES)

@@ -33,7 +33,6 @@ from hypothesis.extra.numpy import arrays
 
 from ..complaints import complaint
 
-# --- card ---
 GOOD: dict[str, Any] = {
     "name": "Valmex 7318", "source": "a test", "unit": "GPa",
     "beta": [0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.8], "nu12": 0.24,
@@ -296,7 +295,6 @@ def test_a_card_is_in_gpa_unless_told_otherwise(tmp_path):
         assert (said["unit"], said["beta"][11]) == (unit, pytest.approx(e1))
 
 
-# --- certainty ---
 ENDS = [0.1, 0.12, 0.2]
 
 

@@ -22,7 +22,6 @@ from bubblefit.solvers.calculix.deck import pressure_forces
 
 from ..complaints import complaint
 
-# --- cylinder model ---
 RADIUS, LENGTH = 75.0, 400.0
 BOX = Mesh(
     np.array([(x, y, z) for x in (0, 2) for y in (0, 3) for z in (0, 5)], float),
@@ -228,7 +227,6 @@ def test_gas_and_bodies_are_checked(make):
     assert "." in caught.value.field
 
 
-# --- thickness parameter ---
 MODELS = (
     BubbleModel(disk_mesh(100.0, 32, "quarter"), 0.8, [0.05, 0.1]),
     straight_strip("warp", 20.0, 22.0, 0.8, increments=3),
