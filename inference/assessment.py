@@ -147,7 +147,7 @@ def certainty(
     )  # fmt: skip
 
 
-def pinned_by(
+def uncertainty_from(
     problem: FitProblem,
     best: Evaluation,
     law: HypoelasticLaw,

@@ -353,7 +353,7 @@ def information_of(
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class LawQuery:
     """The law, its unknowns y and the strains `ends` (3,) up to which its moduli are asked for."""
 
     unknowns: Unknowns

@@ -33,13 +33,13 @@ from ..notes import Note, NoteKind
 from .comparison import NoiseIs, Objective
 from .problem import FitProblem
 
-#: Rings around a point that others are compared with, unless told.
+#: Rings around a point that others are compared with, unless given.
 RINGS = 60
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
 #: Standard deviations of a correlation of independent values, which are no correlation.
 BY_CHANCE = 2.0
-#: Of the largest extent: beyond, there are no neighbours any more, unless told.
+#: Of the largest extent: beyond, there are no neighbours any more, unless given.
 REACH = 0.5
 
 
@@ -197,7 +197,7 @@ class Discrepancy:
     specimens: int = 0
 
     @property
-    def told(self) -> bool:
+    def significant(self) -> bool:
         """Return whether it cannot be noise, and exceeds what the noise leaves open anyway."""
         return self.ratio > self.largest and self.rms > self.least
 
@@ -295,7 +295,9 @@ def _shapes(degree: int) -> int:
 def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
     """Return notes where more is left than noise can be."""
     return [
-        Note(NoteKind.DISCREPANCY, _words(one), name) for name, one in found.items() if one.told
+        Note(NoteKind.DISCREPANCY, _words(one), name)
+        for name, one in found.items()
+        if one.significant
     ]
 
 
@@ -426,7 +428,7 @@ def _values(along: Array, shapes: Array) -> Array:
     return np.stack([legval(along, column) for column in shapes.T], axis=1)
 
 
-#: Of so many fits in which the noise is as it is given, one is told to be off to a side.
+#: Of so many fits in which the noise is as it is given, one is said to be off to a side.
 CHANCE = 0.01
 
 
@@ -462,7 +464,7 @@ class NoiseTest:
         return float(chi2.cdf(self.square, self.free))
 
     @property
-    def told(self) -> NoteKind | None:
+    def note_kind(self) -> NoteKind | None:
         """Return the kind of note to give; None where the residual is as expected."""
         expected = np.sqrt(self.free / self.independent)
         if self.above < CHANCE and self.misfit.ratio > (1 + MATTERS) * expected:
@@ -512,7 +514,7 @@ def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
     return [
         Note(kind, _words_chi_square(test, kind), name)
         for name, test in tests.items()
-        if (kind := test.told) is not None
+        if (kind := test.note_kind) is not None
     ]
 
 

@@ -32,7 +32,7 @@ class Group:
     units: Sequence[Unit]
 
 
-def drawn(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
+def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
     """Return the number of draws of each unit of each group: as many as there are units."""
     return [
         random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()

@@ -373,7 +373,7 @@ def _curve(
     return loads[keep], found.elongation[keep]
 
 
-#: The constants of an evaluation whose spread is told.
+#: The constants of an evaluation with a spread.
 CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
 
 

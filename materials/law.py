@@ -274,7 +274,7 @@ def law_slopes(
             coupling[0, j] = 1.0
         elif name == "thickness":
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
-            # (its stress is another, but nothing that takes this derivative is told of stress).
+            # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
             coupling[1:, j] = law.coupling[1:] / thickness
     return rows, coupling

@@ -126,8 +126,8 @@ def band_lines(card: MaterialCard) -> list[str]:
     for name, strain in strains_of(law).items():
         at = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
         ends = zip(at, *sure.band(law, name, at), strict=True)
-        told = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
-        lines.append(f"  - {name}, MPa: {told}")
+        band = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
+        lines.append(f"  - {name}, MPa: {band}")
     return lines
 
 
@@ -253,7 +253,7 @@ def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:
 
 #: Log strain of the one point in compression: a curve has to begin somewhere.
 COMPRESSION = -0.1
-#: Log strain of both yarns at which the loss of nu12 is told, and increments up to there.
+#: Log strain of both yarns at which the loss of nu12 is stated, and increments up to there.
 BIAXIAL, INCREMENTS = 0.05, 50
 
 

@@ -28,7 +28,7 @@ from .base import Export, Format, Says, heading, option
 #: Engineering shear strain up to which G is averaged where the card has no range; and the least
 #: range that is one: no test of the card's fit sheared the fabric where it ends before.
 SHEAR, SHEARED = 0.1, 1e-3
-#: Of what a spread is told.
+#: Constants with a spread.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.inference.assessment import Certainty, _on_bounds, certainty, moduli_error, pinned_by
+from bubblefit.inference.assessment import (
+    Certainty,
+    _on_bounds,
+    certainty,
+    moduli_error,
+    uncertainty_from,
+)
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import Asked, Limit, information, summary
@@ -79,15 +85,15 @@ def test_what_a_nuisance_hides_is_not_determined():
     """At a single pressure that is not known for sure, moduli can only be told up to a factor."""
     model = replace(MODEL, pressures=PRESSURES[-1:], increments=PRESSURES)
     without, beside = flat(CONSTANT, model), flat(PRESSED, model)
-    sure, unsure = pinned_by_all(without), pinned_by_all(beside)
+    sure, unsure = uncertainty_from_all(without), uncertainty_from_all(beside)
     for name in ("E1", "E2"):
         assert sure[name].max() < 0.02 and unsure[name].min() > 0.5
 
 
-def pinned_by_all(fit: FitProblem) -> dict[str, np.ndarray]:
+def uncertainty_from_all(fit: FitProblem) -> dict[str, np.ndarray]:
     point = evaluated(fit)
     noise = Noise.of(fit, point.residual).rows
-    return pinned_by(fit, point, FLAT_LAW, REACHED, [0], noise)
+    return uncertainty_from(fit, point, FLAT_LAW, REACHED, [0], noise)
 
 
 def flat(unknowns: Unknowns, model: BubbleModel = MODEL) -> FitProblem:

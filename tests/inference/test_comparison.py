@@ -325,7 +325,7 @@ def test_specimens_that_scatter_are_seldom_told(specimens):
         off -= (off @ SLOPES[:, :1] / (SLOPES[:, 0] @ SLOPES[:, 0])).mean() * SLOPES[:, 0]
         one = found(off)
         assert one is not None and one.specimens == specimens
-        told += one.told
+        told += one.significant
     assert told / sets <= 0.03
 
 
@@ -333,10 +333,10 @@ def test_a_wrong_form_is_told():
     """A curve that bends by 60 N where a constant modulus cannot."""
     random = np.random.default_rng(8)
     bend = 60.0 * ((PLACES / 1.5 - 1.0) ** 2 - 0.4)
-    told = [found(bend + scattered(5, random)).told for _ in range(100)]
+    told = [found(bend + scattered(5, random)).significant for _ in range(100)]
     assert sum(told) > 70
     ten = [found(bend + scattered(10, random)) for _ in range(50)]
-    assert all(one.told for one in ten)
+    assert all(one.significant for one in ten)
     # Without what another modulus would follow.
     beside = bend - SLOPES[:, 0] * (bend @ SLOPES[:, 0]) / (SLOPES[:, 0] @ SLOPES[:, 0])
     expected = float(np.sqrt(np.mean(beside**2)))

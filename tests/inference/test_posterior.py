@@ -352,7 +352,7 @@ def test_noise_is_taken_for_more_in_one_of_a_hundred(width):
         blocks = smooth_noise(random, width)
         for k in range(3):
             blocks[k] = blocks[k] - SHAPES[:, k] * (SHAPES[:, k] @ blocks[k])
-        told += judged(blocks).told
+        told += judged(blocks).significant
     assert told <= 3  # more in one of 600 such tests, if one of a hundred is told
 
 
@@ -360,11 +360,11 @@ def test_a_smooth_field_is_found_below_the_noise():
     """0.005 mm of one shape in every block, beside noise of 0.02 mm."""
     random, shape = np.random.default_rng(6), 0.005 * SHAPES[:, 7] * SIDE
     told = [judged([b + shape for b in smooth_noise(random, 0.0)]) for _ in range(6)]
-    assert all(one.told for one in told)
+    assert all(one.significant for one in told)
     assert np.mean([one.rms for one in told]) == pytest.approx(0.005, rel=0.2)
     # What the mesh may be answerable for is none.
     found = judged([b + shape for b in smooth_noise(random, 0.0)], [shape] * BLOCKS)
-    assert not found.told and found.rms < 0.003
+    assert not found.significant and found.rms < 0.003
 
 
 def test_blocks_count_alike_whatever_their_size():

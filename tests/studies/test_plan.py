@@ -13,7 +13,7 @@ import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.bubble import candidates as bubbles
 from bubblefit.experiments.strips import candidates as strips
-from bubblefit.inference.assessment import pinned_by
+from bubblefit.inference.assessment import uncertainty_from
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -122,7 +122,7 @@ def bubble_card() -> MaterialCard:
 
 
 def test_what_is_known_now_is_what_a_fit_says_its_tests_pin_down(tmp_path: Path, few: None) -> None:
-    """The same from `pinned_by`, which inverts the whole problem at once; with offsets unknown."""
+    """The same from `uncertainty_from`, which inverts the whole at once; with offsets unknown."""
     path = small(tmp_path, ("displacement_offset = false", "displacement_offset = true"),
                  ("pressure_offset = false", "pressure_offset = true"))  # fmt: skip
     here: list[Present] = []
@@ -137,7 +137,7 @@ def test_what_is_known_now_is_what_a_fit_says_its_tests_pin_down(tmp_path: Path,
         made = plan(read_project(path), bubble_card())
     present = here[0]
     noise = Noise.of(present.problem, present.point.residual).rows
-    pinned = pinned_by(present.problem, present.point, present.law, made.ends, [0], noise)
+    pinned = uncertainty_from(present.problem, present.point, present.law, made.ends, [0], noise)
     for name, sigma in made.now.sigma.items():
         np.testing.assert_allclose(sigma, pinned[name], rtol=1e-6)
 
