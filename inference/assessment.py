@@ -32,11 +32,13 @@ ON_BOUND = 1e-6
 
 def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
     """Return the largest relative error of each modulus up to the strains reached (3,)."""
-    strains = {name: np.linspace(0.0, reached[k], POINTS) for name, k in COMPONENTS.items()}
-    return {
-        name: float(np.max(np.abs(law.modulus(name, x) / known.modulus(name, x) - 1.0)))
-        for name, x in strains.items()
-    }
+    errors = {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, reached[component], POINTS)
+        errors[name] = float(
+            np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
+        )
+    return errors
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from bubblefit.inference.assessment import (
 )
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
 from bubblefit.inference.descent import descend
-from bubblefit.inference.linear import Asked, Limit, information, summary
+from bubblefit.inference.linear import LawQuery, Limit, information, summary
 from bubblefit.inference.noise import (
     CHANCE,
     Misfit,
@@ -163,9 +163,9 @@ UNKNOWNS = Unknowns.of(
 Y = UNKNOWNS.at(INFORMATION_LAW.beta[list(UNKNOWNS.free)])
 
 
-def asked() -> Asked:
+def asked() -> LawQuery:
     """Constant moduli; the unknowns are G12, E2, E1, each in a unit of its own."""
-    return Asked(UNKNOWNS, INFORMATION_LAW, Y, np.array([0.1, 0.1, 0.05]))
+    return LawQuery(UNKNOWNS, INFORMATION_LAW, Y, np.array([0.1, 0.1, 0.05]))
 
 
 def test_nuisance_is_what_the_whole_covariance_says_it_is():
