@@ -183,7 +183,7 @@ def discrepancy(fields: int = 100, quads: int = 192, *chosen: str) -> None:
                 print(f"{words}, field {number}: no fit")
                 continue
             found = done[1].certainty.discrepancy["bubble"]
-            noticed += found.told
+            noticed += found.significant
             ratios.append(found.ratio)
             rms.append(found.rms)
         print(f"{words:24s}{noticed:4d} of {len(ratios)} told, ratio {np.median(ratios):8.3g} "

@@ -12,7 +12,7 @@ from bubblefit.experiments.kinds import Candidate, MakeSolver, Planning, Weighti
 from bubblefit.experiments.registry import kinds
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.linear import POINTS, PRIOR, Asked, information_of, summary
+from bubblefit.inference.linear import POINTS, PRIOR, LawQuery, information_of, summary
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
@@ -87,7 +87,7 @@ class Simulated:
 
 
 def scatter(
-    tests: Sequence[Simulated], present: Present, asked: Asked, sets: int, seed: int
+    tests: Sequence[Simulated], present: Present, asked: LawQuery, sets: int, seed: int
 ) -> tuple[float, int]:
     """Return the RMS scatter of G12 in refits along its strain, and how many sets had no fit."""
     size = PRIOR * np.abs(present.point.unknowns)
@@ -126,7 +126,7 @@ def designs(
     """
     present, make, offered = case(scale, noise)
     ends = np.minimum(present.reached, RANGE)
-    asked = Asked(present.problem.unknowns, present.law, present.point.unknowns, ends)
+    asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns, ends)
     (own,) = present.problem.comparisons
     bubble = Simulated.of(own, 1, present)
     rows = []

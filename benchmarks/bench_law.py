@@ -20,8 +20,12 @@ from bubblefit.materials.designers import RATIOS, constants_of_law, shares, spre
 from bubblefit.materials.exports import base as curves
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response, trellis_angle, trellis_curve
-from bubblefit.materials.tables import modulus_tables
+from bubblefit.materials.responses import (
+    biaxial_response,
+    modulus_tables,
+    trellis_angle,
+    trellis_curve,
+)
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh

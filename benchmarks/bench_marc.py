@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh

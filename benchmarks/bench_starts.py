@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import ProposedStarts, RandomStarts, SobolStarts
 from bubblefit.project.project import read_project

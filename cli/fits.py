@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from ..errors import InputError
+from ..inference.methods import method_names
 from ..inference.posterior import LEVEL
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
@@ -46,7 +47,7 @@ def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
         given.JOBS,
         given.SCHEDULER,
-        click.option("--method", metavar="NAME", help="Optimiser: lm, slsqp or cobyla."),
+        click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
         given.solver_choice,
         given.fail_above_option("Exit 1 when more than E is left of the objective."),
         given.TRUST,

@@ -36,11 +36,10 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "tests": ("Kinds of test", ("experiments.kinds", "experiments.registry",
                                 "inference.comparison:Comparison,Objective")),
-    "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base",
-                      "materials.forms.registry")),
+    "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.base")),
     "readers": ("Readers of data", ("readers.registry",)),
     "solvers": ("Solvers", ("solvers.base", "solvers.registry")),
-    "methods": ("Optimisers", ("inference.methods.base", "inference.methods")),
+    "methods": ("Optimisers", ("inference.methods",)),
 }  # fmt: skip
 HEAD = "<!-- Written by docs/make_api.py from the docstrings. -->\n"
 #: "name : words" at the start of a line, and after the end of another entry.

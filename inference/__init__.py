@@ -1,1 +1,1 @@
-"""Objectives, feasibility, optimisers and the multistart study."""
+"""Identify unknowns from residuals: feasibility, optimisers, uncertainty."""

@@ -1,25 +1,29 @@
-"""How good a fit is: moduli against a known solution, and what the data could not determine."""
-
-from __future__ import annotations
+"""Assess a fit: moduli against a known solution, uncertainty, and what lies on a bound."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..materials.forms.base import COMPONENTS, modulus_rows
+from ..materials.forms.base import COMPONENTS, Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
-from .discretisation import Limit
-from .linear import LEFT, POINTS, PRIOR, Order, Second, along, moduli_of, posteriors_of, sizes_of
-from .misfit import Discrepancy, differences_of_all, discrepancies, notes_of_discrepancies
-from .noise import Noise
+from .linear import (
+    LEFT,
+    POINTS,
+    PRIOR,
+    Limit,
+    Order,
+    Second,
+    along,
+    moduli_of,
+    posteriors_of,
+    sizes_of,
+)
+from .noise import Discrepancy, Noise, differences_of_all, discrepancies, notes_of_discrepancies
 from .posterior import Posterior, bands_of
 from .problem import Evaluation, FitProblem
-
-Array = NDArray[np.float64]
 
 #: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
 UNCERTAIN = 0.25
@@ -27,7 +31,7 @@ ON_BOUND = 1e-6
 
 
 def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
-    """Largest relative error of each modulus up to the strains reached (3,)."""
+    """Return the largest relative error of each modulus up to the strains reached (3,)."""
     errors = {}
     for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, reached[component], POINTS)
@@ -39,20 +43,18 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """How sure each modulus is up to the strains reached, and plain words.
+    """The uncertainty of each modulus up to the strains reached, and notes on it.
 
-    noise : by comparison, in the unit of its data (mm, N); alike : by comparison, how many
-    neighbouring values err as one. strain, sigma : (n,) by modulus, 1 sigma by noise, relative.
-    undetermined : what the data do not determine, and what lies on its bound. mesh : (n,) by
-    modulus, by how much it would be another on ever finer meshes, relative, than on that of the
-    fit; None where that is not known. posterior : of all unknowns, from the noise alone. fine : of
-    those of ever finer meshes, with what may be left of their error; None as `mesh`. rows : (m,)
-    of each residual the noise that as many independent ones would have. band : (2, n) MPa by
-    modulus, between which it lies with 95 % certainty, noise and mesh together. taken_out :
-    whether the law reported is that of ever finer meshes. discrepancy : by comparison, what of a
-    sheet's residual is too smooth for noise, or of strips' alike in all specimens. second : what it
-    was computed with beside the first derivatives, None where it is of first order. order : what
-    was found of that; None where nobody looked, because little more than noise is left.
+    noise : by comparison, in the unit of its data (mm, N). alike : by comparison, number of
+    neighbouring values that err as one. strain, sigma : (n,) by modulus, 1 sigma by noise,
+    relative. undetermined : notes on moduli that the data do not determine or that lie on a bound.
+    mesh : (n,) by modulus, relative change on ever finer meshes; None where unknown. posterior : of
+    all unknowns, from the noise alone. fine : of those of ever finer meshes, with the error that
+    may be left; None as `mesh`. rows : (m,) noise of each residual if as many independent ones were
+    measured. band : (2, n) MPa by modulus, ends of its 95 % band, noise and mesh together.
+    taken_out : the reported law is that of ever finer meshes. discrepancy : by comparison,
+    residuals too smooth for noise, or alike in all specimens. second, order : second-order terms
+    and their verdict; None where it is of first order, or where little more than noise is left.
     """
 
     noise: dict[str, float]
@@ -72,14 +74,15 @@ class Certainty:
 
     @property
     def reported(self) -> Posterior | None:
-        """Of the law that is reported: of ever finer meshes where their error is taken out."""
+        """Return the posterior of the reported law: of ever finer meshes where their error is taken
+        out."""
         return self.fine if self.taken_out else self.posterior
 
     @property
     def total(self) -> dict[str, Array]:
-        """(n,) by modulus: noise and mesh together, as if the error of the mesh were a sigma.
+        """Return (n,) by modulus, noise and mesh error together, as if the latter were a sigma.
 
-        Of a mesh whose error is taken out, what may be left of it.
+        Where the error of the mesh is taken out, only the share counts that may be left of it.
         """
         if self.mesh is None:
             return dict(self.sigma)
@@ -91,11 +94,9 @@ class Certainty:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """`count` laws as data and mesh leave them: `law` with other numbers, within its bounds.
+        """Return `count` random laws that data and mesh allow, within the bounds of the fit.
 
-        Raises
-        ------
-        ValueError : the posterior is not there (a certainty made by hand).
+        Raises ValueError where there is no posterior (a certainty made by hand).
         """
         known = self.fine or self.posterior
         if known is None:
@@ -111,13 +112,10 @@ def certainty(
     limit: Limit | None = None,
     second: Second | None = None,
 ) -> Certainty:
-    """Linear propagation of the noise of every comparison to the moduli.
+    """Propagate the noise of every comparison linearly to the moduli.
 
-    Parameters
-    ----------
-    law : that is reported. limit : of ever finer models, where it is known: what it leaves counts
-        as noise (see `Noise.of`), else what the best fit leaves. second : what is of second
-        order (see `Linear.of`).
+    law : the reported one. limit : of ever finer models, where known: its residual counts as noise
+    (see `Noise.of`), else that of the best fit. second : terms of second order (see `Linear.of`).
     """
     noise = Noise.of(problem, best.residual if limit is None else limit.residual)
     posterior, fine = posteriors_of(problem, best, noise, limit, second)
@@ -138,29 +136,20 @@ def certainty(
     left = best.residual if limit is None else limit.residual
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
     wrong |= differences_of_all(problem, left, best.jacobian)
-    told = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
+    notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)
         there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
         mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
+    bands = bands_of(fine or posterior, law, strains)
     return Certainty(
-        noise.level,
-        strains,
-        sigmas,
-        told,
-        mesh,
-        noise.alike,
-        posterior,
-        fine,
-        noise.rows,
-        bands_of(fine or posterior, law, strains),
-        discrepancy=wrong,
-        second=second,
-    )
+        noise.level, strains, sigmas, notes, mesh, noise.alike, posterior, fine, noise.rows, bands,
+        discrepancy=wrong, second=second,
+    )  # fmt: skip
 
 
-def pinned_by(
+def uncertainty_from(
     problem: FitProblem,
     best: Evaluation,
     law: HypoelasticLaw,
@@ -168,12 +157,11 @@ def pinned_by(
     numbers: Sequence[int],
     noise: Array,
 ) -> dict[str, Array]:
-    """1-sigma relative uncertainty of each modulus from some comparisons alone, by their numbers.
+    """Return the 1-sigma relative uncertainty of each modulus from some comparisons, by number.
 
-    The best estimate that those would allow (weights do not count), beside hardly any knowledge
-    before: each modulus at its control strains to 1000 % of its own size, and each nuisance to
-    its prior, or to ten times the width of its bounds. noise : (m,) of each residual, as
-    `Certainty.rows` has it.
+    This is the best estimate that those allow (weights do not count), with hardly any knowledge
+    before: each modulus at its control strains to 1000 % of itself, each nuisance to its prior or
+    ten times the width of its bounds. noise : (m,) of each residual, as `Certainty.rows`.
     """
     assert best.jacobian is not None
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
@@ -187,7 +175,6 @@ def pinned_by(
 
 
 def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
-    """Moduli on their margins or bounds, coefficients and nuisance on theirs."""
     p, notes = problem.unknowns, []
     for name, rows in p.moduli.items():
         moduli, least = rows @ best.coefficients, p.bounds.least[name]
@@ -224,14 +211,11 @@ CORRELATED = 0.5
 
 @dataclass(frozen=True)
 class Verdict:
-    """One unknown beside the moduli.
+    """The uncertainty of one unknown beside the moduli, in `unit`.
 
-    Parameters
-    ----------
-    name : with its comparison where it is of one among several. value, sigma, lower, upper, prior :
-        in `unit`; prior None where nothing was known of it.
-    correlation : with each modulus in the middle of its strains, -1 to 1.
-    shared : whether it is one for all tests. why : the data say nothing of it, if they do not.
+    name : with its comparison where there are several. prior : None without one. correlation : with
+    each modulus in the middle of its strains. shared : one for all tests. why : reason why the data
+    may say nothing of it.
     """
 
     name: str
@@ -247,7 +231,7 @@ class Verdict:
 
     @property
     def on(self) -> str:
-        """The bound that it lies on ("lower", "upper"), "" for none."""
+        """Return the bound that it lies on ("lower", "upper"), "" for none."""
         room = ON_BOUND * (self.upper - self.lower)
         if self.value - self.lower <= room:
             return "lower"
@@ -255,14 +239,13 @@ class Verdict:
 
     @property
     def determined(self) -> bool:
-        """Whether the data say anything of it."""
+        """Return whether the data say anything of it."""
         if self.prior is not None:
             return self.sigma < AS_BEFORE * self.prior
         return self.sigma < ANYWHERE * (self.upper - self.lower)
 
     @property
     def words(self) -> str:
-        """What the data say of it."""
         unit = f" {self.unit}" if self.unit else ""
         value = f"{self.value:.4g}{unit}" + (f", on its {self.on} bound" if self.on else "")
         if not self.determined:
@@ -277,14 +260,12 @@ class Verdict:
 
     @property
     def _together(self) -> str:
-        name = max(self.correlation, key=lambda name: abs(self.correlation[name]))
-        if abs(self.correlation[name]) < CORRELATED:
-            return ""
-        return f", correlation {self.correlation[name]:.2f} with {name}"
+        name, value = max(self.correlation.items(), key=lambda item: abs(item[1]))
+        return "" if abs(value) < CORRELATED else f", correlation {value:.2f} with {name}"
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """For result.json."""
+        """Return the entry of result.json."""
         return {
             "value": self.value,
             "unit": self.unit,
@@ -299,7 +280,7 @@ class Verdict:
 
 
 def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
-    """Of all unknowns beside the moduli.
+    """Return a verdict for each unknown beside the moduli.
 
     ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known.
     """
@@ -329,7 +310,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
 
 
 def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
-    """What the data say nothing of; what lies on a bound is told with the moduli that do."""
+    """Return notes on unknowns that the data do not determine."""
     return [
         Note(NoteKind.UNCERTAIN, f"{verdict.name} is {verdict.words}")
         for verdict in found

@@ -1,4 +1,4 @@
-"""One comparison of a fit: a model, who runs it, and what it should show."""
+"""One comparison of a fit: a model, its solver, measured data, and unknowns beside the moduli."""
 
 from __future__ import annotations
 
@@ -11,36 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
+from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver
 
-# Unknowns beside the moduli: of one comparison (an offset, a pressure), or shared by all of them.
-#
-# Shared are what the fabric has one of: Poisson's ratio, thickness.
-
-Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """An unknown beside the moduli: not wanted for itself, but the data hang on it.
+    """An unknown beside the moduli, of one comparison (an offset, a pressure) or shared by all.
 
-    Parameters
-    ----------
-    name : as its objective knows it ("offset_z"), or of a parameter of the model or the law.
-    lower, upper : its bounds, in `unit`.
-    unit : of its values ("mm", "kPa").
-    model_parameter : which of the model's `parameters` it is: `with_parameters` of the model takes
-        how far it is from `start`, and a solver that differentiates does so by it. None where only
-        the objective, or the law, knows of it.
-    scale : the model's units in one `unit` (1e-3 from kPa to MPa).
-    prior : one standard deviation around `start` of what is known of it before the data, in `unit`;
-        None: nothing. weight : residual of a value that far away.
-    start : from which a fit starts.
-    law_parameter : which number of the law it is, beside its beta: "nu12".
-    shared : one for all comparisons of a fit that have it, by its name; else each has its own.
-    why : what to say where the data say nothing of it.
+    name : as its objective knows it ("offset_z"), or of a parameter of model or law. lower, upper,
+    prior, start : in `unit`; prior is one standard deviation around `start`, None without one.
+    weight : residual of a value one prior away. model_parameter : the one of the model's
+    `parameters` that takes the difference from `start`; None where only the objective or the law
+    knows it. scale : the model's units in one `unit` (1e-3 from kPa to MPa). law_parameter : number
+    of the law beside beta: "nu12". shared : one for all comparisons that have it, by its name. why
+    : words for data that say nothing of it.
     """
 
     name: str
@@ -59,10 +47,8 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False)
 class NuisanceOf:
-    """The nuisance of all comparisons of a fit: what they share, then laid end to end.
+    """The nuisance of all comparisons of a fit: shared unknowns, then comparison by comparison.
 
-    Parameters
-    ----------
     comparisons : by name, in their order; those without nuisance are named too.
     """
 
@@ -70,19 +56,17 @@ class NuisanceOf:
 
     @cached_property
     def shared(self) -> tuple[Nuisance, ...]:
-        """What several comparisons may share, each once."""
         every = (n for own in self.comparisons.values() for n in own if n.shared)
         return tuple({n.name: n for n in every}.values())
 
     @cached_property
     def all(self) -> tuple[Nuisance, ...]:
-        """What is shared, then what each comparison has of its own."""
         own = (n for several in self.comparisons.values() for n in several if not n.shared)
         return (*self.shared, *own)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all; one of its own with the comparison's name before it where there are several."""
+        """Return all names, with the comparison's before its own ones where there are several."""
         several = len(self.comparisons) > 1
         own = tuple(
             f"{comparison}: {n.name}" if several else n.name
@@ -94,22 +78,20 @@ class NuisanceOf:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of all, in their units."""
         return np.array([n.lower for n in self.all]), np.array([n.upper for n in self.all])
 
     @property
     def start(self) -> Array:
-        """From where a fit starts, of all, in their units."""
         return np.array([n.start for n in self.all])
 
     @property
     def priors(self) -> tuple[Numbers, Array]:
-        """Number of each that has a prior, and residual of one unit of it."""
+        """Return the number of each that has a prior, and the residual of one unit of it."""
         known = [(k, n.weight / n.prior) for k, n in enumerate(self.all) if n.prior is not None]
         return np.array([k for k, _ in known], dtype=np.intp), np.array([c for _, c in known])
 
     def places(self, comparison: str) -> Numbers:
-        """Where the nuisance of a comparison lies, in its order."""
+        """Return the positions of a comparison's nuisance, in its order."""
         found, first = [], len(self.shared)
         shared = {n.name: k for k, n in enumerate(self.shared)}
         for name, nuisance in self.comparisons.items():
@@ -120,15 +102,15 @@ class NuisanceOf:
         return np.array(found, dtype=np.intp)
 
     def values(self, comparison: str, all_values: Array) -> dict[str, float]:
-        """The nuisance of a comparison by plain name, from the values of all, in their units."""
+        """Return the nuisance of a comparison by plain name from the values of all."""
         own = self.comparisons.get(comparison, ())
         values = all_values[self.places(comparison)].tolist()
         return dict(zip((n.name for n in own), values, strict=True))
 
     def of_law(self, all_values: Array) -> dict[str, float]:
-        """The numbers of the law that are unknown, by its names, from the values of all.
+        """Return the unknown numbers of the law by name from the values of all.
 
-        Within their bounds: a step keeps them but for rounding, and a law may end there.
+        They are clipped to their bounds, which a step keeps but for rounding: a law may end there.
         """
         return {
             n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
@@ -149,12 +131,11 @@ NoiseIs = Literal["given", "specimens' scatter", "assumed"]
 class Objective(Protocol):
     """Residual blocks of one comparison.
 
-    sizes : length of each block, together m; scale (m,): `unit`s in one unit of each residual;
-    least_noise in `unit`s, to reckon with at least (its `noise_is`, a `NoiseIs`, is "assumed"
-    where the objective has none); data: all that was measured. One whose neighbouring values may
-    err as one also has `places`, (n, 2) mm on a sheet or (n, 1) along a curve, of each block's
-    values; one that knows how many do, whatever is left of them, has `alike`; one
-    whose values are of several specimens has `specimens`, (m,) the number of each one's, or None.
+    sizes : length of each block, together m. scale : (m,) `unit`s in one unit of each residual.
+    least_noise : in `unit`s. data : all that was measured. Optional: `noise_is` (a `NoiseIs`, else
+    "assumed"); `places`, (n, 2) mm on a sheet or (n, 1) along a curve, of each block's values,
+    where neighbours may err as one; `alike`, the known number of values that do; `specimens`, (m,)
+    the specimen's number of each value, or None.
     """
 
     @property
@@ -173,19 +154,19 @@ class Objective(Protocol):
     def data(self) -> tuple[Array, ...]: ...
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        """(m,) at nuisance values by name, in their units; it asks for those it knows."""
+        """Return (m,) at nuisance values by name, in their units."""
         ...
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """(m, parameters) from the solver's slope of the displacements."""
+        """Return (m, parameters) from the solver's slope of the displacements."""
         ...
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """(m, names): slope of the residual by the nuisance that only the objective knows of."""
+        """Return (m, names), slopes by the nuisance that only the objective knows."""
         ...
 
     def shifted(self, here: History, there: History) -> Objective:
-        """The objective of a model that shows `here` where this one shows `there`."""
+        """Return the objective of a model that shows `here` where this one shows `there`."""
         ...
 
 
@@ -193,18 +174,11 @@ class Objective(Protocol):
 class Comparison:
     """A model that should show what was measured.
 
-    Parameters
-    ----------
-    name : of its test ("bubble 1", "strips 1: warp"), for messages and reports; one of its own.
-    model : what its solver runs.
-    solver : its own, so that what the solver prepares for the model is kept.
-    objective : what the model should show.
-    nuisance : unknowns beside the moduli, of this comparison alone or shared with others.
-    stage : those of lower stages lead into a fit of several (see `approach`).
-    contracts : the sheet is free to contract under tension, so that the law has to be positive
-        definite there.
-    must_be_stable : an unstable equilibrium is no point for a fit to go to: no test under load
-        could show it.
+    name : of its test ("bubble 1", "strips 1: warp"), unique in a fit. solver : its own, so that it
+    keeps what it prepares for the model. stage : those of lower stages lead into a fit of several
+    (see `approach`). contracts : the sheet contracts freely under tension, so that the law has to
+    be positive definite there. must_be_stable : an unstable equilibrium is refused, since no test
+    under load shows it.
     """
 
     name: str
@@ -218,11 +192,11 @@ class Comparison:
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
 
     def by(self, solver: Solver) -> Comparison:
-        """The same comparison run by another solver."""
+        """Return the same comparison run by another solver."""
         return replace(self, solver=solver, _last=None)
 
     def forget(self) -> None:
-        """No warm start from here on, until something was differentiated."""
+        """Drop the warm start until the next differentiated run."""
         self._last = None
 
     def run(
@@ -230,15 +204,9 @@ class Comparison:
     ) -> History:
         """Run without derivatives.
 
-        Parameters
-        ----------
-        free : entries of the law's beta that vary between runs.
-        nuisance : values by name, in their units.
-        warm : start each increment from the last differentiated solution and its slope.
-
-        Raises
-        ------
-        SolverFailure : it did not end well.
+        free : entries of the law's beta that vary between runs. nuisance : values by name, in their
+        units. warm : start each increment from the last differentiated solution and its slope.
+        Raises SolverFailure.
         """
         values = self._model_values(nuisance)
         model = self._model(values)
@@ -250,16 +218,10 @@ class Comparison:
     def differentiate(
         self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
     ) -> tuple[History, Array]:
-        """Run with derivatives, and remember the way for a warm start; arguments as for `run`.
+        """Run with derivatives and keep the path for a warm start; arguments as for `run`.
 
-        Returns
-        -------
-        History, and the slope of the residual (m, free + nuisance): by the entries of beta, then
-        by the nuisance of this comparison in their units.
-
-        Raises
-        ------
-        SolverFailure : it did not end well, or the solver does not differentiate.
+        Returns the history and the slope of the residual (m, free + nuisance) by the entries of
+        beta, then by the nuisance of this comparison in their units.
         """
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
@@ -276,7 +238,6 @@ class Comparison:
         return history, self._chain(self.objective.jacobian(history, slope), len(free))
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
-        """What the model knows of, by its names and in its units."""
         return {
             n.model_parameter: n.scale * (nuisance[n.name] - n.start)
             for n in self.nuisance
@@ -284,12 +245,8 @@ class Comparison:
         }
 
     def _model(self, values: Mapping[str, float]) -> Any:
-        """The model with its parameters at `values`; one that has none is as it is.
-
-        Raises
-        ------
-        SolverFailure : there is no such model (a pressure below zero): nothing to go to.
-        """
+        """Return the model with its parameters at `values`; raise SolverFailure where there is
+        none."""
         if not values:
             return self.model
         try:
@@ -298,7 +255,7 @@ class Comparison:
             raise SolverFailure(f"there is no such model: {error}", self.solver.name) from None
 
     def _chain(self, by_solver: Array, free: int) -> Array:
-        """Columns in the order of the unknowns, from those in the order of the model's names."""
+        """Return columns in the order of the unknowns from those in the model's order."""
         of_model = [n for n in self.nuisance if n.model_parameter is not None]
         of_law = [n for n in self.nuisance if n.law_parameter is not None]
         by = {n.name: n.scale for n in (*of_model, *of_law)}
@@ -313,13 +270,12 @@ class Comparison:
 
     @property
     def _of_law(self) -> list[str]:
-        """Numbers of the law beside its beta that are unknown, by its names."""
         return [n.law_parameter for n in self.nuisance if n.law_parameter is not None]
 
     def _point(
         self, law: HypoelasticLaw, free: Sequence[int], values: Mapping[str, float]
     ) -> Array:
-        """The parameters that vary, in the order in which the solver differentiates by them."""
+        """Return the varying parameters in the order in which the solver differentiates by them."""
         of_law = [float(getattr(law, name)) for name in self._of_law]
         return np.concatenate([law.beta[list(free)], list(values.values()), of_law])
 
@@ -340,12 +296,7 @@ SMALLEST = 1e-14
 
 
 class Blocks:
-    """Where each block of a residual (m,) lies, and what follows from its norm.
-
-    Parameters
-    ----------
-    sizes : length of each block, in order; together m.
-    """
+    """Positions of the blocks of a residual (m,) and their norms; sizes : lengths, together m."""
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes = tuple(int(size) for size in sizes)
@@ -354,14 +305,13 @@ class Blocks:
         self.of = np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     def norms(self, residual: Array) -> Array:
-        """Norm of each block, (blocks,): an RMS error over its scale."""
+        """Return the norm of each block, (blocks,): an RMS error over its scale."""
         return np.sqrt(np.add.reduceat(residual**2, self.starts))
 
     def value(self, residual: Array) -> float:
-        """The objective e."""
         return float(self.norms(residual).sum())
 
     def gradient(self, residual: Array, jacobian: Array) -> Array:
-        """Slope of e, (unknowns,); a block that fits exactly contributes nothing."""
+        """Return the slope of e, (unknowns,); a block that fits exactly contributes nothing."""
         norms = np.maximum(self.norms(residual), SMALLEST)
         return np.asarray((residual / norms[self.of]) @ jacobian)

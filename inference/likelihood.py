@@ -1,30 +1,25 @@
 """Profile likelihood of a number that is linear in the unknowns of a fit, as a modulus is.
 
 The number is held at values ever farther from its best, and the others are fitted anew each time.
-What the weighted sum of squares then grows by is -2 log of the likelihood ratio, once it is divided
-by how much more it grows than a likelihood of the noise would (`Linear.spread_over_curvature`): to
-first order it passes a given level just where the fit's own posterior does. What it shows beyond
-that is curvature: ends that lie unevenly about the best, or that do not exist.
+The growth of the weighted sum of squares, divided by that over a likelihood of the noise
+(`Linear.spread_over_curvature`), is -2 log of the likelihood ratio: to first order it passes a
+level just where the fit's own posterior does. Beyond that it shows curvature: ends that lie
+unevenly about the best, or that do not exist.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 from scipy.special import gammaincinv
 
-from ..materials.forms.base import modulus_rows
-from .methods.descent import bounded_step
+from ..materials.forms.base import Array, modulus_rows
+from .descent import bounded_step
 from .posterior import LEVEL
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
-
-Array = NDArray[np.float64]
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
 THRESHOLD = float(2 * gammaincinv(0.5, LEVEL))  # chi-square of one degree
@@ -43,7 +38,7 @@ FAR = "too many steps"
 
 
 def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
-    """(unknowns,): this @ unknowns is a modulus (MPa) at a strain."""
+    """Return (unknowns,) so that this @ unknowns is a modulus (MPa) at a strain."""
     at = np.array([strain])
     rows = modulus_rows(unknowns.form, name, at, unknowns.strain_range)[:, list(unknowns.free)]
     extra = np.zeros(unknowns.count - unknowns.size)
@@ -54,8 +49,8 @@ def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
 class Side:
     """A profile to one side of the best.
 
-    values : MPa, from the best on; ratios : -2 log L there. why : BOUND, FAILED or FAR where it
-    does not pass the threshold, "" where it does. analyses : that it took.
+    values : MPa, from the best on; ratios : -2 log L there. why : BOUND, FAILED or FAR where the
+    threshold is not passed, else "".
     """
 
     values: tuple[float, ...]
@@ -65,7 +60,8 @@ class Side:
 
     @property
     def end(self) -> float | None:
-        """Where the threshold is passed, by a monotone curve of the root; None where it is not."""
+        """Return the value at the threshold, by a monotone curve of the root; None where not
+        passed."""
         if self.why:
             return None
         values = np.array(self.values)
@@ -77,7 +73,7 @@ class Side:
 
 
 def extreme(unknowns: Unknowns, row: Array, sign: float) -> float:
-    """Largest (sign 1) or smallest (-1) row @ unknowns that bounds and inequalities allow."""
+    """Return the largest (sign 1) or smallest (-1) row @ unknowns that the inequalities allow."""
     a, c = unknowns.inequalities
     found = linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
     return float(row @ found.x) if found.status == 0 else float(sign * np.inf)
@@ -93,11 +89,8 @@ def profile_side(
 ) -> Side:
     """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
 
-    Parameters
-    ----------
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
-    sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : is called
-        after each place.
+    sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
     """
     before, end = problem.analyses, extreme(problem.unknowns, row, sign)
     start = float(row @ best.unknowns)
@@ -135,7 +128,7 @@ def profile_side(
 
 
 def _next(values: list[float], ratios: list[float]) -> float:
-    """The step in which the root of -2 log L should grow by `STEP`."""
+    """Return the step in which the root of -2 log L should grow by `STEP`."""
     last = abs(values[-1] - values[-2])
     roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
     grown = float(roots[1] - roots[0])
@@ -145,9 +138,9 @@ def _next(values: list[float], ratios: list[float]) -> float:
 def fitted_at(
     problem: FitProblem, point: Evaluation, row: Array, target: float
 ) -> Evaluation | None:
-    """The least sum of squares where row @ unknowns is the target, from a neighbour's optimum.
+    """Fit with row @ unknowns held at the target, from a neighbour's optimum.
 
-    None where the analyses do not end well, in an equilibrium that a test could show.
+    None where the analyses do not end well, in a stable equilibrium.
     """
     a, c = problem.unknowns.inequalities
     limit = problem.analyses + MOST_ANALYSES
@@ -177,7 +170,7 @@ def _stable(problem: FitProblem, y: Array) -> Evaluation | None:
 
 
 def _squares(point: Evaluation) -> tuple[Array, Array]:
-    """Half the curvature and half the slope of the sum of squares; flat directions stay put."""
+    """Return half the curvature and slope of the sum of squares; flat directions stay put."""
     assert point.jacobian is not None
     curvature = point.jacobian.T @ point.jacobian
     curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))

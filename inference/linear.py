@@ -1,4 +1,8 @@
-"""A fit near its optimum: what its data say of its unknowns, by its derivatives."""
+"""Linearise a fit at its optimum: posteriors, mesh error, second order, information.
+
+Near its optimum a fit of the sum of the norms of its blocks is a least squares fit in which every
+block weighs the inverse of its norm, and it is that estimate which the noise moves.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +11,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..materials.forms.base import COMPONENTS, modulus_rows
+from ..errors import SolverFailure
+from ..materials.forms.base import COMPONENTS, Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
 from ..solvers.base import History
 from .comparison import Comparison, Nuisance
-from .discretisation import Limit
+from .descent import bounded_step
 from .noise import Noise, misfits
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
-
-Array = NDArray[np.float64]
 
 #: Of the largest curvature of the misfit: below, the data say nothing of a direction.
 FLAT = 1e-13
@@ -30,14 +32,12 @@ SMALLEST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Second:
-    """What the sum of the blocks' norms has of second order beside the squares of its slopes.
+    """Second-order terms of the sum of the blocks' norms beside the squares of its slopes.
 
-    Parameters
-    ----------
     added : (unknowns, unknowns) in the sizes of a `Linear`, to half of the curvature of the
-        weighted sum of squares. left : (m,) the residual of each block over its norm, zero where
-        the block's weight is its noise's: along it a norm is not curved, and noise along it does
-        not turn its slope. directions, analyses : with how many it was found.
+    weighted sum of squares. left : (m,) the residual of each block over its norm, zero where the
+    block's weight is its noise's: along it a norm is not curved, and noise along it does not turn
+    its slope.
     """
 
     added: Array
@@ -46,23 +46,20 @@ class Second:
     analyses: int
 
     def slopes(self, problem: FitProblem, jacobian: Array) -> Array:
-        """(m, unknowns) slope of each residual's block along what is left of it."""
+        """Return (m, unknowns), the slope of each residual's block along its residual."""
         blocks = problem.blocks
         return np.asarray(np.add.reduceat(self.left[:, None] * jacobian, blocks.starts)[blocks.of])
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A fit near its optimum: least squares, in which every block weighs the inverse of its norm.
+    """A fit near its optimum as least squares, every block weighted by the inverse of its norm.
 
-    Parameters
-    ----------
     sizes : (unknowns,) in which they are counted. weights : (m,) roots of the weights of the
-        squares. sharp, flat : (unknowns, some) directions of which the data say something, and
-        nothing. curvature : (sharp,) of half the weighted sum of squares along the former, by the
-        first derivatives.
-        estimator : (unknowns, m) from weighted residuals to what they move the unknowns by, less
-        the sign. moved : (unknowns, m) the same of the noise of each residual.
+    squares. sharp, flat : (unknowns, some) directions that the data determine, and those they do
+    not. curvature : (sharp,) of half the weighted sum of squares, by the first derivatives.
+    estimator : (unknowns, m) from weighted residuals to minus the move of the unknowns. moved :
+    (unknowns, m) the same for the noise of each residual.
     """
 
     sizes: Array
@@ -77,7 +74,7 @@ class Linear:
     def of(
         cls, problem: FitProblem, best: Evaluation, noise: Noise, second: Second | None = None
     ) -> Linear:
-        """At the optimum, evaluated with its Jacobian; second : with what is of second order."""
+        """Linearise at the optimum with its Jacobian, and with second-order terms if given."""
         assert best.jacobian is not None
         weights = np.sqrt(weights_of(problem, best.residual, noise))
         sizes = sizes_of(problem.unknowns, best.unknowns)
@@ -96,11 +93,11 @@ class Linear:
         return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
 
     def spread_over_curvature(self, row: Array) -> float:
-        """Of one number, row @ unknowns: its variance over that of weighted squares of noise one.
+        """Return the variance of row @ unknowns over that of weighted squares of noise one.
 
         By so much a weighted sum of squares grows too fast along it for a likelihood ratio (J. T.
-        Kent, Robust properties of likelihood ratio tests, Biometrika 69, 1982). Not a number where
-        the data say nothing of it.
+        Kent, Robust properties of likelihood ratio tests, Biometrika 69, 1982). NaN where the data
+        say nothing of it.
         """
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
@@ -109,7 +106,7 @@ class Linear:
 
 
 def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
-    """(m,) of the squares of the residuals, near the least sum of the norms of their blocks."""
+    """Return (m,) weights of the squares near the least sum of the norms of their blocks."""
     blocks = problem.blocks
     norms = np.maximum(blocks.norms(residual), blocks.norms(noise.least))
     largest = norms.max()
@@ -119,7 +116,7 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
-    """(unknowns,) what each is large or small beside: itself, or the width of its bounds."""
+    """Return (unknowns,) the size of each: its own, or the width of its bounds."""
     lower, upper = unknowns.nuisance.bounds
     law = np.abs(best[: unknowns.size])
     return np.concatenate([np.maximum(law, 1e-3), np.maximum(upper - lower, 1e-3)])
@@ -142,18 +139,11 @@ def posteriors_of(
     limit: Limit | None = None,
     second: Second | None = None,
 ) -> tuple[Posterior, Posterior | None]:
-    """The unknowns as the noise leaves them, to first order, and those of ever finer models.
+    """Return the posterior from the noise, and that of ever finer models (None without `limit`).
 
-    second : as for `Linear.of`: to second order.
-
-    The second have what may be left of the model's error in their covariance, too; None where
-    the limit is not known.
-
-    A fit makes the sum of the norms of its blocks small: near its optimum it is a least squares
-    fit in which every block weighs the inverse of its norm, and it is that estimate which the
-    noise moves. A block that is fitted better than its noise allows has the norm of the noise.
-    A direction of which the data say nothing is as uncertain as a modulus of which nothing is
-    known.
+    The latter's covariance includes the model error that may be left. A block that is fitted better
+    than its noise allows has the norm of the noise. A direction of which the data say nothing is as
+    uncertain as a modulus of which nothing is known. second : as for `Linear.of`.
     """
     linear = Linear.of(problem, best, noise, second)
     weights, sizes, moved = linear.weights, linear.sizes, linear.moved
@@ -170,7 +160,7 @@ def posteriors_of(
 
 
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
-    """(n,) MPa by modulus at strains (n,), of the law at unknowns y."""
+    """Return (n,) MPa by modulus at strains (n,), of the law at unknowns y."""
     coefficients = unknowns.to_coefficients @ y[: unknowns.size]
     rows = {
         name: modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
@@ -182,7 +172,7 @@ def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dic
 def along(
     unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Strains and 1-sigma relative uncertainty of each modulus, from that of the unknowns."""
+    """Return strains and 1-sigma relative uncertainty of each modulus from a covariance."""
     p, size = unknowns, unknowns.size
     moved = p.to_coefficients @ covariance[:size, :size] @ p.to_coefficients.T
     strains, sigmas = {}, {}
@@ -193,15 +183,6 @@ def along(
         strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)
     return strains, sigmas
 
-
-# What a fit's objective has of second order beside the squares of its slopes.
-#
-# Where much is left of the residual, two things are no longer small. The slopes change from place
-# to place, and each counts by what is left there: that comes from differences of the exact slopes,
-# each over half of a standard deviation, along the directions that the data determine worst (the
-# others have curvature enough). And the norm of a block is not curved along the block's own
-# residual: a fit of the sum of norms follows noise otherwise than one of squares with fixed
-# weights. That costs nothing. Near a residual of noise alone both are nothing.
 
 #: Times the noise of the data that is left of a comparison, from which on it is looked at.
 LARGE = 2.0
@@ -219,11 +200,11 @@ TOO_LITTLE = "too little changes"
 
 @dataclass(frozen=True)
 class Order:
-    """Whether the uncertainty is of first or of second order.
+    """The order of the uncertainty, and its reason.
 
-    used : it is of second order. why : "" where it is; else NOT_DEFINITE or TOO_LITTLE. change : by
-    modulus, by how much the second order changes its sigma, relative, where it does most; empty
-    where it has none. directions : along which it was looked at. analyses : that it took.
+    used : second order. why : "" where used, else NOT_DEFINITE or TOO_LITTLE. change : by modulus,
+    largest relative change of its sigma by the second order; empty where it has none. directions,
+    analyses : numbers of them.
     """
 
     used: bool
@@ -234,7 +215,7 @@ class Order:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """For result.json."""
+        """Return the entry of result.json."""
         return {
             "order": 2 if self.used else 1,
             "why": self.why,
@@ -245,7 +226,6 @@ class Order:
 
     @property
     def words(self) -> str:
-        """In a line."""
         changes = ", ".join(f"{name} {100 * by:+.0f} %" for name, by in self.change.items())
         if self.used:
             return f"second order: 1 sigma against that of the first derivatives: {changes}"
@@ -259,22 +239,24 @@ class Order:
 
     @property
     def notes(self) -> list[Note]:
-        """Where the second order matters."""
+        """Return a note where the second order matters."""
         if not self.used and self.why != NOT_DEFINITE:
             return []
         return [Note(NoteKind.SECOND_ORDER, f"the uncertainty is of {self.words}")]
 
 
 def large(problem: FitProblem, residual: Array) -> bool:
-    """Whether so much is left of any comparison that the second order may matter."""
+    """Return whether some residual is so large that the second order may matter."""
     return any(misfit.ratio > LARGE for misfit in misfits(problem, residual).values())
 
 
 def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
-    """At the optimum: from differences of the exact slopes, along the worst determined directions.
+    """Return second-order terms from differences of the slopes along the least certain directions.
 
-    A direction along which no analysis ends well, to neither side, counts as if its slopes did not
-    change.
+    Where much is left of the residual, its slopes change from place to place (by differences over
+    half of a standard deviation; directions that the data determine well have curvature enough),
+    and the norm of a block is not curved along the block's own residual. A direction along which no
+    analysis ends well, to neither side, counts as if its slopes did not change.
     """
     assert best.jacobian is not None
     before, linear = problem.analyses, Linear.of(problem, best, noise)
@@ -304,13 +286,13 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
 
 
 def definite(linear: Linear, second: Second) -> bool:
-    """Whether enough of the curvature of the first derivatives is left along every direction."""
+    """Return whether enough curvature is left along every direction with the second order."""
     unit = linear.sharp / np.sqrt(linear.curvature)
     return bool(np.linalg.eigvalsh(unit.T @ second.added @ unit).min() > LEFT_SECOND_ORDER - 1.0)
 
 
 def _left(problem: FitProblem, best: Evaluation, noise: Noise) -> Array:
-    """(m,) the residual of each block over its norm; zero where the block weighs by its noise."""
+    """Return (m,) residuals over their block's norm; zero where the block weighs by its noise."""
     blocks = problem.blocks
     norms = blocks.norms(best.residual)
     own = norms > blocks.norms(noise.least)
@@ -318,7 +300,7 @@ def _left(problem: FitProblem, best: Evaluation, noise: Noise) -> Array:
 
 
 def _beside(problem: FitProblem, best: Evaluation, step: Array) -> tuple[Evaluation | None, float]:
-    """A point a step to either side that is allowed and ends well, and to which side."""
+    """Return an allowed point a step to either side that ends well, and the side."""
     a, c = problem.unknowns.inequalities
     for way in (1.0, -1.0):
         y = best.unknowns + way * step
@@ -330,24 +312,16 @@ def _beside(problem: FitProblem, best: Evaluation, step: Array) -> tuple[Evaluat
     return None, 1.0
 
 
-# What measured values say of a law, as information that adds up from test to test.
-#
-# Information is J'J, J (m, unknowns) the slope of the values over their noise, without what a
-# test's own nuisance takes up of it: the best estimate from several tests has the inverse of the
-# sum as its covariance (Fisher). Every value counts by its noise, not by a weight of the
-# objective.
-
 #: Of the width of the bounds of a nuisance: less is none.
 LEAST_WIDTH = 1e-3
 
 
 def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance] = ()) -> Array:
-    """(n, n): what values say of the n unknowns of the law, whatever the nuisance is.
+    """Return (n, n), the information of values on the n unknowns of the law, nuisance removed.
 
-    Parameters
-    ----------
-    slopes : (m, n + nuisance) of the values by the law's unknowns, then by the nuisance.
-    sigma : noise of the values, (m,) or one for all, in their unit.
+    Information is J'J, J the slope of the values over their noise: it adds up from test to test,
+    and its inverse is the covariance of the best estimate (Fisher). slopes : (m, n + nuisance) of
+    the values by the law's unknowns, then by the nuisance. sigma : noise, (m,) or one for all.
     nuisance : with a prior each, or known to ten times the width of its bounds.
     """
     count = slopes.shape[1] - len(nuisance)
@@ -365,11 +339,9 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
 def information_of(
     comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
 ) -> tuple[Array, History]:
-    """(n, n) of a comparison that is run with a law, and the run: nuisance at zero, least noise.
+    """Return the information (n, n) of a comparison run with a law, nuisance at zero, and the run.
 
-    Raises
-    ------
-    SolverFailure : it does not end well, or its solver gives no derivatives.
+    Raises SolverFailure where it does not end well, or its solver gives no derivatives.
     """
     at_zero = {n.name: 0.0 for n in comparison.nuisance}
     history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
@@ -381,11 +353,8 @@ def information_of(
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """The law at which, and the strains up to which, its moduli are asked for.
-
-    y : unknowns of the law. ends : (3,) strains (eps1, eps2, gamma12).
-    """
+class LawQuery:
+    """The law, its unknowns y and the strains `ends` (3,) up to which its moduli are asked for."""
 
     unknowns: Unknowns
     law: HypoelasticLaw
@@ -393,10 +362,10 @@ class Asked:
     ends: Array
 
     def sigma(self, known: Array) -> dict[str, Array]:
-        """1-sigma relative uncertainty (n,) of each modulus from information (unknowns, unknowns).
+        """Return the 1-sigma relative uncertainty (n,) of each modulus from information.
 
-        Before any test each unknown of the law is known to 1000 % of itself: so a modulus of which
-        the tests say nothing comes out as unknown, not as certain.
+        Before any test each unknown of the law is known to 1000 % of itself, so that a modulus of
+        which the tests say nothing comes out as unknown.
         """
         count = len(known)
         sizes = PRIOR * sizes_of(self.unknowns, self.y)[:count]
@@ -406,5 +375,67 @@ class Asked:
 
 
 def summary(sigma: Mapping[str, Array]) -> dict[str, float]:
-    """One figure a modulus: the root of the mean square of its relative sigma along its strain."""
+    """Return, by modulus, the root mean square of its relative sigma along its strain."""
     return {name: float(np.sqrt(np.mean(values**2))) for name, values in sigma.items()}
+
+
+def residual_of(
+    problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
+) -> Array:
+    """Return (m,) the residual of other models at the best unknowns, in the problem's rows.
+
+    Raises SolverFailure where a model does not run, or its residual is of other rows.
+    """
+    unknowns, parts = problem.unknowns, []
+    for comparison in comparisons:
+        nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
+        history = comparison.run(law, unknowns.free, nuisance, False)
+        parts.append(comparison.objective.residual(history, nuisance))
+    rows = np.concatenate(parts)
+    own = sum(sum(c.objective.sizes) for c in problem.comparisons)
+    if rows.shape != (own,) or not np.isfinite(rows).all():
+        raise SolverFailure("the finer model does not give what was matched", problem.solver.name)
+    return np.concatenate([rows, best.residual[own:]])  # priors are of the unknowns
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """The limit of ever finer models.
+
+    step : (unknowns,) from the best unknowns to theirs. residual : (m,) that they would leave.
+    error : (m,) of the residual at the best unknowns.
+    """
+
+    step: Array
+    residual: Array
+    error: Array
+
+
+def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
+    """Return the optimum of the limit of finer models to first order; None if the QP has no answer.
+
+    The residual of a model of second order is off by c h^2; one refinement by k gives c h^2 (1 -
+    1/k^2), so all of it. best : with its Jacobian. finer : (m,) residual of models finer by
+    `factor`, at the same unknowns. Blocks are weighted as in the sum of their norms; what these
+    weights would change without any error is no part of the step.
+    """
+    assert best.jacobian is not None
+    error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
+    blocks = problem.blocks
+    norms = np.maximum(blocks.norms(best.residual), blocks.norms(error))
+    if not (norms > 0).any():
+        return Limit(np.zeros_like(best.unknowns), best.residual, error)
+    weights = 1.0 / np.maximum(norms, 1e-9 * norms.max())[blocks.of]
+    weighted = best.jacobian.T * weights
+    a, c = problem.unknowns.inequalities
+    curvature = weighted @ best.jacobian
+    # An unknown of which the data say nothing stays where it is.
+    curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
+    without, there = (
+        bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
+        for residual in (best.residual, best.residual + error)
+    )
+    if without is None or there is None:
+        return None
+    step = there - without
+    return Limit(step, best.residual + error + best.jacobian @ step, error)

@@ -1,42 +1,49 @@
-"""The noise of the data behind a fit: given or from what is left, and how many values share it."""
+"""The noise of the data, and tests whether the residual of a fit can be noise.
+
+A facet of a camera is wider than the step between its points, and model errors are smooth:
+neighbouring residuals are alike. Where derivatives vary slowly, the variance of a fit grows by 1 +
+sum of rho(d) over the neighbours of a point, rho the correlation at the distance d, as long as rho
+is more than chance.
+
+Over distances that are long beside a facet noise has as much power in one shape as in another, in
+the smoothest polynomials over the sheet as in those of the next degrees; a law or model of the
+wrong form leaves more in the former. Their ratio, each per shape, has the distribution F of Fisher
+and Snedecor if nothing but noise is left, whatever its size and facet.
+
+Specimens err along their whole curve, so that smooth is no sign there. But they scatter about the
+truth: what is alike in all is the model's. From each curve one takes what no change of the unknowns
+can explain, in a few smooth shapes; over the specimens the mean of these amplitudes is tested
+against their own scatter (Hotelling's T squared).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial.legendre import legval
 from scipy.spatial.distance import cdist
+from scipy.special import chdtr, chdtrc, fdtri
 
+from ..materials.forms.base import Array
+from ..notes import Note, NoteKind
 from .comparison import NoiseIs, Objective
 from .problem import FitProblem
 
-# How many neighbouring values of a residual err as one.
-#
-# A facet of a camera's correlation is wider than the step between two of its points, and what a
-# model cannot follow is smooth: neighbouring residuals are alike, and say less than as many
-# independent ones. Where the derivatives vary slowly over such a neighbourhood, the variance of
-# what is fitted grows by 1 + sum of rho(d) over the neighbours of a point, rho the correlation at
-# the distance d; the sum is broken off where rho is first no more than chance.
-
-Array = NDArray[np.float64]
-
-#: Rings around a point that others are compared with, unless told.
+#: Rings around a point that others are compared with, unless given.
 RINGS = 60
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
 #: Standard deviations of a correlation of independent values, which are no correlation.
-CHANCE = 2.0
-#: Of the largest extent: beyond, there are no neighbours any more, unless told.
+BY_CHANCE = 2.0
+#: Of the largest extent: beyond, there are no neighbours any more, unless given.
 REACH = 0.5
 
 
 def alike_in(objective: Objective, residual: Array) -> float:
-    """Of a comparison's residual (m,); 1 where its objective does not say where its values lie.
-
-    Blocks count alike, whatever they are normalised with.
-    """
+    """Return `alike` of a comparison's residual (m,); 1 where its objective has no places."""
     places = getattr(objective, "places", ())
     if not places:
         return 1.0
@@ -47,13 +54,10 @@ def alike_in(objective: Objective, residual: Array) -> float:
 def alike(
     residuals: Sequence[Array], places: Sequence[Array], reach: float = REACH, rings: int = RINGS
 ) -> float:
-    """Number of values that err as one, 1 where they are independent.
+    """Return the number of values that err as one, 1 where they are independent.
 
-    Parameters
-    ----------
-    residuals : blocks (n,), each of one quantity in one frame. places : (n, 2) mm or (n, 1) of
-        each. reach : of the largest extent, beyond which there are no neighbours any more.
-        rings : of distances, up to there.
+    residuals : blocks (n,), each of one quantity in one frame; they count alike. places : (n, 2) mm
+    or (n, 1) of each. reach : of the largest extent, where neighbours end. rings : of distances.
     """
     products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
     random = np.random.default_rng(0)
@@ -80,14 +84,14 @@ def alike(
     rho = products[known] / pairs[known]
     neighbours = pairs[known] / asked
     # Every pair was met twice, at most; of few pairs a correlation is chance.
-    chance = rho <= CHANCE / np.sqrt(np.maximum(pairs[known] / 2, 1.0))
+    chance = rho <= BY_CHANCE / np.sqrt(np.maximum(pairs[known] / 2, 1.0))
     positive = int(np.argmax(chance)) if chance.any() else len(rho)
     return float(1.0 + (rho * neighbours)[:positive].sum())
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """RMS residual of a comparison beside the noise of its data, both in `unit`s."""
+    """The RMS residual of a comparison beside the noise of its data, both in `unit`s."""
 
     rms: float
     noise: float
@@ -96,12 +100,11 @@ class Misfit:
 
     @property
     def ratio(self) -> float:
-        """How many times the noise is left."""
         return self.rms / self.noise if self.noise > 0 else np.inf
 
 
 def misfits(problem: FitProblem, residual: Array) -> dict[str, Misfit]:
-    """Of every comparison, by its name, from the residual (m,) of all."""
+    """Return the misfit of every comparison, by name, from the residual (m,) of all."""
     misfit, found = residual * problem.scale, {}
     for k, comparison in enumerate(problem.comparisons):
         rms = float(np.sqrt(np.mean(misfit[problem.rows(k)] ** 2)))
@@ -114,12 +117,11 @@ def misfits(problem: FitProblem, residual: Array) -> dict[str, Misfit]:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What counts as noise.
+    """The noise that a fit is assessed with.
 
-    level : by comparison, in the unit of its data (mm, N). alike : by comparison, how many
-    neighbouring values err as one. rows : (m,) of each residual the standard deviation that as
-    many independent values would have. least : (m,) the same of the least noise of each
-    comparison's data, all values independent.
+    level : by comparison, in the unit of its data (mm, N). alike : by comparison, number of
+    neighbours that err as one. rows : (m,) the standard deviation that as many independent values
+    would have. least : (m,) the least noise of each comparison's data, all values independent.
     """
 
     level: dict[str, float]
@@ -129,12 +131,12 @@ class Noise:
 
     @classmethod
     def of(cls, problem: FitProblem, residual: Array) -> Noise:
-        """The RMS of what is left (m,), but not less than the objective's least noise.
+        """Return the noise from a residual (m,), at least the objective's least noise.
 
         A misfit of zero (computed data) does not mean that a measurement would determine
-        everything. Neighbours that err as one (`correlation.alike`) count as one; a misfit that is
-        less than the noise does not tell them, and is taken for white unless the objective knows
-        better (`alike`, of the specimens behind a load curve).
+        everything. Neighbours that err as one count as one; a misfit below the noise does not show
+        them, and is taken for white unless the objective knows better (`alike`, of the specimens of
+        a load curve).
         """
         scale = problem.scale
         level, together = {}, {}
@@ -151,3 +153,383 @@ class Noise:
         known = [n.weight for n in problem.unknowns.nuisance.all if n.prior is not None]
         rows[len(rows) - len(known) :] = least[len(rows) - len(known) :] = known
         return cls(level, together, rows, least)
+
+
+#: Degree of the polynomials that are smooth over the whole sheet, and of the next ones.
+SMOOTH, NEXT = 4, 8
+
+
+#: Of so many fits in which nothing but noise is left, one is said to leave more.
+FALSE_ALARMS = 0.01
+
+
+#: Values of a block for every shape that is looked at, at least.
+LEAST_VALUES = 2
+
+
+#: A facet is not small beside the next shapes. If A of n values err as one, noise that is alike
+#: over a Gaussian has exp(2.6 to 3.5 sqrt(A / n)) times their power in the smooth ones (computed on
+#: a square, n / A from 40 to 400; white noise has as much).
+STEEPER = 3.5
+
+
+#: Blocks that are asked how many values err as one.
+FEW = 3
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """The part of a comparison's residual that is smooth over its whole sheet.
+
+    ratio : power in a smooth shape over that in one of the next. largest : of those that noise
+    alone exceeds in one of a hundred fits. rms : of the part beyond the noise's share, in `unit`s.
+    least : uncertainty of a mean of all values by the noise; less does not matter (rounding is
+    smooth, too). specimens : of strips, their number; then `ratio` is that of Hotelling's test and
+    `rms` that of what all have in common.
+    """
+
+    ratio: float
+    largest: float
+    rms: float
+    unit: str
+    least: float = 0.0
+    specimens: int = 0
+
+    @property
+    def significant(self) -> bool:
+        """Return whether it cannot be noise, and exceeds what the noise leaves open anyway."""
+        return self.ratio > self.largest and self.rms > self.least
+
+
+def discrepancies(
+    problem: FitProblem, residual: Array, doubt: Array | None = None
+) -> dict[str, Discrepancy]:
+    """Return the discrepancy of every comparison with places on a sheet, from the residual (m,).
+
+    doubt : (m,) part of the residual that the mesh may cause.
+    """
+    found = {}
+    doubt = np.zeros_like(residual) if doubt is None else doubt
+    for k, comparison in enumerate(problem.comparisons):
+        objective = comparison.objective
+        places = getattr(objective, "places", ())
+        if not places or places[0].shape[1] != 2:
+            continue
+        rows = problem.rows(k)
+        ends = np.cumsum(objective.sizes)[:-1]
+        blocks, of_mesh = (
+            np.split(whole[rows] * problem.scale[rows], ends) for whole in (residual, doubt)
+        )
+        one = discrepancy(blocks, of_mesh, places, problem.unknowns.count, objective.unit)
+        if one is not None:
+            least = objective.least_noise / float(np.sqrt(len(residual[rows])))
+            found[comparison.name] = replace(one, least=least)
+    return found
+
+
+def discrepancy(
+    blocks: Sequence[Array],
+    doubts: Sequence[Array],
+    places: Sequence[Array],
+    unknowns: int,
+    unit: str,
+) -> Discrepancy | None:
+    """Return the discrepancy of blocks (n,) at places (n, 2) mm; None where values are too few.
+
+    Blocks count alike. A block's doubt is taken off its power in the smooth shapes. `unknowns` of
+    the fit have taken as many smooth shapes out of the residual.
+    """
+    usable = [
+        (block, doubt, at)
+        for block, doubt, at in zip(blocks, doubts, places, strict=True)
+        if len(block) >= LEAST_VALUES * _shapes(NEXT) and block.any()
+    ]
+    if not usable:
+        return None
+    # Power in units of each block's own, and shapes.
+    smooth, following, count = np.zeros(2), np.zeros(2), _shapes(SMOOTH)
+    before, shapes, rest = np.zeros((0, 2)), np.zeros((0, 0)), []
+    left, of_next, values = 0.0, 0.0, 0
+    for block, doubt, at in usable:
+        if at is not before and not np.array_equal(at, before):
+            shapes, before = smooth_shapes(at), at
+        amplitude, own = shapes.T @ block, float(np.mean(block**2))
+        share, beyond = amplitude**2, -((shapes[:, :count].T @ doubt) ** 2).sum()
+        beyond += share[:count].sum()
+        smooth += beyond / own, count
+        following += share[count:].sum() / own, shapes.shape[1] - count
+        left, of_next = left + beyond, of_next + count * share[count:].mean()
+        values += len(block)
+        rest.append(block - shapes @ amplitude)
+    step = -(-len(rest) // FEW)
+    together = alike(rest[::step], [at for _, _, at in usable][::step])
+    independent = values / len(usable) / together
+    free = smooth[1] - unknowns
+    if free < 1 or not following[0] > 0:
+        return None
+    steeper = float(np.exp(STEEPER * np.sqrt((1.0 - 1.0 / together) / independent)))
+    ratio = (smooth[0] / free) / (following[0] / following[1])
+    largest = float(fdtri(free, following[1], 1 - FALSE_ALARMS)) * steeper
+    rms = np.sqrt(max(left - steeper * of_next, 0.0) / values)
+    return Discrepancy(float(ratio), largest, float(rms), unit)
+
+
+def smooth_shapes(places: Array) -> Array:
+    """Return (n, shapes) orthonormal over the places, polynomials of ever higher degree."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    unit = 2 * (places - low) / np.where(high > low, high - low, 1.0) - 1.0
+    powers = [(i, total - i) for total in range(NEXT + 1) for i in range(total, -1, -1)]
+    x, y = (
+        np.stack([legval(one, np.eye(NEXT + 1)[i]) for i in range(NEXT + 1)], axis=1)
+        for one in unit.T
+    )
+    columns = np.stack([x[:, i] * y[:, j] for i, j in powers], axis=1)
+    return np.asarray(np.linalg.qr(columns)[0])
+
+
+def _shapes(degree: int) -> int:
+    return (degree + 1) * (degree + 2) // 2
+
+
+def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
+    """Return notes where more is left than noise can be."""
+    return [
+        Note(NoteKind.DISCREPANCY, _words(one), name)
+        for name, one in found.items()
+        if one.significant
+    ]
+
+
+def _words(one: Discrepancy) -> str:
+    if one.specimens:
+        return (
+            f"{one.rms:.2g} {one.unit} of what the fit leaves is alike in all {one.specimens} "
+            f"specimens (Hotelling's F is {one.ratio:.3g}; chance gives {one.largest:.3g} in one "
+            "of a hundred): the form of the law or the model is wrong (moduli that depend on more "
+            "than their own strain, gauge lengths, a preload), and the moduli are off by more "
+            "than their bands say"
+        )
+    return (
+        f"{one.rms:.2g} {one.unit} of what the fit leaves is smooth over the whole sheet "
+        f"({one.ratio:.3g} times the power that noise has in such shapes; chance gives "
+        f"{one.largest:.3g} in one of a hundred): the form of the law or the model is wrong "
+        "(thickness option, axes, pressures, a sheet taken for flat), and the moduli are off "
+        "by more than their bands say"
+    )
+
+
+#: Shapes that are tested, at most, and degrees of polynomials among which they are found.
+SHAPES, DEGREES = 2, 8
+
+
+#: Of the whole curve, that a specimen must cover to count.
+COVERED = 0.8
+
+
+#: Of the largest singular value: below, a slope says nothing of its own; of a shape, likewise.
+NOTHING = 1e-6
+
+
+LEFT = 1e-3
+
+
+def differences_of_all(
+    problem: FitProblem, residual: Array, jacobian: Array | None
+) -> dict[str, Discrepancy]:
+    """Return discrepancies of the comparisons with values of several specimens along a curve."""
+    found: dict[str, Discrepancy] = {}
+    if jacobian is None:
+        return found
+    for k, comparison in enumerate(problem.comparisons):
+        objective = comparison.objective
+        whose = getattr(objective, "specimens", None)
+        if whose is None:
+            continue
+        rows, (at,) = problem.rows(k), objective.places  # type: ignore[attr-defined]
+        scale = problem.scale[rows]
+        off, slopes = residual[rows] * scale, jacobian[rows] * scale[:, None]
+        some = [np.flatnonzero(whose == number) for number in np.unique(whose)]
+        left, places, steep = ([v[own] for own in some] for v in (off, at[:, 0], slopes))
+        one = alike_in_all(left, places, steep, objective.unit)
+        if one is not None:
+            found[comparison.name] = one
+    return found
+
+
+def alike_in_all(
+    residuals: Sequence[Array], places: Sequence[Array], slopes: Sequence[Array], unit: str
+) -> Discrepancy | None:
+    """Return what specimens have in common beside the model, in the residuals' unit.
+
+    residuals : (n,) of each specimen, model less measured. places : (n,) along its curve. slopes :
+    (n, unknowns) of the residual. `rms` is that of what no change of the unknowns can follow. None
+    with fewer than three specimens that cover most of the curve with enough points.
+    """
+    low, high = (end(end(own) for own in places) for end in (min, max))
+    if not high > low:
+        return None
+    whole = np.concatenate(slopes)
+    _, size, axes = np.linalg.svd(whole, full_matrices=False)
+    kept = axes[size > NOTHING * size[0]] if size[0] > 0 else axes[:0]
+    some = [
+        k
+        for k, own in enumerate(places)
+        if np.ptp(own) >= COVERED * (high - low) and len(own) >= len(kept) + SHAPES + 1
+    ]
+    count = min(SHAPES, len(some) - 2)
+    if count < 1:
+        return None
+    along = [2 * (own - low) / (high - low) - 1.0 for own in places]
+    shapes = _beside(whole @ kept.T, np.concatenate(along), count)
+    count = shapes.shape[1]
+    if not count:
+        return None  # the law can follow whatever is smooth
+    amplitudes = []
+    for k in some:
+        columns = np.column_stack([slopes[k] @ kept.T, _values(along[k], shapes)])
+        amplitudes.append(np.linalg.lstsq(columns, residuals[k], rcond=None)[0][-count:])
+    each = np.array(amplitudes)
+    mean, specimens = each.mean(axis=0), len(some)
+    spread = np.atleast_2d(np.cov(each.T))
+    common = _values(np.concatenate(along), shapes) @ mean
+    followed = np.linalg.qr(whole @ kept.T)[0] if len(kept) else np.zeros((len(common), 0))
+    rms = float(np.sqrt(np.mean((common - followed @ (followed.T @ common)) ** 2)))
+    if not np.linalg.eigvalsh(spread).min() > 0:
+        return None  # specimens that do not differ at all: nothing to test against
+    square = specimens * float(mean @ np.linalg.solve(spread, mean))
+    ratio = square * (specimens - count) / (count * (specimens - 1))
+    largest = float(fdtri(count, specimens - count, 1 - FALSE_ALARMS))
+    return Discrepancy(ratio, largest, rms, unit, specimens=specimens)
+
+
+def _beside(slopes: Array, along: Array, count: int) -> Array:
+    """Return (DEGREES + 1, count) Legendre coefficients of the smoothest shapes beside the slopes.
+
+    A shape that they can follow, with those taken before it, says nothing of the form.
+    """
+    unit = np.linalg.qr(slopes)[0] if slopes.shape[1] else np.zeros((len(along), 0))
+    shapes = []
+    for row in np.eye(DEGREES + 1):
+        every = legval(along, row)
+        left = every - unit @ (unit.T @ every)
+        left -= unit @ (unit.T @ left)
+        size = float(np.linalg.norm(left))
+        if size**2 > LEFT * float(every @ every):
+            shapes.append(row)
+            unit = np.column_stack([unit, left / size])
+        if len(shapes) == count:
+            break
+    return np.array(shapes).reshape(-1, DEGREES + 1).T
+
+
+def _values(along: Array, shapes: Array) -> Array:
+    """Return (n, count) of shapes at places from -1 to 1."""
+    return np.stack([legval(along, column) for column in shapes.T], axis=1)
+
+
+#: Of so many fits in which the noise is as it is given, one is said to be off to a side.
+CHANCE = 0.01
+
+
+#: Of the noise: less is no matter, however many values say it (rounding, a mesh).
+MATTERS = 0.1
+
+
+@dataclass(frozen=True)
+class NoiseTest:
+    """A comparison's residual beside the noise given.
+
+    values : how many; independent : as how many independent ones they count; free : of those, less
+    what the unknowns take up.
+    """
+
+    misfit: Misfit
+    values: int
+    independent: float
+    free: float
+
+    @property
+    def square(self) -> float:
+        return self.independent * self.misfit.ratio**2
+
+    @property
+    def above(self) -> float:
+        """Return the probability that such noise leaves as much, or more."""
+        return float(chdtrc(self.free, self.square))
+
+    @property
+    def below(self) -> float:
+        """Return the probability that it leaves as little, or less."""
+        return float(chdtr(self.free, self.square))
+
+    @property
+    def note_kind(self) -> NoteKind | None:
+        """Return the kind of note to give; None where the residual is as expected."""
+        expected = np.sqrt(self.free / self.independent)
+        if self.above < CHANCE and self.misfit.ratio > (1 + MATTERS) * expected:
+            return NoteKind.ABOVE_NOISE
+        if self.below < CHANCE and self.misfit.ratio < (1 - MATTERS) * expected:
+            return NoteKind.BELOW_NOISE
+        return None
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the entry of result.json."""
+        return {
+            "values": self.values,
+            "independent": self.independent,
+            "chi_square": self.square,
+            "degrees_of_freedom": self.free,
+            "probability_of_more": self.above,
+            "probability_of_less": self.below,
+        }
+
+
+def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
+    """Return tests of the comparisons with given noise, by name; residual (m,) of all.
+
+    Neighbours that err as one count as one. The unknowns are shared among the comparisons as their
+    independent values are.
+    """
+    given: dict[str, tuple[Misfit, int, float]] = {}
+    total, every = 0.0, misfits(problem, residual)
+    if not any(misfit.noise_is == "given" for misfit in every.values()):
+        return {}
+    for k, (name, misfit) in enumerate(every.items()):
+        own = residual[problem.rows(k)]
+        independent = len(own) / alike_in(problem.comparisons[k].objective, own)
+        total += independent
+        if misfit.noise_is == "given" and misfit.noise > 0:
+            given[name] = misfit, len(own), independent
+    taken = problem.unknowns.count / max(total, 1.0)
+    return {
+        name: NoiseTest(misfit, values, independent, max(independent * (1.0 - taken), 1.0))
+        for name, (misfit, values, independent) in given.items()
+    }
+
+
+def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
+    """Return notes where more, or less, is left than the noise given can leave."""
+    return [
+        Note(kind, _words_chi_square(test, kind), name)
+        for name, test in tests.items()
+        if (kind := test.note_kind) is not None
+    ]
+
+
+def _words_chi_square(test: NoiseTest, kind: NoteKind) -> str:
+    m = test.misfit
+    left = (
+        f"the fit leaves {m.rms:.3g} {m.unit} RMS, {m.ratio:.3g} times the noise given "
+        f"({m.noise:.3g} {m.unit}; {test.values} values count as {test.independent:.3g} "
+        "independent ones)"
+    )
+    if kind == NoteKind.ABOVE_NOISE:
+        return (
+            f"{left}: the noise is given too small, or model or data are off by more than noise, "
+            "and the uncertainty reckons with what is left as if it were noise"
+        )
+    return (
+        f"{left}: the noise is given too large, and the uncertainty, which reckons with it, is "
+        "larger than the data say"
+    )

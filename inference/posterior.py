@@ -1,4 +1,10 @@
-"""What a fit knows of its unknowns: a normal distribution within their bounds."""
+"""The posterior of a fit: a normal distribution within linear inequalities, and draws from it.
+
+Draws outside are drawn again as long as enough of them lie inside. Where hardly any does (the
+optimum lies on bounds), every draw is the end of a walk inside, along random directions, to a place
+drawn from the normal distribution on that line between its ends (hit and run). The directions have
+the shape of what is allowed and likely, so that close bounds do not stop the walk.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +13,12 @@ from functools import cached_property
 
 import numpy as np
 import quadprog
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, ndtri_exp
 
-from ..materials.forms.base import modulus_rows
+from ..materials.forms.base import Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
-
-# Draws from a normal distribution within linear inequalities.
-#
-# Draws outside are drawn again as long as enough of them lie inside. Where hardly any does (the
-# optimum lies on bounds), every draw is the end of a walk of its own inside, along random
-# directions, to a place drawn from the normal distribution on that line between its ends (hit and
-# run). The directions are those of the shape of what is allowed and likely, so that bounds that
-# are close to each other do not stop the walk.
-
-Array = NDArray[np.float64]
 
 #: Draws a wanted one, before it is a walk.
 MOST_DRAWS = 20
@@ -52,10 +47,8 @@ def truncated_draws(
     count: int,
     random: np.random.Generator,
 ) -> Array:
-    """`count` draws (count, n) of a normal distribution, given A y >= c.
+    """Return `count` draws (count, n) of a normal distribution, given A y >= c.
 
-    Parameters
-    ----------
     mean : (n,), which may lie outside. covariance : (n, n). inequalities : A (k, n), c (k,).
     allowed : (n,) a point that keeps them, up to rounding.
     """
@@ -82,7 +75,7 @@ def truncated_draws(
 def _without_equalities(
     rows: Array, least: Array, centre: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """The same within the plane that pairs of opposite inequalities leave."""
+    """Return the same within the plane that pairs of opposite inequalities leave."""
     if not len(rows):
         return rows, least, centre, np.eye(len(centre))
     opposite = rows @ rows.T < -1 + CLOSE
@@ -99,7 +92,6 @@ def _without_equalities(
 def _drawn_again(
     rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
 ) -> Array:
-    """Up to `count` draws that are inside, of so many as are worth it."""
     inside: list[Array] = []
     for _ in range(MOST_DRAWS):
         draws = centre + random.standard_normal((count, len(centre)))
@@ -112,7 +104,6 @@ def _drawn_again(
 def _walked(
     rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
 ) -> Array:
-    """Ends of `count` walks side by side."""
     start, root = _start(rows, least, centre)
     # Most inequalities are so far away that no walk meets them.
     near = rows @ centre - least < np.linalg.norm(start - centre) + BEYOND
@@ -133,7 +124,7 @@ def _walked(
 
 
 def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
-    """Standard normal numbers between ends (n,), drawn by their distribution function."""
+    """Return standard normal numbers between ends (n,), drawn by their distribution function."""
     flip = lower > 0  # the lower tail has the digits
     low, high = np.where(flip, -upper, lower), np.where(flip, -lower, upper)
     share = random.random(len(low))
@@ -145,9 +136,9 @@ def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
 
 
 def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
-    """A point inside, and a root (n, n) of the shape of what is likely around it.
+    """Return a point inside, and a root (n, n) of the shape of what is likely around it.
 
-    It is where  |z - centre|^2 / 2 - sum log(rows z - least)  is least, by Newton's method, and the
+    It minimises |z - centre|^2 / 2 - sum log(rows z - least) by Newton's method; the shape is the
     inverse of the curvature there: round in a wide place, flat between bounds that are close.
     """
     place = _inside(rows, least, centre)
@@ -168,15 +159,14 @@ def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
 
 
 def _root(factor: Array) -> Array:
-    """A root of the inverse of factor' factor, which itself would lose all digits between bounds
-    that nearly meet."""
+    """Return a root of the inverse of factor' factor, which would lose all digits if formed."""
     upper: Array = np.linalg.qr(factor).R
     upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
     return np.asarray(solve_triangular(upper, np.eye(len(upper))))
 
 
 def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:
-    """Value (infinite outside), slope, and a factor F of the curvature F' F."""
+    """Return value (infinite outside), slope, and a factor F of the curvature F' F."""
     away, room = place - centre, rows @ place - least
     if (room <= 0).any():
         return np.inf, away, np.eye(len(away))
@@ -186,7 +176,7 @@ def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[fl
 
 
 def _inside(rows: Array, least: Array, centre: Array) -> Array:
-    """The point nearest to the centre that is some way inside."""
+    """Return the point nearest to the centre that is some way inside."""
     for way in INSIDE:
         try:
             return np.asarray(
@@ -201,12 +191,9 @@ def _inside(rows: Array, least: Array, centre: Array) -> Array:
 class Posterior:
     """The unknowns as the noise of the data leaves them.
 
-    Parameters
-    ----------
-    unknowns : their order, units, bounds and inequalities.
-    best : (n,) the best of them, which keep the inequalities.
-    centre : (n,) where they would be without inequalities: where none binds, the best.
-    covariance : (n, n) in the products of their units, without inequalities.
+    unknowns : their order, units, bounds and inequalities. best : (n,), keeps the inequalities.
+    centre : (n,) without inequalities: where none binds, the best. covariance : (n, n) without
+    them.
     """
 
     unknowns: Unknowns
@@ -216,12 +203,11 @@ class Posterior:
 
     @property
     def sigma(self) -> Array:
-        """(n,) one standard deviation of each unknown, in its unit."""
         return np.sqrt(np.diag(self.covariance))
 
     @cached_property
     def coefficients(self) -> Array:
-        """(size + nuisance, same): of the free coefficients, MPa, and the nuisance in its units."""
+        """Return the covariance of the free coefficients, MPa, and of the nuisance in its units."""
         n, size = self.unknowns.count, self.unknowns.size
         t = np.eye(n)
         t[:size, :size] = self.unknowns.to_coefficients
@@ -229,37 +215,31 @@ class Posterior:
 
     @property
     def of_law(self) -> Array:
-        """(size, size) MPa^2, covariance of the law's free coefficients, in their order."""
+        """Return (size, size) MPa^2, covariance of the law's free coefficients, in their order."""
         return self.coefficients[: self.unknowns.size, : self.unknowns.size]
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Of the rows of `coefficients`."""
+        """Return the labels of the rows of `coefficients`."""
         return (*self.unknowns.labels, *self.unknowns.nuisance_names)
 
     @property
     def correlations(self) -> Array:
-        """The same as `coefficients`, each in its own standard deviation: between -1 and 1."""
+        """Return the correlations that belong to `coefficients`."""
         sigma = np.sqrt(np.diag(self.coefficients))
         unit = np.where(sigma > 0, sigma, 1.0)
         return np.asarray(self.coefficients / unit / unit[:, None])
 
     def moved(self, step: Array, centre: Array, share: float) -> Posterior:
-        """The same about other unknowns.
+        """Return the posterior about best + step and another centre.
 
-        Parameters
-        ----------
-        step : (n,) from the best to the other best. centre : (n,) the other centre. share : of the
-            step, by which the other best is uncertain (one standard deviation).
+        share : of the step, by which the other best is uncertain (one standard deviation).
         """
         covariance = self.covariance + share**2 * np.outer(step, step)
         return Posterior(self.unknowns, self.best + step, centre, covariance)
 
     def sample(self, count: int, random: np.random.Generator) -> Array:
-        """`count` draws of all unknowns (count, n), all of which keep the inequalities.
-
-        They are of the normal distribution within the inequalities (see `truncated`).
-        """
+        """Return `count` draws of all unknowns (count, n), all of which keep the inequalities."""
         return truncated_draws(
             self.centre, self.covariance, self.unknowns.inequalities, self.best, count, random
         )
@@ -267,7 +247,7 @@ class Posterior:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """`count` laws as the data leave them, all within the bounds: `law` with other numbers."""
+        """Return `count` random laws that the data allow, all within the bounds."""
         return [self.unknowns.law(law, y) for y in self.sample(count, random)]
 
 
@@ -278,11 +258,11 @@ LEVEL, DRAWS = 0.95, 1000
 def bands_of(
     posterior: Posterior, law: HypoelasticLaw, strains: dict[str, Array]
 ) -> dict[str, Array]:
-    """(2, n) MPa by modulus: lower and upper end of its band at strains (n,).
+    """Return (2, n) MPa by modulus, the ends of its band at strains (n,).
 
-    Of draws from the posterior, which keep the inequalities of the fit, so that what lies on a
-    bound is uncertain to one side. The law's own modulus is always inside: where the mesh's error
-    is told and not taken out, the band reaches from there to what finer meshes would give.
+    From draws that keep the inequalities, so that what lies on a bound is uncertain to one side.
+    The law's own modulus is always inside: where the mesh error is not taken out, the band reaches
+    from there to the moduli of finer meshes.
     """
     unknowns = posterior.unknowns
     drawn = posterior.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
+from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Blocks, Comparison
 from .unknowns import RandomStarts, Starts, Unknowns
-
-Array = NDArray[np.float64]
 
 #: Status of an analysis that was kept earlier, and ended well then.
 FROM_CACHE = "ok, from the cache"
@@ -22,10 +21,10 @@ FROM_CACHE = "ok, from the cache"
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """An analysis that ended well, seen by the optimiser.
+    """An analysis that ended well, as the optimiser sees it.
 
-    coefficients (free,) MPa; residual (m,); jacobian (m, unknowns) or None; value: e of Eq. 3.7
-    or 4.8; histories: one a comparison; stable: every equilibrium that has to be
+    coefficients : (free,) MPa. residual : (m,). value : e of Eq. 3.7 or 4.8. jacobian : (m,
+    unknowns) or None. histories : one a comparison. stable : every equilibrium that has to be
     (`Comparison.must_be_stable`), as far as the solver looked.
     """
 
@@ -39,12 +38,11 @@ class Evaluation:
 
     @property
     def from_cache(self) -> bool:
-        """Whether nothing ran: every run of it was kept earlier."""
+        """Return whether every run of it was in the cache."""
         return bool(self.histories) and all(h.from_cache for h in self.histories)
 
     @property
     def status(self) -> str:
-        """What a history says of it."""
         if self.stable:
             return FROM_CACHE if self.from_cache else "ok"
         return next(filter(None, (instability(h.unstable) for h in self.histories)))
@@ -58,16 +56,11 @@ Watch = Callable[[Array, float | None, str, str], None]
 class FitProblem:
     """Comparisons, a law and unknowns of one fit; an analysis runs every comparison once.
 
-    After the blocks of the comparisons comes one of the nuisance unknowns that have a prior.
-
-    `law` carries nu12, strain range and thickness option; its beta is replaced, and nu12 where it
-    is an unknown. `surrogate`: the
-    same problem for a solver that differentiates, where this one's does not. `starts`: where starts
-    begin.
-
-    Raises
-    ------
-    InputError : no comparison, two of one name, or one whose nuisance is not among the unknowns.
+    After the blocks of the comparisons comes one of the nuisance unknowns that have a prior. law :
+    gives nu12, strain range and thickness option; its beta is replaced, and nu12 where it is
+    unknown. surrogate : the same problem for a solver that differentiates, where this one's does
+    not. Raises InputError without comparisons, for two of one name, or nuisance that is not among
+    the unknowns.
     """
 
     comparisons: tuple[Comparison, ...]
@@ -98,33 +91,32 @@ class FitProblem:
 
     @property
     def solver(self) -> Solver:
-        """The solver that counts (each comparison has one of its own, of the same kind)."""
+        """Return the solver that counts (each comparison has one of its own, of the same kind)."""
         return self.comparisons[0].solver
 
     @property
     def differentiates(self) -> bool:
-        """Whether its solver gives exact derivatives."""
         return isinstance(self.solver, DifferentiatingSolver)
 
     @property
     def scale(self) -> Array:
-        """(m,): units of its data (mm, N), or of the unknown, in one unit of each residual."""
+        """Return (m,) units of the data (mm, N), or of the unknown, per unit of residual."""
         own = [c.objective.scale for c in self.comparisons]
         return np.concatenate([*own, 1.0 / self.unknowns.nuisance.priors[1]])
 
     def rows(self, number: int) -> slice:
-        """Rows of the residual that belong to comparison `number`."""
+        """Return the rows of the residual of comparison `number`."""
         sizes = [sum(c.objective.sizes) for c in self.comparisons]
         return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
 
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
-        """The same problem for other solvers, one a comparison: a surrogate."""
+        """Return the same problem for other solvers, one a comparison: a surrogate."""
         pairs = zip(self.comparisons, solvers, strict=True)
         others = tuple(comparison.by(solver) for comparison, solver in pairs)
         return FitProblem(others, self.law, self.unknowns)
 
     def part(self, numbers: Sequence[int]) -> FitProblem:
-        """The fit to some of the comparisons, by their numbers; whoever watches hears which."""
+        """Return the fit to some comparisons, by number; `watch` gets their names."""
         some = tuple(self.comparisons[k] for k in numbers)
         names = ", ".join(c.name for c in some)
 
@@ -137,12 +129,12 @@ class FitProblem:
         return FitProblem(some, self.law, self.unknowns, watch, analyses=self.analyses)
 
     def shift(self, here: Sequence[History], there: Sequence[History]) -> None:
-        """From now on reckon as if the solver gave `here` where it gives `there`."""
+        """Shift the objectives as if the solver gave `here` where it gives `there`."""
         for comparison, h, t in zip(self.comparisons, here, there, strict=True):
             comparison.objective = comparison.objective.shifted(h, t)
 
     def reset(self) -> None:
-        """Forget the warm start and the count: every start of a study begins alike."""
+        """Reset warm start and counts: every start of a study begins alike."""
         self.analyses, self.unstable, self.cached = 0, 0, 0
         self.failure, self.warm_starts = "", True
         for comparison in self.comparisons:
@@ -153,7 +145,7 @@ class FitProblem:
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run every comparison at unknowns y; None when one did not end well (Eqs 3.8, 4.9).
 
-        `warm`: start each increment from the last differentiated solution and its slope.
+        warm : start each increment from the last differentiated solution and its slope.
         """
         self.analyses += 1
         law = self.unknowns.law(self.law, y)
@@ -187,22 +179,17 @@ class FitProblem:
             of_priors = cost[:, None] * np.eye(self.unknowns.count)[places]
             jacobian = np.concatenate([*jacobians, of_priors])
         pairs = zip(self.comparisons, histories, strict=True)
-        point = Evaluation(
-            y.copy(),
-            law.beta[list(free)],
-            whole,
-            value,
-            jacobian,
-            tuple(histories),
-            all(h.stable is not False for c, h in pairs if c.must_be_stable),
-        )
+        stable = all(h.stable is not False for c, h in pairs if c.must_be_stable)
+        coefficients = law.beta[list(free)]
+        point = Evaluation(y.copy(), coefficients, whole, value, jacobian, tuple(histories), stable)
         self.unstable += not point.stable
         self.cached += point.from_cache
         self._report(y, value, point.status)
         return point
 
     def _by_unknowns(self, comparison: Comparison, slope: Array) -> Array:
-        """(m, unknowns) from the slope by free entries of beta and the comparison's nuisance."""
+        """Return (m, unknowns) from the slope by free entries of beta and the comparison's
+        nuisance."""
         p = self.unknowns
         jacobian = np.zeros((len(slope), p.count))
         jacobian[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
@@ -221,21 +208,13 @@ class FitProblem:
 
 @dataclass(eq=False)
 class WeightedProblem(FitProblem):
-    """The same comparisons and unknowns; every residual is multiplied by a factor.
-
-    Parameters
-    ----------
-    factors : (m,), zero for what does not count.
-    """
+    """The same comparisons and unknowns with every residual multiplied by a factor, (m,)."""
 
     factors: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
-        """The fit to a problem's data, weighted anew; the other problem is left as it is.
-
-        What was differentiated last in the other problem is where the first analysis starts from.
-        """
+        """Return the fit to a problem's data, weighted anew, with the problem's warm start."""
         comparisons = tuple(replace(comparison) for comparison in problem.comparisons)
         return cls(comparisons, problem.law, problem.unknowns, factors=factors)
 
@@ -245,7 +224,7 @@ class WeightedProblem(FitProblem):
         return None if point is None else self.seen(point)
 
     def seen(self, point: Evaluation) -> Evaluation:
-        """An analysis of the problem without factors as this one sees it: nothing is run."""
+        """Return an analysis of the problem without factors as this one sees it: nothing is run."""
         residual, slope = self.factors * point.residual, point.jacobian
         return replace(
             point,
@@ -266,9 +245,8 @@ RUNS_USED_UP = "runs used up"
 class Optimum:
     """The best feasible point of one start.
 
-    status : how the fit ended. analyses : all of them; runs : those of them that the solver that
-    counts ran while a surrogate led (0 where there is none). failure : why the solver that counts
-    failed, where that and nothing else ended the fit.
+    runs : of the analyses, those by the solver that counts while a surrogate led (0 without one).
+    failure : why that solver failed, where nothing else ended the fit.
     """
 
     best: Evaluation
@@ -279,10 +257,8 @@ class Optimum:
 
     @property
     def value(self) -> float:
-        """The objective e at the best feasible point."""
         return self.best.value
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """The law's free coefficients (MPa) at the best feasible point."""
         return self.best.coefficients

@@ -1,11 +1,9 @@
-"""Which residuals of a fit count how often when its data are drawn again.
+"""Draw the data of a fit again: which residuals count how often.
 
-Units (frames, specimens, whole tests) are drawn with replacement, each among its own group, and
-count as often as they were drawn. A block of the objective that is of one unit counts so many
-times; in a block that several units share, the mean of the squares is over what was drawn.
+Units (frames, specimens, whole tests) are drawn with replacement, each among its own group. A block
+of the objective that is of one unit counts as often as that was drawn; in a block that several
+units share, the mean of the squares is over what was drawn.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..materials.forms.base import Array
 from .problem import FitProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """What is drawn as a whole. rows : (m,) bool, residuals of a problem that are of it."""
+    """A part of the data that is drawn as a whole; rows : (m,) bool, its residuals."""
 
     name: str
     rows: NDArray[np.bool_]
@@ -35,8 +32,8 @@ class Group:
     units: Sequence[Unit]
 
 
-def drawn(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
-    """How often each unit of each group was drawn: as many as there are, with replacement."""
+def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
+    """Return the number of draws of each unit of each group: as many as there are units."""
     return [
         random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
         for group in groups
@@ -46,10 +43,7 @@ def drawn(groups: Sequence[Group], random: np.random.Generator) -> list[list[int
 def factors_of(
     problem: FitProblem, groups: Sequence[Group], counts: Sequence[Sequence[int]]
 ) -> Array:
-    """(m,) factors of the residuals with units that count so often; what is of no unit counts once.
-
-    Priors are no data and count once.
-    """
+    """Return (m,) factors of the residuals for counts of the units; all else counts once."""
     times = np.ones(len(problem.blocks.of))
     for group, own in zip(groups, counts, strict=True):
         for unit, often in zip(group.units, own, strict=True):
@@ -63,11 +57,9 @@ def factors_of(
 
 
 def rows_of(problem: FitProblem, points: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """(m,) which residuals are of points, by comparison.
+    """Return (m,) which residuals are of points, by comparison.
 
-    Raises
-    ------
-    InputError : the objective of a comparison does not say it (`of_points`).
+    Raises InputError where an objective cannot say (`of_points`).
     """
     found = np.zeros(len(problem.blocks.of), dtype=bool)
     for k, comparison in enumerate(problem.comparisons):
@@ -87,16 +79,12 @@ Fold = Mapping[str, NDArray[np.bool_]]
 
 
 def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
-    """Which points each of `count` folds gives to the fit, by comparison.
+    """Return the points that each of `count` folds gives to the fit, by comparison.
 
-    A comparison of several specimens loses whole specimens, because the points of one err
-    together; one of a single specimen loses points drawn at random. Each point is left out exactly
-    once where there are `count` specimens, or fewer than two.
-
-    Parameters
-    ----------
-    specimens : (n,) number of the specimen of each point, by comparison; those that are not named
-        lose nothing.
+    A comparison of several specimens loses whole specimens, because the points of one err together;
+    one of a single specimen loses points drawn at random. Each point is left out exactly once where
+    there are `count` specimens, or fewer than two. specimens : (n,) number of the specimen of each
+    point, by comparison; others lose nothing.
     """
     random = np.random.default_rng(seed)
     place = {}

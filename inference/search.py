@@ -1,35 +1,29 @@
-"""One fit from one start, by any method, for any solver."""
-
-from __future__ import annotations
+"""Fit from one start, by any method, for any solver."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoFeasibleStart
+from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from .comparison import Comparison, Objective
-from .methods import method_named
-from .methods.base import FitOptions, Method
-from .methods.descent import descend
+from .descent import descend
+from .methods import FitOptions, Method, method_named
 from .problem import CONVERGED, LEVEL, RUNS_USED_UP, Evaluation, FitProblem, Optimum
 from .unknowns import MOST_DRAWS, LawBounds, Unknowns
 
-Array = NDArray[np.float64]
-
 
 def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
-    """Unknowns at the least of the misfit of the comparisons that lead in; `start` without any.
+    """Return unknowns at the optimum of the comparisons that lead in; `start` without any.
 
-    Those of the lowest stage are matched first, then those of the lowest two, and so on; the fit
-    of all begins where the last but one ended. From a random start nearly every step of a fit of
-    several tests can end without an equilibrium of one that is hard to run, and the fit creeps:
-    strips along the yarns get to their optimum from anywhere; from there a bias strip does, which
-    mostly has the shear modulus to find; and from there all tests together. `start` also where a
-    comparison fails, or is unstable, at the optimum of the others.
+    Those of the lowest stage are matched first, then those of the lowest two, and so on. From a
+    random start nearly every step of a fit of several tests can end without an equilibrium of one
+    that is hard to run: strips along the yarns get to their optimum from anywhere; from there a
+    bias strip does, which mostly has the shear modulus to find; and from there all tests together.
+    Returns `start` also where a comparison fails, or is unstable, at the optimum of the others.
     """
     stages = sorted({c.stage for c in problem.comparisons})
     if len(stages) < 2:
@@ -46,13 +40,6 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     return y if point is not None and point.stable else start
 
 
-# A fit to a solver without derivatives: a surrogate leads, the other corrects it.
-#
-# Minimised is surrogate(beta) + [other(beta_k) - surrogate(beta_k)] - data , with the surrogate's
-# exact Jacobian; the other solver then runs once at the new beta, and so on until its own
-# objective is level. A step that worsens that objective is shortened (trust region). What counts,
-# and what is returned, is always the other solver's objective.
-
 NOT_WORTH_A_RUN = 0.1  # relative decrease of e by one run
 SHORTER = 0.5
 MOST_SHORTER = 3  # steps in a row
@@ -61,14 +48,12 @@ MOST_SHORTER = 3  # steps in a row
 def corrected_fit(
     problem: FitProblem, start: Array, method: Method, options: FitOptions
 ) -> Optimum | None:
-    """Fit from the unknowns `start`; None when the other solver fails wherever the surrogate leads.
+    """Fit a solver without derivatives, led by a surrogate; None when it fails wherever that leads.
 
-    Parameters
-    ----------
-    problem : with the solver that counts, and a `surrogate` that differentiates.
-    method : for the surrogate's fits.
-    options : `max_analyses` of the surrogate in each of its fits, `max_runs` of the solver that
-        counts.
+    Minimised is surrogate(beta) + [other(beta_k) - surrogate(beta_k)] - data, with the surrogate's
+    exact Jacobian; the other solver then runs once at the new beta, and so on until its own
+    objective, which alone counts, is level. A step that worsens that is shortened (trust region).
+    method, `max_analyses` : of each fit of the surrogate; `max_runs` : of the solver that counts.
     """
     surrogate = problem.surrogate
     assert surrogate is not None
@@ -107,7 +92,7 @@ def corrected_fit(
 
 
 def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:
-    """Whether a run that went wrong was not much worse than the best."""
+    """Return whether a run that went wrong was not much worse than the best."""
     if point is None or best is None or not point.stable:
         return False
     return point.value < (1 + NOT_WORTH_A_RUN) * best.value
@@ -115,7 +100,7 @@ def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:
 
 @contextmanager
 def _corrections_of(surrogate: FitProblem) -> Iterator[list[Objective]]:
-    """The surrogate's own objectives, which it has again at the end."""
+    """Yield the surrogate's own objectives and restore them at the end."""
     objectives = [comparison.objective for comparison in surrogate.comparisons]
     try:
         yield objectives
@@ -129,7 +114,7 @@ def _restore(surrogate: FitProblem, objectives: Sequence[Objective]) -> None:
 
 
 def _lead(surrogate: FitProblem, y: Array, method: Method, options: FitOptions) -> Array | None:
-    """Unknowns at the least of the surrogate's (corrected) objective."""
+    """Return unknowns at the optimum of the surrogate's (corrected) objective."""
     surrogate.warm_starts = True
     most = surrogate.analyses + options.max_analyses
     optimum = method.minimise(surrogate, y, replace(options, max_analyses=most))
@@ -141,11 +126,8 @@ def fit_from(
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
 
-    near : an optimum is near (a fit on another mesh ended there), so that nothing leads in.
-
-    Raises
-    ------
-    InputError : there is no such method.
+    near : an optimum is near (that of another mesh), so that no comparisons lead in. Raises
+    InputError for an unknown method.
     """
     method = method_named(options.method)
     if not method.needs_slope:
@@ -160,14 +142,10 @@ MOST_ANALYSES = 50
 
 
 def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
-    """Unknowns of start `number` of the study `seed`: the same on any machine.
+    """Return the unknowns of start `number` of the study `seed`: the same on any machine.
 
-    Candidates of the problem's `starts`, whose moduli are positive over the strain range, are tried
-    until an analysis ends well, in a stable equilibrium.
-
-    Raises
-    ------
-    NoFeasibleStart : none in 200,000 draws or 50 analyses.
+    Candidates of the problem's `starts` are tried until an analysis ends well, in a stable
+    equilibrium. Raises NoFeasibleStart after 200,000 draws or 50 analyses.
     """
     # Where another solver counts, its runs are not spent on draws.
     starts, problem = problem.starts, problem.surrogate or problem
@@ -199,7 +177,7 @@ TOLERANCE = 1e-9
 
 
 def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[FitProblem, Array]:
-    """Comparisons with a law that is given, and its unknowns (count,), nuisance at its start."""
+    """Return comparisons with a given law as a problem, and its unknowns, nuisance at its start."""
     ends = law.strain_range.tolist()
     unknowns = Unknowns.of(law.form, law.nu12, ends, LawBounds.of_moduli(ANY), comparisons)
     y = unknowns.at(law.beta[list(unknowns.free)])
@@ -207,7 +185,7 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
 
 
 def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
-    """At the law of unknowns y, the nuisance where it fits best; None where an analysis failed.
+    """Evaluate the law of unknowns y with its best-fitting nuisance; None where an analysis failed.
 
     The nuisance stays as in y where the problem's solver gives no derivatives.
     """

@@ -1,1 +1,1 @@
-"""The constitutive law, its positivity and the material card."""
+"""Define the constitutive law, its forms, the material card and its exports."""

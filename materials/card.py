@@ -1,11 +1,10 @@
-"""The material card `material.toml`: a law, the thickness it was fitted for, where it came from.
+"""Read and write the material card `material.toml`: a law, its thickness, source and certainty.
 
 Format 2 names its form (`form = "cubic"`), and beside it what the form needs (`breaks`, `knots`).
-Format 3 also has `[certainty]`: laws one standard deviation off, and what they are of.
-A file without `format` is of format 1, which knew cubics, and tri-linear laws by their breaks.
+Format 3 also has `[certainty]`: laws one standard deviation off, along independent directions whose
+products add up to the covariance of the free coefficients; kept like that it is never indefinite. A
+file without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
-
-from __future__ import annotations
 
 import math
 import sys
@@ -16,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -24,17 +23,17 @@ from ..errors import InputError
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
 from ..reading import toml_of
 from ..writing import replacing
-from .forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, ratios_of
-from .forms.registry import form_named, form_names, form_settings
+from .forms.base import (
+    COMPONENTS,
+    STRAIN_NAMES,
+    UNLIMITED,
+    Array,
+    form_named,
+    form_names,
+    form_settings,
+    ratios_of,
+)
 from .law import HypoelasticLaw, ThicknessChange
-
-# How sure a card is: laws one standard deviation off, along directions independent of each other.
-#
-# The covariance of the free coefficients is the sum of the products of the directions with
-# themselves. Kept like that it is never indefinite, and the first directions are those in which
-# the moduli are least certain.
-
-Array = NDArray[np.float64]
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
@@ -48,7 +47,7 @@ TRIES = 200
 
 @dataclass(frozen=True, eq=False)
 class CardCertainty:
-    """What a fit leaves open of its law.
+    """The uncertainty that a fit leaves in its law.
 
     directions : (k, free) MPa, one standard deviation each, of the free coefficients in their
     order; the least certain first. words : what is in them, and of what.
@@ -59,21 +58,21 @@ class CardCertainty:
 
     @property
     def covariance(self) -> Array:
-        """(free, free) MPa^2, of the law's free coefficients."""
+        """Return (free, free) MPa^2 of the law's free coefficients."""
         return np.asarray(self.directions.T @ self.directions)
 
     def sigma(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> Array:
-        """(n,) MPa, one standard deviation of a modulus of the law at strains (n,)."""
+        """Return (n,) MPa, one standard deviation of a modulus of the law at strains (n,)."""
         rows = law.modulus_rows(name, strain)[:, list(law.form.free)]
         return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
 
     def band(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> tuple[Array, Array]:
-        """(n,) MPa each, lower and upper end of 95 % of a modulus; none is below zero."""
+        """Return (n,) MPa each, lower and upper end of 95 % of a modulus; none is below zero."""
         modulus, off = law.modulus(name, strain), BAND * self.sigma(law, name, strain)
         return np.maximum(modulus - off, 0.0), modulus + off
 
     def shifted(self, law: HypoelasticLaw, along: ArrayLike) -> HypoelasticLaw:
-        """The law off by so many standard deviations along each of the first directions."""
+        """Return the law off by so many standard deviations along each of the first directions."""
         steps = np.asarray(along, dtype=float)
         beta = law.beta.copy()
         beta[list(law.form.free)] += steps @ self.directions[: len(steps)]
@@ -82,12 +81,8 @@ class CardCertainty:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """`count` laws, drawn from a normal distribution; only those of positive moduli.
-
-        Raises
-        ------
-        ValueError : hardly any draw has them.
-        """
+        """Return `count` random laws of positive moduli; raise ValueError if hardly any draw is
+        one."""
         drawn: list[HypoelasticLaw] = []
         for _ in range(TRIES * count):
             if len(drawn) == count:
@@ -101,7 +96,7 @@ class CardCertainty:
 
 
 def certainty_of(law: HypoelasticLaw, coefficients: Array, words: str = "") -> CardCertainty:
-    """Of draws of the free coefficients (draws, free) MPa, about those of the law."""
+    """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
     relative = np.vstack(
         [
@@ -117,7 +112,7 @@ def certainty_of(law: HypoelasticLaw, coefficients: Array, words: str = "") -> C
 
 
 def strains_of(law: HypoelasticLaw) -> dict[str, Array]:
-    """Strains (n,) by modulus, up to where the law is known; zero alone where it has no end."""
+    """Return strains (n,) by modulus, up to the end of the range; zero alone without one."""
     ends = {name: float(law.strain_range[c]) for name, c in COMPONENTS.items()}
     return {
         name: np.linspace(0.0, end, PLACES) if end < UNLIMITED else np.zeros(1)
@@ -126,7 +121,7 @@ def strains_of(law: HypoelasticLaw) -> dict[str, Array]:
 
 
 def positive(law: HypoelasticLaw) -> bool:
-    """Whether every modulus is above zero as far as the law is known, at every load ratio."""
+    """Return whether every modulus is above zero in the law's range, at every load ratio."""
     return all(
         (law.modulus(name, strain, ratio) > 0).all()
         for name, strain in strains_of(law).items()
@@ -135,7 +130,7 @@ def positive(law: HypoelasticLaw) -> bool:
 
 
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
-    """What a card's certainty is of: noise, mesh, tests, number of values."""
+    """Describe a card's certainty: noise, mesh, tests, number of values."""
     named = ", ".join(tests)
     also = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
     return f"{also}; {values} values of {named}; the form of the law is taken for right"
@@ -154,10 +149,7 @@ SAME_THICKNESS = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MaterialCard:
-    """A law with the thickness it was fitted for (mm), a name, and where it came from.
-
-    certainty : how sure the law is, None where nobody knows.
-    """
+    """A law with its thickness (mm), name, source, and its certainty or None."""
 
     law: HypoelasticLaw
     thickness: float
@@ -166,12 +158,12 @@ class MaterialCard:
     certainty: CardCertainty | None = None
 
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
-        """Write the card with its moduli in `unit`; `read_card` reads it."""
+        """Write the card with its moduli in `unit`."""
         write_card(self, Path(path), unit)
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
-    """What to say where `thickness` (mm) is not that of the card; None where it is.
+    """Describe how `thickness` (mm) differs from that of the card; None where it does not.
 
     Moduli are stresses: of a fabric twice as thick the same moduli are twice as stiff.
     """
@@ -245,7 +237,7 @@ Thickness = Annotated[float, PlainValidator(_thickness), WithJsonSchema({"type":
 
 
 class ValidStrain(Section):
-    """`valid_strain`: [0, end] of each log strain; a direction left out has no end."""
+    """[0, end] of each log strain; a direction left out has no end."""
 
     warp: End = UNLIMITED
     fill: End = UNLIMITED
@@ -253,7 +245,7 @@ class ValidStrain(Section):
 
 
 class CertaintyFile(Section):
-    """`certainty`: steps of the free coefficients, one standard deviation each, in `unit`."""
+    """Steps of the free coefficients, one standard deviation each, in `unit`."""
 
     of: str = ""
     directions: list[Numbers]
@@ -277,14 +269,7 @@ class CardFile(Section):
 
 
 def read_card(path: Path) -> MaterialCard:
-    """Read a card of any format.
-
-    Raises
-    ------
-    InputError : naming the file and the field: not TOML, a missing or unknown key, a format, law,
-        form or unit that is none, coefficients that the form does not have, a range that is not
-        [0, end], what the form does not like (breaks, knots).
-    """
+    """Read a card of any format; raise InputError that names the file and the field."""
     path = Path(path)
     try:
         content = toml_of(path)
@@ -335,7 +320,7 @@ def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
 
 
 def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Name of the form, and what the card says beside it; keys that are none are not looked at."""
+    """Return the name of the form and its settings; unknown keys are not looked at."""
     name, text = content.get("form"), content.get("law", "")
     if content.get("format", 1) == 1:
         if name is not None:

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..caching import compiled
 from ..errors import InputError
@@ -28,6 +28,7 @@ from .forms.base import (
     RATIO_ENDS,
     SHEAR,
     UNLIMITED,
+    Array,
     Form,
     held_strain,
     map_in_range,
@@ -39,7 +40,6 @@ from .forms.polynomial import CONSTANT, CUBIC
 from .forms.trilinear import TriLinear
 from .point_law import SLOPES, membrane_stress, stress_update
 
-Array = NDArray[np.float64]
 ThicknessChange = Literal["constant", "incompressible"]
 
 __all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]
@@ -51,21 +51,12 @@ JUMP = 1e-6
 class HypoelasticLaw:
     """Tangent moduli and Poisson's ratio of a coated fabric.
 
-    Parameters
-    ----------
-    beta : (size,) MPa, what the form knows: 12 coefficients, or moduli at the knots of a spline.
-    nu12 : Poisson's ratio.
-    strain_range : (3,) ends (eps1, eps2, gamma12) of the range that beta holds for; beyond
-        them, and below zero, a modulus keeps its end value.
-    thickness_change : "constant" (shells that keep it) or "incompressible" (resultant
-        sigma t0 / area ratio).
-    form : how beta makes the moduli; cubics unless given.
-    pieces : (3, P, 5) MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here.
-
-    Raises
-    ------
-    InputError : a beta that is not of the form's size, or not finite, or has an entry that the
-        form does not have; a range that is not positive.
+    beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12) of
+    the range that beta holds for; beyond them, and below zero, a modulus keeps its end value.
+    thickness_change : "constant" (shells that keep it) or "incompressible" (resultant sigma t0 /
+    area ratio). form : how beta makes the moduli; cubics unless given. pieces : (3, P, 5) MPa, the
+    moduli as piecewise cubics (`forms.base.pieces_of`); made here. Raises InputError for what does
+    not fit.
     """
 
     beta: Array
@@ -78,30 +69,24 @@ class HypoelasticLaw:
     def __post_init__(self) -> None:
         beta, form = np.array(self.beta, dtype=float), self.form
         if beta.shape != (form.size,) or not np.isfinite(beta).all():
-            raise InputError(
-                None, "beta", f"expected {form.size} finite coefficients, got shape {beta.shape}"
-            )
+            problem = f"expected {form.size} finite coefficients, got shape {beta.shape}"
+            raise InputError(None, "beta", problem)
         surplus = [i for i in range(form.size) if i not in form.free and beta[i] != 0.0]
         if surplus:
             names = ", ".join(form.labels[i] for i in surplus)
             values = ", ".join(f"{beta[i]:g}" for i in surplus)
-            raise InputError(
-                None, "beta", f"a {form.name} law has no {names}: expected 0, got {values}"
-            )
-        unlimited = [UNLIMITED] * 3
-        ends = np.array(unlimited if self.strain_range is None else self.strain_range, dtype=float)
+            problem = f"a {form.name} law has no {names}: expected 0, got {values}"
+            raise InputError(None, "beta", problem)
+        given = [UNLIMITED] * 3 if self.strain_range is None else self.strain_range
+        ends = np.array(given, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
-            raise InputError(
-                None, "strain_range", f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
-            )
+            problem = f"expected 3 positive ends (eps1, eps2, gamma12), got {ends}"
+            raise InputError(None, "strain_range", problem)
         if not 0 <= self.nu12 < 1:
             raise InputError(None, "nu12", f"expected 0 <= nu12 < 1, got {self.nu12}")
         if self.thickness_change not in ("constant", "incompressible"):
-            raise InputError(
-                None,
-                "thickness_change",
-                f"expected 'constant' or 'incompressible', got {self.thickness_change!r}",
-            )
+            problem = f"expected 'constant' or 'incompressible', got {self.thickness_change!r}"
+            raise InputError(None, "thickness_change", problem)
         pieces = pieces_of(form, beta, ends.tolist())
         beta.flags.writeable = ends.flags.writeable = False
         for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):
@@ -116,7 +101,7 @@ class HypoelasticLaw:
         nu12: float = 0.24,
         thickness_change: ThicknessChange = "constant",
     ) -> HypoelasticLaw:
-        """Constant moduli (MPa): the linear orthotropic law."""
+        """Return the linear orthotropic law of constant moduli (MPa)."""
         beta = np.zeros(12)
         beta[[3, 7, 11]] = g12, e2, e1
         return cls(beta, nu12, None, thickness_change, CONSTANT)  # type: ignore[arg-type]
@@ -132,10 +117,8 @@ class HypoelasticLaw:
         strain_range: ArrayLike | None = None,
         thickness_change: ThicknessChange = "constant",
     ) -> HypoelasticLaw:
-        """Moduli (MPa) that are constant in three regions of their strain.
+        """Return the law of moduli (MPa) that are constant in three regions of their strain.
 
-        Parameters
-        ----------
         e1, e2, g12 : (3,) moduli up to the first break, between the breaks, beyond the second.
         breaks : (3, 2) two strains for each of (eps1, eps2, gamma12).
         """
@@ -148,7 +131,7 @@ class HypoelasticLaw:
 
     @cached_property
     def jumps(self) -> bool:
-        """Whether a modulus jumps somewhere in the strain range."""
+        """Return whether a modulus jumps somewhere in the strain range."""
         here, there, at = self.pieces[:, :-1, 1:], self.pieces[:, 1:, 1:], self.pieces[:, :-1, :1]
         powers = at ** [3, 2, 1, 0]
         before, after = (here * powers).sum(axis=-1), (there * powers).sum(axis=-1)
@@ -157,23 +140,20 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Array:
-        """(3,), read-only: what couples warp and fill, as the compiled law reads it.
-
-        nu12, and what E1 and E2 gain (MPa) by their normalised load ratios.
-        """
+        """Return nu12, and the gain (MPa) of E1 and E2 by their load ratios; (3,), read-only."""
         return _read_only([self.nu12, *ratio_map(self.form) @ self.beta])
 
     @property
     def area_power(self) -> float:
-        """Power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
+        """Return the power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
         return 1.0 if self.thickness_change == "constant" else 0.0
 
     def with_beta(self, beta: ArrayLike) -> HypoelasticLaw:
-        """The same law with other coefficients (MPa)."""
+        """Return the same law with other coefficients (MPa)."""
         return replace(self, beta=np.asarray(beta, dtype=float))
 
     def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """Tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape.
+        """Return the tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape.
 
         ratio : the normalised load ratio of the modulus' own yarn; equal loads unless given.
         """
@@ -185,30 +165,30 @@ class HypoelasticLaw:
         return np.asarray(own + (ratio - EVEN) * gain)
 
     def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """(n, size): d modulus / d beta at strains (n,), held ones included; as `modulus`."""
+        """Return (n, size), d modulus / d beta at strains (n,), held ones included."""
         return modulus_rows(self.form, name, strain, self.strain_range.tolist(), ratio)
 
     @property
     def of_load_ratio(self) -> bool:
-        """Whether the form lets E1 or E2 depend on the ratio of the loads along warp and fill."""
+        """Return whether E1 or E2 may depend on the ratio of the loads along warp and fill."""
         return bool(ratio_map(self.form).any())
 
     def E1(self, strain: ArrayLike) -> Array:
-        """Warp tangent modulus (MPa) of eps1."""
+        """Return the warp tangent modulus (MPa) of eps1."""
         return self.modulus("E1", strain)
 
     def E2(self, strain: ArrayLike) -> Array:
-        """Fill tangent modulus (MPa) of eps2."""
+        """Return the fill tangent modulus (MPa) of eps2."""
         return self.modulus("E2", strain)
 
     def G12(self, strain: ArrayLike) -> Array:
-        """Shear tangent modulus (MPa) of gamma12."""
+        """Return the shear tangent modulus (MPa) of gamma12."""
         return self.modulus("G12", strain)
 
     def increment(
         self, strain_old: ArrayLike, strain_new: ArrayLike, stress_old: ArrayLike
     ) -> tuple[Array, Array]:
-        """Stress (n, 3) MPa after one increment of strain (n, 3), and its tangent (n, 3, 3).
+        """Return stress (n, 3) MPa after one increment of strain (n, 3), and its tangent (n, 3, 3).
 
         NaN in the rows where a modulus is not positive.
         """
@@ -224,17 +204,10 @@ class HypoelasticLaw:
         strain_old: ArrayLike | None = None,
         stress_old: ArrayLike | None = None,
     ) -> tuple[Array, Array, Array, Array]:
-        """From surface deformation gradients to 2nd Piola-Kirchhoff stress.
+        """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), log strain (n, 3), corotated stress (n, 3).
 
-        Parameters
-        ----------
-        gradient : (n, k, 2), k = 2 or 3: columns are the images of the unit warp and fill
-            vectors.
-        strain_old, stress_old : (n, 3) log strain and stress at the start; zero unless given.
-
-        Returns
-        -------
-        pk2 (n, 3), d(pk2)/dE (n, 3, 3), log strain (n, 3), corotated Cauchy stress (n, 3).
+        gradient : (n, k, 2), k = 2 or 3: columns are the images of the unit warp and fill vectors.
+        strain_old, stress_old : (n, 3) at the start; zero unless given.
         """
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
@@ -285,10 +258,10 @@ def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignor
 def law_slopes(
     law: HypoelasticLaw, parameters: Sequence[str], thickness: float
 ) -> tuple[Array, Array]:
-    """Derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling` (3, np).
+    """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling` (3, np).
 
-    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm, of a sheet that is
-    `thickness` mm thick); by any other they are zero.
+    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm, of a sheet that is `thickness`
+    mm thick); by any other they are zero.
     """
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
@@ -301,7 +274,7 @@ def law_slopes(
             coupling[0, j] = 1.0
         elif name == "thickness":
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
-            # (its stress is another, but nothing that takes this derivative is told of stress).
+            # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
             coupling[1:, j] = law.coupling[1:] / thickness
     return rows, coupling
@@ -312,7 +285,7 @@ DEFINITE = 1.02
 
 
 def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Array:
-    """(n, size): the law is positive definite in a pull along either yarn where rows @ beta >= 0.
+    """Return (n, size) so that the law is positive definite in a pull where rows @ beta >= 0.
 
     That is E1 E2 > (nu12 E2)^2. A fabric that is pulled contracts, so that the modulus across is
     that at zero strain, and the condition is linear: E1(0) > nu12^2 E2(eps2) in a pull along the

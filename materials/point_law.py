@@ -7,30 +7,17 @@ The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 i
 (warp, fill) frame, through  m = (C11 + C22)/2,  q = (C11 - C22)/2,  c = C12.  Strain vectors are
 (eps1, eps2, gamma12) with the engineering shear; Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
-"""
 
-from __future__ import annotations
+`pieces` (3, P, 5) is a law's three moduli as `forms.base.pieces_of` writes them. The modulus of an
+increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F its integral. So a
+bar has the exact stress in any number of increments, a modulus that jumps gives a stress that does
+not, and d(stress)/d(strain) is the modulus at the END of the increment.
+"""
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..caching import compiled
-from .forms.base import EVEN
-
-# The tangent modulus of one increment at one integration point, compiled.
-#
-# `pieces` (3, P, 5) is a law's three moduli as piecewise cubics, as `forms.base.pieces_of` writes
-# them: by component 0 (E1 of eps1), 1 (E2 of eps2) and 2 (G12 of gamma12, even in it) the upper
-# end of each piece and its four coefficients, highest power of the strain first. Below zero strain
-# and beyond the last end a modulus is held.
-#
-# The modulus of an increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F
-# its integral. So a bar has the exact stress in any number of increments, a modulus that jumps
-# gives a stress that does not, and d(stress)/d(strain) is the modulus at the END of the increment.
-
-Array = NDArray[np.float64]
+from .forms.base import EVEN, Array
 
 #: An increment of strain across the end of a piece is not divided by where it is smaller.
 TINY = 1e-12
@@ -38,7 +25,7 @@ TINY = 1e-12
 
 @compiled()
 def _place(pieces: Array, component: int, x: float) -> int:
-    """The piece that holds at x; the last one beyond the range, the first below zero."""
+    """Return the piece that holds at x; the last one beyond the range, the first below zero."""
     k, last = 0, pieces.shape[1] - 1
     while k < last and x > pieces[component, k, 0]:
         k += 1
@@ -47,7 +34,7 @@ def _place(pieces: Array, component: int, x: float) -> int:
 
 @compiled()
 def _means(a: float, b: float) -> tuple[float, float, float]:
-    """Means of x^3, x^2 and x between a and b."""
+    """Return means of x^3, x^2 and x between a and b."""
     total, squares = a + b, a * a + b * b
     return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
 
@@ -61,7 +48,7 @@ def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) ->
 
 @compiled()
 def point_modulus(pieces: Array, component: int, x: float) -> float:
-    """The modulus at the strain x."""
+    """Return the modulus at the strain x."""
     size = abs(x) if component == 2 else x
     held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
     k = _place(pieces, component, held)
@@ -71,7 +58,7 @@ def point_modulus(pieces: Array, component: int, x: float) -> float:
 
 @compiled()
 def _integral(pieces: Array, component: int, low: float, high: float) -> float:
-    """Integral of the modulus from low to high, the sum over the pieces on the way."""
+    """Return the integral of the modulus from low to high, summed over the pieces on the way."""
     total, start = 0.0, 0.0
     if low < 0.0:
         total += (min(high, 0.0) - low) * pieces[component, 0, 4]
@@ -88,7 +75,7 @@ def _integral(pieces: Array, component: int, low: float, high: float) -> float:
 
 @compiled()
 def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
-    """As `increment_modulus`, for an increment that leaves a piece."""
+    """Return as `increment_modulus`, for an increment that leaves a piece."""
     change = x - x_old
     if abs(change) < TINY:
         return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
@@ -109,7 +96,7 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
 def increment_modulus(
     pieces: Array, component: int, x: float, x_old: float
 ) -> tuple[float, float, float]:
-    """Mean modulus from x_old to x, and its derivatives by x and by x_old.
+    """Return the mean modulus from x_old to x, and its derivatives by x and by x_old.
 
     These are (E(x) - mean)/(x - x_old) and (mean - E(x_old))/(x - x_old). Inside one piece all
     three are polynomials of both strains, so that nothing cancels however small the increment.
@@ -151,7 +138,7 @@ def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
 def _add_way(
     pieces: Array, component: int, low: float, high: float, whole: float, weights: Array
 ) -> None:
-    """Add what the way from low to high, part of one of the length `whole`, has of each piece."""
+    """Add the share of each piece on the way from low to high, part of one of length `whole`."""
     start = 0.0
     if low < 0.0:
         _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
@@ -169,7 +156,7 @@ def _add_way(
 def by_pieces(
     pieces: Array, component: int, x: float, x_old: float, weights: Array
 ) -> tuple[int, int]:
-    """Derivative of the mean modulus by the coefficients of each piece, into weights (P, 4).
+    """Write the derivative of the mean modulus by the coefficients of each piece to weights (P, 4).
 
     Returns the first piece on the way and the one after the last; the others are not written.
     """
@@ -227,7 +214,7 @@ ROUNDING = 1e-15
 
 @compiled()
 def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
-    """The angle of the load ratio of two stresses, and its derivatives by them."""
+    """Return the angle of the load ratio of two stresses, and its derivatives by them."""
     square = warp * warp + fill * fill
     if warp > 0.0 or fill > 0.0:
         if warp <= 0.0:
@@ -247,14 +234,12 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 def mean_ratio(
     warp: float, fill: float, coupling: Array, old0: float, old1: float, dh0: float, dh1: float
 ) -> tuple[float, float, float, float, float, float]:
-    """The load ratio of an increment's mean stress, and how the stress depends on itself by it.
+    """Return the load ratio of an increment's mean stress, and how the stress depends on itself.
 
     warp, fill : E1, E2 at 1:1, MPa; old0, old1 : stress at the start; dh0, dh1 : strain increment.
-
     Returns gamma1 and gamma2 less those at 1:1; u (2), half the derivative of the stress by the
     angle; w (2), such that a change r of the stress at a fixed ratio is a change r + u (w . r) of
-    it altogether. gamma1 is not a number where a modulus, or 1 - nu12 nu21, is not positive on
-    the way.
+    it altogether. gamma1 is NaN where a modulus, or 1 - nu12 nu21, is not positive on the way.
     """
     nu = coupling[0]
     angle = load_angle(old0, old1)[0]
@@ -313,7 +298,7 @@ FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 @compiled()
 def _atanh_ratio(z: float) -> tuple[float, float]:
-    """f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
+    """Return f(z) = atanh(sqrt z)/sqrt z and its derivative; the series avoids 0/0 near z = 0."""
     if z < 0.01:
         f = 1.0 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z / 13)))))
         slope = 1 / 3 + z * (
@@ -327,7 +312,7 @@ def _atanh_ratio(z: float) -> tuple[float, float]:
 
 @compiled()
 def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
-    """Logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
+    """Write logarithmic strain h = (eps1, eps2, gamma12) and p = dh/dE (3, 3).
 
     Returns False when C is not positive definite (a degenerate iterate).
     """
@@ -361,10 +346,10 @@ def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
 
 @compiled()
 def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Array) -> None:
-    """Second Piola-Kirchhoff stress s = U^-1 t U^-1 from the corotated stress t (times J).
+    """Write 2nd Piola-Kirchhoff stress s = U^-1 t U^-1 of the corotated stress t (times J).
 
-    Also w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3). U^-1 in closed form for 2 x 2:
-    k [[C22 + J, -C12], [-C12, C11 + J]] with k = 1/(J sqrt(tr C + 2 J)).
+    Also w = ds/dt (3, 3) and g = ds/dE at fixed t (3, 3). U^-1 in closed form for 2 x 2: k [[C22 +
+    J, -C12], [-C12, C11 + J]] with k = 1/(J sqrt(tr C + 2 J)).
     """
     j = math.sqrt(m * m - q * q - c * c)
     root = math.sqrt(2.0 * (m + j))
@@ -396,23 +381,16 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
 
 @compiled()
 def stress_update(
-    pieces: Array,
-    coupling: Array,
-    h: Array,
-    h_old: Array,
-    s_old: Array,
-    s_new: Array,
-    tangent: Array,
-    slopes: Array,
-) -> bool:
-    """One increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array, s_new: Array,
+    tangent: Array, slopes: Array,
+) -> bool:  # fmt: skip
+    """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
-    pieces (3, P, 5) MPa as in `point_moduli`; coupling (3,) what couples warp and fill: nu12,
-    and what E1 and E2 gain (MPa) by their normalised load ratios (`point_ratio`); h, h_old (3,)
-    strain, s_old (3,) stress at the start. Writes s_new (3,), tangent = d s_new/d h (3, 3) and
-    slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old, RATIO.. the load ratios
-    less those at 1:1, TURN.. and BY.. u and w of `mean_ratio`. False when a modulus, or
-    1 - nu12 nu21, is not positive.
+    pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
+    load ratios; h, h_old (3,) strain, s_old (3,) stress at the start. Writes s_new (3,), tangent =
+    d s_new/d h (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old,
+    RATIO.. the load ratios less those at 1:1, TURN.. and BY.. u and w of `mean_ratio`. False when a
+    modulus, or 1 - nu12 nu21, is not positive.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
@@ -468,20 +446,10 @@ def stress_update(
 
 @compiled()
 def referred_stress(
-    m: float,
-    q: float,
-    c: float,
-    ratio: float,
-    growth: tuple[float, float, float],
-    s: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    pull: Array,
-    work: Array,
-) -> None:
-    """2nd Piola-Kirchhoff stress and d(pk2)/dE of the Cauchy stress s, law_tangent = ds/dh.
+    m: float, q: float, c: float, ratio: float, growth: tuple[float, float, float], s: Array,
+    pk2: Array, stiffness: Array, p: Array, law_tangent: Array, pull: Array, work: Array,
+) -> None:  # fmt: skip
+    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s, law_tangent = ds/dh.
 
     ratio: the stress resultant over s t0; growth (3,): the derivative of its logarithm by h. The
     rest is as in `membrane_stress`.
@@ -510,25 +478,11 @@ def referred_stress(
 
 @compiled()
 def membrane_stress(
-    m: float,
-    q: float,
-    c: float,
-    pieces: Array,
-    coupling: Array,
-    area_power: float,
-    h_old: Array,
-    s_old: Array,
-    h: Array,
-    s_new: Array,
-    pk2: Array,
-    stiffness: Array,
-    p: Array,
-    law_tangent: Array,
-    slopes: Array,
-    pull: Array,
-    work: Array,
-) -> bool:
-    """From Cauchy-Green components to 2nd Piola-Kirchhoff stress and d(pk2)/dE.
+    m: float, q: float, c: float, pieces: Array, coupling: Array, area_power: float, h_old: Array,
+    s_old: Array, h: Array, s_new: Array, pk2: Array, stiffness: Array, p: Array,
+    law_tangent: Array, slopes: Array, pull: Array, work: Array,
+) -> bool:  # fmt: skip
+    """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy-Green components.
 
     `area_power` is 1 for constant thickness and 0 for incompressible thickness (the resultant is
     sigma t0/J2 then, J2 the area ratio). `pull` (3, 3) becomes d(pk2)/d(sigma), area ratio

@@ -1,10 +1,13 @@
-"""What the law answers in a uniaxial test and in a trellis shear, in three measures.
+"""Compute uniaxial, trellis and biaxial responses of the law, and tables of its moduli.
 
-Uniaxial: pulled along one yarn, free to contract across it. Trellis: both yarns keep their
-length while the angle between them changes, as in a picture frame.
+Uniaxial: pulled along one yarn, free to contract across it. Trellis: both yarns keep their length
+while the angle between them changes, as in a picture frame. Biaxial: a homogeneous patch, without
+shear, at loads per width before the test, as a cruciform's machine counts them:
+
+    n1 = t0 (J2)^p sigma1 / lambda1,    n2 = t0 (J2)^p sigma2 / lambda2,
+
+J2 = lambda1 lambda2 the area ratio, p the law's `area_power`, one increment of the law a load.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -16,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..caching import compiled
 from ..errors import InputError
+from .forms.base import COMPONENTS, UNLIMITED, Array
 from .law import HypoelasticLaw, law_slopes
 from .point_law import (
     BEFORE1,
@@ -40,7 +44,6 @@ from .point_law import (
     stress_update,
 )
 
-Array = NDArray[np.float64]
 #: "true": log strain and Cauchy stress. "nominal": change of length (or of angle, radians) and
 #: force per reference area (trellis: stress that does work on the angle). "green": Green-Lagrange
 #: strain (shear: engineering, 2 E12) and 2nd Piola-Kirchhoff stress. All stresses are forces over
@@ -53,16 +56,11 @@ ROUNDS = 50
 
 
 def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array, Array]:
-    """Log strain (n, 3) and Cauchy stress (n, 3), MPa, of a bar pulled step by step.
+    """Return log strain (n, 3) and Cauchy stress (n, 3), MPa, of a bar pulled step by step.
 
-    Parameters
-    ----------
-    pulled : 0 along the warp, 1 along the fill.
-    log_strain : (n,) of the pulled direction, one increment of the law each, from zero.
-
-    Raises
-    ------
-    InputError : no stress-free width: a modulus is not positive on the way.
+    pulled : 0 along the warp, 1 along the fill. log_strain : (n,) of the pulled direction, one
+    increment of the law each, from zero. Raises InputError where a modulus is not positive on the
+    way.
     """
     free = 1 - pulled
     ends = np.asarray(log_strain, dtype=float)
@@ -88,7 +86,7 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
 def uniaxial_curve(
     law: HypoelasticLaw, pulled: int, log_strain: ArrayLike, measure: Measure
 ) -> tuple[Array, Array]:
-    """Strain (n,) and stress (n,), MPa, in `measure` at increasing (or falling) log strains.
+    """Return strain (n,) and stress (n,), MPa, in `measure` at increasing (or falling) log strains.
 
     The first log strain may be zero. Raises as `bar`.
     """
@@ -110,18 +108,11 @@ def uniaxial_curve(
 def trellis_curve(
     law: HypoelasticLaw, angle: ArrayLike, measure: Measure
 ) -> tuple[Array, Array, Array]:
-    """Shear strain (n,), shear stress (n,) and stress along the yarns (n, 2), MPa, in `measure`.
+    """Return shear strain (n,), shear stress (n,) and stress along the yarns (n, 2), MPa.
 
     The stress along the yarns, which a law of curves that do not couple leaves out, is 2nd
-    Piola-Kirchhoff stress whatever the measure.
-
-    Parameters
-    ----------
-    angle : (n,) increasing changes of the angle between the yarns, radians.
-
-    Raises
-    ------
-    InputError : a modulus is not positive on the way.
+    Piola-Kirchhoff stress whatever the measure. angle : (n,) increasing changes of the angle
+    between the yarns, radians. Raises InputError where a modulus is not positive on the way.
     """
     ends = np.asarray(angle, dtype=float)
     fine = _refined(ends)
@@ -146,7 +137,7 @@ def trellis_curve(
 
 
 def trellis_angle(gamma12: float) -> float:
-    """Change of angle (radians) at which trellis shear has the log strain gamma12.
+    """Return the change of angle (radians) at which trellis shear has the log strain gamma12.
 
     U of C = [[1, sin a], [sin a, 1]] gives gamma12 = atanh(sin a).
     """
@@ -154,7 +145,7 @@ def trellis_angle(gamma12: float) -> float:
 
 
 def _refined(ends: Array) -> Array:
-    """Every point, and STEPS increments up to it, from zero; a leading zero adds none."""
+    """Return every point, and STEPS increments up to it, from zero; a leading zero adds none."""
     starts = np.concatenate([[0.0], ends[:-1]])
     return np.concatenate(
         [a + (b - a) * np.arange(1, STEPS + 1) / STEPS for a, b in zip(starts, ends, strict=True)]
@@ -164,17 +155,6 @@ def _refined(ends: Array) -> Array:
 def _at(ends: Array, fine: Array) -> Array:
     return fine[STEPS - 1 :: STEPS][: len(ends)]
 
-
-# What the law answers in a biaxial test: strains of a patch at loads per width along its yarns.
-#
-# The patch is homogeneous, and warp and fill stay perpendicular: the shear is zero. A load per
-# width is a force over the width that the sheet had before the test, as a cruciform's machine
-# counts it:
-#
-#     n1 = t0 (J2)^p sigma1 / lambda1,    n2 = t0 (J2)^p sigma2 / lambda2,
-#
-# J2 = lambda1 lambda2 the area ratio, p the law's `area_power`. The law is integrated from load to
-# load, one increment each.
 
 #: Newton iterations of one load, and halvings of a step that does not come nearer.
 ROUNDS_BIAXIAL_RESPONSE, HALVINGS = 60, 40
@@ -187,8 +167,8 @@ class BiaxialResponse:
     """A patch at one load after the other.
 
     strain : (n, 2) logarithmic, along warp and fill. stress : (n, 2) MPa, Cauchy. slope : (n, 2,
-    parameters) derivatives of the strain. reached : how many loads have an equilibrium; rows
-    beyond are NaN. stable : (n,) whether every small stretch of the patch takes work.
+    parameters) derivatives of the strain. reached : how many loads have an equilibrium; rows beyond
+    are NaN. stable : (n,) whether every small stretch of the patch takes work.
     """
 
     strain: Array
@@ -199,21 +179,17 @@ class BiaxialResponse:
 
     @property
     def elongation(self) -> Array:
-        """(n, 2) change of length over the length before the test."""
+        """Return (n, 2) change of length over the length before the test."""
         return np.expm1(self.strain)
 
 
 def biaxial_response(
     law: HypoelasticLaw, loads: ArrayLike, thickness: float, parameters: Sequence[str] = ()
 ) -> BiaxialResponse:
-    """The strains of a patch, from the unloaded state.
+    """Return the strains of a patch, from the unloaded state.
 
-    Parameters
-    ----------
-    loads : (n, 2) N/mm (kN/m) along warp and fill, one increment of the law each.
-    thickness : mm, before the test.
-    parameters : by which the strain is differentiated: "beta_i" (per MPa), "nu12" and
-        "thickness" (per mm).
+    loads : (n, 2) N/mm (kN/m) along warp and fill. thickness : mm, before the test. parameters : of
+    the derivatives: "beta_i" (per MPa), "nu12" and "thickness" (per mm).
     """
     asked = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
     rows, by_coupling = law_slopes(law, parameters, thickness)
@@ -231,10 +207,8 @@ def biaxial_response(
 def _forces(  # type: ignore[no-untyped-def]
     pieces, coupling, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
 ):
-    """Forces per width less the load into rest (2,), their derivatives by h into k (2, 2).
-
-    False where a modulus is not positive.
-    """
+    """Write forces per width less the load to rest (2,), derivatives by h to k (2, 2); False if
+    not."""
     if not stress_update(pieces, coupling, h, h_old, s_old, s, tangent, slopes):
         return False
     for i in range(2):
@@ -255,7 +229,7 @@ def _size(rest):  # type: ignore[no-untyped-def]
 def _path(  # type: ignore[no-untyped-def]
     pieces, coupling, power, thickness, loads, rows, by_coupling, strain, stress, slope, stable
 ):
-    """Load by load; how many have an equilibrium."""
+    """Solve load by load; return how many have an equilibrium."""
     nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
     h, h_old, trial, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     tangent, slopes = np.empty((3, 3)), np.empty(SLOPES)
@@ -339,12 +313,9 @@ MOST, HALVINGS_BIAXIAL_REACH, LOADS = 1000.0, 50, 20
 def largest_load(
     law: HypoelasticLaw, thickness: float, shares: Sequence[tuple[float, float]], ends: ArrayLike
 ) -> float:
-    """kN/m of the larger load up to which every ratio keeps within strains; 0 where none does.
+    """Return the larger load (kN/m) up to which every ratio keeps within strains; 0 if none does.
 
-    Parameters
-    ----------
-    thickness : mm. shares : loads along warp and fill of each ratio, the larger 1. ends : (2,)
-        logarithmic strains along warp and fill.
+    shares : loads along warp and fill of each ratio, the larger 1. ends : (2,) logarithmic strains.
     """
     known = np.asarray(ends, dtype=float)
 
@@ -361,3 +332,130 @@ def largest_load(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if within(middle) else (low, middle)
     return low
+
+
+def curve_pieces(law: HypoelasticLaw, name: str) -> Array:
+    """Return (n, 5) pieces of a modulus, MPa, each once; raise InputError if of the load ratio.
+
+    A row is the upper end of a piece and its four coefficients, highest power of the strain first;
+    below zero strain and beyond the last end the modulus is held.
+    """
+    if law.of_load_ratio:
+        problem = (
+            f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
+            "the loads, and here they are moduli of strain"
+        )
+        raise InputError(None, "form", problem)
+    rows = law.pieces[COMPONENTS[name]]
+    # What repeats the last piece ends where it does.
+    return np.asarray(rows[: 1 + int((np.diff(rows[:, 0]) > 0).sum())])
+
+
+def piece_constants(law: HypoelasticLaw) -> tuple[float, ...]:
+    """Return the numbers of pieces of E1, E2 and G12 (3), then the pieces of each, row by row."""
+    curves = [curve_pieces(law, name) for name in ("E1", "E2", "G12")]
+    numbers = np.concatenate([curve.ravel() for curve in curves])
+    return (*(float(len(curve)) for curve in curves), *numbers.tolist())
+
+
+#: Points from zero strain to the end of the range.
+POINTS = 121
+
+
+#: Where a table ends when the law's range does not: a law without a range holds its polynomials
+#: for any strain, a table cannot.
+REACH = 0.3
+
+
+#: Strain over which a table makes the jump of a modulus: a table takes one value a strain.
+JUMP = 1e-6
+
+
+#: Difference of two pieces where they meet, over the modulus there, that is more than rounding.
+ROUNDING = 1e-9
+
+
+#: Strains between two points at which the error of a table is looked for.
+BETWEEN = 16
+
+
+@dataclass(frozen=True, eq=False)
+class ModulusTable:
+    """One tangent modulus by its log strain; straight between points, held beyond both ends.
+
+    name : "E1", "E2" or "G12" (of the engineering shear, from -end to end: it is even in it).
+    strain, modulus : (n,), increasing strains and MPa. error : largest relative difference from the
+    law between the points, jumps left out. jumps : strains from 0 where the modulus jumps. reaches
+    : the table covers the law's whole range.
+    """
+
+    name: str
+    strain: Array
+    modulus: Array
+    error: float
+    jumps: Array
+    reaches: bool
+
+    def at(self, strain: NDArray[np.float64] | float) -> Array:
+        """Return the modulus (MPa) that a solver reads off the table."""
+        return np.asarray(np.interp(strain, self.strain, self.modulus))
+
+
+def modulus_table(
+    law: HypoelasticLaw, name: str, points: int = POINTS, reach: float = REACH
+) -> ModulusTable:
+    """Return the table of one modulus.
+
+    points : equally spaced strains from 0 to the end; where one piece gives way to the next there
+    is one more, and two where it jumps. reach : the end where the law has no range.
+    """
+    if points < 2:
+        raise InputError(None, "points", f"expected at least 2, got {points}")
+    if not 0 < reach < UNLIMITED:
+        raise InputError(None, "reach", f"expected a positive strain, got {reach:g}")
+    component = COMPONENTS[name]
+    end = float(law.strain_range[component])
+    reaches = end < UNLIMITED
+    end = end if reaches else reach
+    strain = np.linspace(0.0, end, points)
+    knots, jumps = _meetings(law, name, end)
+    # An equally spaced strain inside a jump would make it a step of two slopes.
+    spaced = strain[(np.abs(strain[:, None] - knots - JUMP / 2) >= JUMP).all(axis=1)]
+    beyond = np.minimum(jumps + JUMP, end)
+    strain = np.unique(np.concatenate([[0.0, end], spaced, knots, beyond]))
+    modulus = law.modulus(name, strain)
+    error = _error(law, name, strain, modulus, jumps)
+    if name == "G12":
+        strain = np.concatenate([-strain[:0:-1], strain])
+        modulus = np.concatenate([modulus[:0:-1], modulus])
+    return ModulusTable(name, strain, modulus, error, jumps, reaches)
+
+
+def modulus_tables(
+    law: HypoelasticLaw, points: int = POINTS, reach: float = REACH
+) -> dict[str, ModulusTable]:
+    """Return the tables of E1, E2 and G12, by name; as `modulus_table`."""
+    return {name: modulus_table(law, name, points, reach) for name in COMPONENTS}
+
+
+def _meetings(law: HypoelasticLaw, name: str, end: float) -> tuple[Array, Array]:
+    """Return strains before `end` where one piece gives way to the next, and where it jumps."""
+    pieces = curve_pieces(law, name)
+    knots = pieces[:-1, 0]
+    here, there = (
+        np.array([np.polyval(piece[1:], knot) for piece, knot in zip(side, knots, strict=True)])
+        for side in (pieces[:-1], pieces[1:])
+    )
+    jump = np.abs(there - here) > ROUNDING * np.maximum(np.abs(here), np.abs(there))
+    inside = knots < end
+    return knots[inside], knots[inside & jump]
+
+
+def _error(law: HypoelasticLaw, name: str, strain: Array, modulus: Array, jumps: Array) -> float:
+    starts, widths = strain[:-1], np.diff(strain)
+    smooth = ~np.isin(starts, jumps)
+    shares = np.arange(1, BETWEEN) / BETWEEN
+    x = (starts[smooth, None] + widths[smooth, None] * shares).ravel()
+    exact = law.modulus(name, x)
+    off = np.abs(np.interp(x, strain, modulus) - exact)
+    return float(np.max(off / np.maximum(np.abs(exact), np.finfo(float).tiny)))

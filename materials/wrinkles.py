@@ -1,20 +1,25 @@
-"""Wrinkled and slack states at one integration point, compiled: which strain the fabric has.
+"""Wrinkled and slack states at one integration point, compiled: the strain of the fabric.
 
-The search for them is Newton's iteration on two unknowns, size and angle of the wrinkle strain;
-see relaxation.py for what they obey.
+A wrinkle takes up strain across itself without stress. At a point with total strain h the fabric
+itself is strained by h + w, the wrinkle strain w = size n n' (n its normal), or any contraction
+where it is slack, such that the Cauchy stress s obeys
+
+    s >= 0 (no principal compression),  w >= 0,  s : w = 0,
+
+which for a linear law is the projection of the trial stress on the tensile ones in the norm of the
+compliance (Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)). The law
+is integrated along the strain of the fabric, h + w. A share of the stiffness at zero strain is left
+to the wrinkle strain, so that wrinkled and slack parts keep a tangent. The search is Newton's
+iteration on size and angle of the wrinkle strain.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..caching import compiled
+from .forms.base import Array
 from .point_law import increment_modulus, log_strain, referred_stress, stress_update
-
-Array = NDArray[np.float64]
 
 ITERATIONS = 25
 #: Strain, or stress over the stiffness, that is taken as none.
@@ -25,13 +30,13 @@ NORMALS = 36
 
 @compiled()
 def least_principal(a: float, b: float, c: float) -> float:
-    """The smaller eigenvalue of [[a, c], [c, b]]."""
+    """Return the smaller eigenvalue of [[a, c], [c, b]]."""
     return 0.5 * (a + b) - math.hypot(0.5 * (a - b), c)
 
 
 @compiled()
 def _normal(angle: float, n: Array, m: Array) -> None:
-    """Strain n n' of a wrinkle (engineering shear), and m, half of its slope by the angle.
+    """Write strain n n' of a wrinkle (engineering shear), and m, half of its slope by the angle.
 
     n . s is the stress across the wrinkle, m . s the shear along it.
     """
@@ -45,7 +50,7 @@ def _across(
     pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     n: Array, size: float, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> float:  # fmt: skip
-    """Size of a wrinkle strain along n that leaves no stress across it; NaN if not found."""
+    """Return the size of a wrinkle strain along n without stress across it; NaN if not found."""
     scale = abs(size) + 1e-3
     for _ in range(ITERATIONS):
         for i in range(3):
@@ -76,7 +81,7 @@ def _start(
     pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
     n: Array, m: Array, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Angle and size between the two tried normals where the shear along changes its sign."""
+    """Return angle and size between the two normals where the shear along changes its sign."""
     before, size_before, angle_before = math.nan, 0.0, 0.0
     for k in range(NORMALS + 1):
         angle = k * math.pi / NORMALS
@@ -102,7 +107,7 @@ def _wrinkle(
     angle: float, size: float, n: Array, m: Array,
     he: Array, s: Array, tangent: Array, slopes: Array, inverse: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Angle and size of the wrinkle strain by Newton's iteration; inverse (2, 2) of its slope."""
+    """Return angle and size of the wrinkle strain by Newton; inverse (2, 2) of its slope."""
     scale = abs(s[0]) + abs(s[1]) + abs(s[2])
     for _ in range(ITERATIONS):
         _normal(angle, n, m)
@@ -140,7 +145,7 @@ def slack(
     pieces: Array, coupling: Array, h_old: Array, s_old: Array,
     he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> bool:  # fmt: skip
-    """Strain of the fabric without any stress, into he."""
+    """Write the strain of the fabric without any stress to he."""
     for i in range(3):
         he[i] = h_old[i]
     for _ in range(ITERATIONS):
@@ -167,7 +172,7 @@ def wrinkled(
     away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
     strain_slope: Array,
 ) -> bool:  # fmt: skip
-    """A wrinkle in one direction: he, s_new, and strain_slope, the derivative of he by h.
+    """Find a wrinkle in one direction: he, s_new, and strain_slope, the derivative of he by h.
 
     away : angle and size of the larger principal strain from the total strain to the slack one.
     """
@@ -210,34 +215,19 @@ def wrinkled(
     return True
 
 
-# Tension field: a membrane that wrinkles instead of carrying compression, compiled.
-#
-# A wrinkle takes up strain across itself without stress. At a point with total strain h the fabric
-# itself is strained by h + w, the wrinkle strain w = size n n' (n its normal), or any contraction
-# where it is slack, such that the Cauchy stress s obeys
-#
-#     s >= 0 (no principal compression),  w >= 0,  s : w = 0,
-#
-# which for a linear law is the projection of the trial stress on the tensile ones in the norm of
-# the compliance (Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)).
-# The law is integrated along the strain of the fabric, h + w. What is left to the wrinkle strain
-# is a share of the stiffness at zero strain, so that wrinkled and slack parts keep a tangent.
-
-
 @compiled()
 def relaxed_update(
     pieces: Array, coupling: Array, share: float, h: Array, h_old: Array, s_old: Array,
     he: Array, s_new: Array, carried: Array, tangent: Array, slopes: Array, strain_slope: Array,
 ) -> int:  # fmt: skip
-    """As `stress_update`, for a membrane that wrinkles.
+    """Integrate as `stress_update`, for a membrane that wrinkles.
 
     h (3,) total strain at the end; h_old, s_old (3,) strain and stress OF THE FABRIC at the start.
-    share : of the stiffness at zero strain, left to the wrinkle strain.
-
-    Writes he, s_new (3,) strain and stress of the fabric at the end; carried (3,) the stress with
-    the share of the wrinkle strain, tangent (3, 3) its derivative by h, and strain_slope (3, 3)
-    that of he. Returns 0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and
-    -1 where there is no stress, as in `stress_update`.
+    share : of the stiffness at zero strain, left to the wrinkle strain. Writes he, s_new (3,)
+    strain and stress of the fabric at the end; carried (3,) the stress with the share of the
+    wrinkle strain, tangent (3, 3) its derivative by h, and strain_slope (3, 3) that of he. Returns
+    0 where the membrane is taut, 1 where it wrinkles, 2 where it is slack, and -1 where there is no
+    stress.
     """
     strain_slope[:] = 0.0
     for i in range(3):
@@ -291,7 +281,7 @@ def relaxed_membrane_stress(
     share: float, h_old: Array, s_old: Array, h: Array, he: Array, s_new: Array, pk2: Array,
     stiffness: Array, p: Array, law_tangent: Array, slopes: Array, pull: Array, work: Array,
 ) -> int:  # fmt: skip
-    """As `membrane_stress`, for a membrane that wrinkles; returns as `relaxed_update`.
+    """Compute as `membrane_stress`, for a membrane that wrinkles; returns as `relaxed_update`.
 
     The stress resultant goes with the area of the fabric, not with that of the wrinkled surface.
     """

@@ -1,1 +1,1 @@
-"""Quadrilateral meshes with named sets, written and read by meshio."""
+"""Build meshes and finite element problems as plain data."""

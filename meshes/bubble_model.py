@@ -10,18 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Mesh
+from .mesh import Array, Mesh
 
 THICKNESS = "thickness"
 
 
 def changes_anything(known: Sequence[str], values: Mapping[str, float]) -> bool:
-    """Whether values added to parameters change a model.
-
-    Raises
-    ------
-    InputError : no such parameter.
-    """
+    """Return whether values added to parameters change a model; InputError if unknown."""
     unknown = [name for name in values if name not in known]
     if unknown:
         raise InputError(None, "parameters", f"{unknown} not among {tuple(known)}")
@@ -33,24 +28,17 @@ class OfThickness:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What `with_parameters` changes: thickness (mm)."""
+        """Return what `with_parameters` changes: thickness (mm)."""
         return (THICKNESS,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """The same model with `values` added to its `parameters`; itself where all are zero.
-
-        Raises
-        ------
-        InputError : no such parameter, or the thickness would not be positive.
-        """
+        """Return the model with `values` added to its `parameters`; itself where all are zero."""
         if not changes_anything(self.parameters, values):
             return self
         model: Any = self
         changed: Self = replace(model, thickness=model.thickness + values[THICKNESS])
         return changed
 
-
-Array = NDArray[np.float64]
 
 #: Pinned rim; symmetry lines where the mesh has them.
 RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
@@ -69,27 +57,18 @@ PRESSURE_OFFSET = "pressure_offset"
 class BubbleModel:
     """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
-    Parameters
-    ----------
-    mesh : mm; warp is x, fill is y. z is the surface of the sheet in the reference picture, from
-        which displacements are counted.
-    thickness : mm, in the reference state.
-    pressures : MPa, strictly increasing: the frames to report.
-    increments : MPa, strictly increasing, containing every pressure: the steps over which the
-        hypoelastic law is integrated; the pressures unless given. They hardly matter to the
-        result (benchmarks/bench_law.py increments).
-    supports : degrees of freedom held at zero, by node set; those of the rim where it moves.
-    modes : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm.
-    slack : how much longer the stress-free sheet is than the reference picture along x (warp) and
-        y (fill), as a share: 0.001 is 0.1 %.
-    rim_motion : (increments, rim nodes, 3) mm, where the rim is at the end of every increment,
-        counted from the reference picture; None for a rim that stays.
+    mesh : mm; warp is x, fill is y, z the surface of the sheet in the reference picture, from which
+    displacements are counted. thickness : mm, in the reference state. pressures : MPa, increasing:
+    the frames to report. increments : MPa, increasing, containing every pressure: steps over which
+    the law is integrated; they hardly matter to the result (benchmarks/bench_law.py increments).
+    supports : degrees of freedom held at zero, by node set; those of the rim where it moves. modes
+    : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm. slack : how much
+    longer the stress-free sheet is along x (warp) and y (fill), as a share. rim_motion :
+    (increments, rim nodes, 3) mm from the reference picture at the end of every increment; None for
+    a rim that stays.
 
-    Raises
-    ------
-    InputError : pressures that do not increase, increments without one of the pressures, a
-        support on a set that the mesh does not have (symmetry sets excepted), a motion or a mode
-        of another number of nodes, a sheet shorter than nothing.
+    Raises InputError for pressures that do not increase, increments without a pressure, supports on
+    unknown sets (symmetry sets excepted), wrong numbers of nodes, a slack of -1 or less.
     """
 
     mesh: Mesh
@@ -132,17 +111,13 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What `with_parameters` changes: pressure_offset (MPa), thickness (mm), slack_warp and
-        slack_fill (shares), and the modes (mm)."""
+        """Return what `with_parameters` changes: MPa, mm, shares, and the modes (mm)."""
         return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)
 
     def with_parameters(self, values: Mapping[str, float]) -> BubbleModel:
-        """The same model with `values` added to its `parameters`; itself where all are zero.
+        """Return the model with `values` added to its `parameters`; itself where all are zero.
 
-        Raises
-        ------
-        InputError : no such parameter, or the first increment, or the thickness, would not be
-            positive.
+        Raises InputError for unknown names, or where pressure or thickness would not be positive.
         """
         if not changes_anything(self.parameters, values):
             return self
@@ -164,12 +139,13 @@ class BubbleModel:
 
     @property
     def stress_free(self) -> Array:
-        """(nodes, 3) mm, where the nodes of the sheet are without any stress."""
+        """Return (nodes, 3) mm, the nodes of the sheet without any stress."""
         warp, fill = self.slack
         return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
 
     def sheet_slope(self, name: str) -> tuple[Array, Array]:
-        """Derivatives (nodes, 3) of the reference surface and of `stress_free` by a parameter."""
+        """Return derivatives (nodes, 3) of the reference surface and of `stress_free` by a
+        parameter."""
         surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
         if name in self.modes:
             surface[:, 2] = sheet[:, 2] = self.modes[name]
@@ -179,7 +155,7 @@ class BubbleModel:
         return surface, sheet
 
     def held(self, pressure: float) -> Array:
-        """(fixed,) mm, displacement of the held degrees of freedom at a pressure (MPa)."""
+        """Return (fixed,) mm, displacements of the held degrees of freedom at a pressure (MPa)."""
         values = np.zeros((len(self.mesh.points), 3))
         if self.rim_motion is not None:
             ends = np.array([0.0, *self.increments])
@@ -195,13 +171,13 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Index of each reported pressure in `increments`, (frames,)."""
+        """Return the index of each reported pressure in `increments`, (frames,)."""
         steps = np.array(self.increments)
         return np.array([int(np.argmin(np.abs(steps - p))) for p in self.pressures])
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Held degrees of freedom, 3 * node + direction, sorted."""
+        """Return held degrees of freedom, 3 * node + direction, sorted."""
         dofs = [
             3 * self.mesh.node_sets[name] + direction
             for name, directions in self.supports.items()
@@ -212,11 +188,10 @@ class BubbleModel:
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
-    """The pressures, with small first steps so that no step is more than about 3 times the last.
+    """Return the pressures with small first steps, no step more than about 3 times the last.
 
     22, 59, 97 ... kPa becomes 6, 22, 40, 59, 97 ... The two more are not for accuracy: from a flat
-    sheet Newton reaches a high first pressure in as many iterations as two lower ones: 20 starts
-    of the known-solution example cost the same with either.
+    sheet Newton reaches a high first pressure in as many iterations as two lower ones.
     """
     first = pressures[0]
     steps = [first * 6.0 / 22.0, *pressures]

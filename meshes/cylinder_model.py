@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .mesh import Mesh
+from .mesh import Array, Mesh
 from .tube import Refinement, cylinder_mesh
 
 #: Inner diameter and length (mm) of the collar by the largest diameter of cylinder it is for: those
@@ -21,13 +21,7 @@ COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
 
 @dataclass(frozen=True)
 class RigidSupports:
-    """Two cylinders along x under the tube, frictionless, at z = span / 2 and -span / 2.
-
-    Parameters
-    ----------
-    span : mm between their axes.
-    diameter : mm, outer.
-    """
+    """Two frictionless cylinders along x under the tube, at z = span / 2 and -span / 2, mm."""
 
     span: float = 2000.0
     diameter: float = 100.0
@@ -38,11 +32,9 @@ class RigidSupports:
 
 @dataclass(frozen=True)
 class Collar:
-    """A ring around the middle of the tube, its axis along z, frictionless, pulled down.
+    """A frictionless ring around the middle of the tube, its axis along z, pulled down, mm.
 
-    Parameters
-    ----------
-    inner_diameter, length : mm. fillet : mm, radius of its inner edges.
+    fillet : radius of its inner edges.
     """
 
     inner_diameter: float
@@ -57,12 +49,7 @@ class Collar:
 
 
 def usual_collar(diameter: float) -> Collar:
-    """The collar for a cylinder of this diameter (mm) where none is given.
-
-    Raises
-    ------
-    InputError : the cylinder is larger than any that there is one for.
-    """
+    """Return the collar for a diameter (mm); raise InputError if that is too large."""
     for largest, (inner, length) in COLLARS.items():
         if diameter <= largest:
             return Collar(inner, length)
@@ -82,14 +69,8 @@ def _check(body: RigidSupports | Collar, name: str) -> None:
 class Gas:
     """Air as the thesis has it; gauge pressures are above `ambient`.
 
-    Parameters
-    ----------
-    ambient : MPa, the pressure around and the reference of the density.
-    temperature : K, constant. density : kg/m^3 at ambient pressure and this temperature.
-
-    Raises
-    ------
-    InputError : a value that is not a positive number.
+    ambient : MPa, the pressure around and the reference of the density. temperature : K, constant.
+    density : kg/m^3 at ambient pressure and this temperature. Raises InputError unless positive.
     """
 
     ambient: float = 0.101
@@ -103,32 +84,27 @@ class Gas:
                 raise InputError(None, f"gas.{one.name}", f"expected > 0, got {value!r}")
 
     def mass(self, gauge: float, volume: float) -> float:
-        """Mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""
+        """Return the mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""
         return self.density * 1e-9 * volume * (gauge + self.ambient) / self.ambient
 
     def closed_in(self, gauge: float, volume: float) -> ClosedGas:
-        """The gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
+        """Return the gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
         return ClosedGas((gauge + self.ambient) * volume, self.ambient)
 
 
 @dataclass(frozen=True)
 class ClosedGas:
-    """A constant mass at constant temperature: absolute pressure times volume stays.
-
-    Parameters
-    ----------
-    amount : MPa mm^3, absolute pressure times volume. ambient : MPa outside.
-    """
+    """Gas of constant mass and temperature; amount : absolute pressure times volume."""
 
     amount: float
     ambient: float
 
     def pressure(self, volume: float) -> float:
-        """Gauge pressure (MPa) in `volume` (mm^3)."""
+        """Return the gauge pressure (MPa) in `volume` (mm^3)."""
         return self.amount / volume - self.ambient
 
     def stiffness(self, volume: float) -> float:
-        """Loss of pressure per volume, -dp/dV (MPa/mm^3)."""
+        """Return the loss of pressure per volume, -dp/dV (MPa/mm^3)."""
         return self.amount / volume**2
 
 
@@ -139,17 +115,11 @@ PLACES, SLOPE_OVER = (0.25, 0.5, 1.0), 0.1
 
 @dataclass(frozen=True)
 class CurveReading:
-    """Where a curve is read.
+    """Places at which a curve is read.
 
-    Parameters
-    ----------
-    places : mm of deflection, by what they are called ("40 mm", "0.25 diameters").
-    slope_over : mm of deflection: the initial stiffness is the slope up to here, and the knee is
-        where the slope over as much has fallen.
-
-    Raises
-    ------
-    InputError : what is not above zero.
+    places : mm of deflection, by label ("40 mm", "0.25 diameters"). slope_over : mm of deflection:
+    the initial stiffness is the slope up to here, and the knee is where the slope over as much has
+    fallen. Raises InputError for what is not above zero.
     """
 
     places: Mapping[str, float]
@@ -164,15 +134,13 @@ class CurveReading:
 def curve_reading(
     diameter: float, places: Sequence[float] | None = None, slope_over: float | None = None
 ) -> CurveReading:
-    """Places and slopes that are given (mm), and those by the diameter (mm) where they are not."""
+    """Return places and slopes as given (mm), or by the diameter (mm)."""
     if places is None:
         named = {f"{share:g} diameters": share * diameter for share in PLACES}
     else:
         named = {f"{place:g} mm": place for place in places}
     return CurveReading(named, SLOPE_OVER * diameter if slope_over is None else slope_over)
 
-
-Array = NDArray[np.float64]
 
 NEAR = 1e-9  # of a length
 #: Node sets of the mesh beside those of the planes of symmetry.
@@ -185,33 +153,20 @@ class CylinderModel:
 
     First the gauge pressure rises over `inflation`, the bottom held in height at the supports
     (`held_on_inflation`). Then the gas is closed in, its mass constant, and the cylinder lies free
-    on the supports while the collar goes down.
+    on the supports while the collar goes down. Reported: the inflated state, then every one of
+    `deflections`; load in N, pressure and volume, all of the WHOLE cylinder (`copies` of the mesh).
 
-    Reported: the inflated state, then every one of `deflections`; load in N, pressure and volume,
-    all of the WHOLE cylinder (`copies` of what is meshed).
-
-    Parameters
-    ----------
     mesh : mm, as `cylinder_mesh` makes it: z along the axis, y up, seam at the bottom, `warp` in
-        each quad, and the rows `support` and `support_bottom` at z = span / 2.
-    thickness : (quads,) mm in the reference state; the seam is three times as thick.
-    inflation : MPa, strictly increasing: the increments of gauge pressure; the last one is the
-        pressure at which the gas is closed in.
-    deflections : mm that the collar has gone down since it touched the inflated cylinder,
-        strictly increasing: the frames to report.
-    increments : mm, likewise, containing every deflection: the steps over which the hypoelastic
-        law is integrated. The deflections unless given.
-    supports, collar : rigid, frictionless.
-    gas : what is closed in.
-    reading : where the curve of load over deflection is read, which changes no result; by the
-        diameter unless given.
+    each quad, and the rows `support` and `support_bottom` at z = span / 2. thickness : (quads,) mm
+    in the reference state; the seam is three times as thick. inflation : MPa, increasing increments
+    of gauge pressure to the one at which the gas is closed in. deflections : mm of the collar since
+    it touched the inflated cylinder, increasing: the frames. increments : mm, containing every
+    deflection: the steps of the law; the deflections unless given. reading : where the curve of
+    load over deflection is read, which changes no result.
 
-    Raises
-    ------
-    InputError : a mesh without warp directions or one of the node sets, thicknesses that are not
-        positive or not one a quad, pressures or deflections that do not increase, increments
-        without one of the deflections, supports that are not under the cylinder, a collar that
-        does not go around it or reaches the supports.
+    Raises InputError for a mesh without warp directions or node sets, wrong thicknesses, pressures
+    or deflections that do not increase, supports that are not under the cylinder, a collar that
+    does not go around it or reaches the supports.
     """
 
     mesh: Mesh
@@ -277,14 +232,11 @@ class CylinderModel:
 
     @property
     def diameter(self) -> float:
-        """mm, before inflation."""
+        """Return the diameter (mm) before inflation."""
         return self.diameter_at(self.mesh.points)
 
     def diameter_at(self, points: Array) -> float:
-        """Of the circle (mm) with the area that the ring at mid-span encloses.
-
-        points : (n, 3) mm, where the nodes are.
-        """
+        """Return that of the circle (mm) with the area of the ring at mid-span."""
         ring = self.mesh.node_sets["mid_span"]
         across, up = self.mesh.points[ring, :2].T
         x, y = points[ring[np.argsort(np.arctan2(across, -up))], :2].T
@@ -294,23 +246,23 @@ class CylinderModel:
 
     @property
     def pressure(self) -> float:
-        """Gauge pressure of the inflated cylinder, MPa."""
+        """Return the gauge pressure of the inflated cylinder, MPa."""
         return self.inflation[-1]
 
     @property
     def copies(self) -> int:
-        """How many times the mesh makes the whole cylinder: 4 for a quarter."""
+        """Return how many times the mesh makes the whole cylinder: 4 for a quarter."""
         return int(2 ** sum(f"symmetry_{axis}" in self.mesh.node_sets for axis in "xz"))
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Index of each reported deflection in `increments`, (frames - 1,)."""
+        """Return the index of each reported deflection in `increments`, (frames - 1,)."""
         steps = np.array(self.increments)
         return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
 
     @property
     def guides(self) -> Mapping[str, tuple[int, ...]]:
-        """Directions held at zero throughout, by node set: the planes of symmetry.
+        """Return the directions held at zero throughout, by node set: the planes of symmetry.
 
         On the whole cylinder top and bottom line stay in the plane x = 0 and the ring at mid-span
         in z = 0, where symmetry has them anyway: frictionless supports hold it in height only.
@@ -321,13 +273,13 @@ class CylinderModel:
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Degrees of freedom held at zero throughout, 3 * node + direction, sorted."""
+        """Return degrees of freedom held at zero throughout, 3 * node + direction, sorted."""
         held = [3 * self.mesh.node_sets[n] + k for n, ks in self.guides.items() for k in ks]
         return np.unique(np.concatenate(held)).astype(np.intp)
 
     @property
     def held_on_inflation(self) -> NDArray[np.intp]:
-        """Degrees of freedom held at zero until the cylinder is inflated, sorted."""
+        """Return degrees of freedom held at zero until the cylinder is inflated, sorted."""
         bottom = 3 * self.mesh.node_sets["support_bottom"] + 1
         return np.union1d(self.fixed, bottom).astype(np.intp)
 
@@ -340,15 +292,11 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class RigidCylinder:
-    """A rigid post (infinitely long) that the membrane lies on, or a ring around it.
+    """A rigid post (infinitely long) that the membrane lies on, or a ring around it, mm.
 
-    Parameters
-    ----------
-    name : of its reaction in the history; bodies of one name are added up.
-    axis : unit vector. centre : mm.
-    radius : mm, outside of a post, inside of a ring.
-    ring : the membrane is inside.
-    length, fillet : mm, of a ring: how long it is and how its mouth is rounded.
+    name : of its reaction in the history; bodies of one name are added up. axis : unit vector.
+    radius : outside of a post, inside of a ring. length, fillet : of a ring: length and rounding of
+    its mouth.
     """
 
     name: str
@@ -364,14 +312,10 @@ class RigidCylinder:
 class Bending:
     """Rigid cylinders that bend an inflated membrane with a constant mass of gas in it.
 
-    Parameters
-    ----------
-    supports : bodies at rest; each is brought up along minus `direction` to touch first.
-    collar : the body that moves along `direction`; it is brought down to touch first.
-    displacements : mm of the collar from touching, increasing: the increments.
-    reported : index of each of them that is a frame; all unless given.
-    released : node set held only while inflating.
-    penalty : MPa/mm of contact. gas : what is closed in.
+    supports : bodies at rest, brought up along minus `direction` to touch first. collar : moves
+    along `direction`, brought down to touch first. displacements : mm of the collar from touching,
+    increasing: the increments. reported : index of each that is a frame; all unless given. released
+    : node set held only while inflating. penalty : MPa/mm of contact.
     """
 
     supports: Sequence[RigidCylinder]
@@ -388,21 +332,14 @@ class Bending:
 class InflatedModel:
     """A closed membrane of any shape, or the part of one that symmetry planes close.
 
-    Parameters
-    ----------
-    mesh : mm; quads counter-clockwise seen from outside.
-    thickness : mm, one or (elements,). warp : (3,) or (elements, 3) direction of the warp yarn,
-        projected on each facet.
-    pressures : MPa, increasing: the increments of inflation, and frames where nothing bends it.
-    supports : degrees of freedom held at zero, by node set; symmetry planes among them.
-    copies : how many times the mesh makes the whole (4 for a quarter): forces and volume are
-        reported for the whole.
-    bending : what happens after inflation.
+    mesh : mm; quads counter-clockwise seen from outside. thickness : mm, one or (elements,). warp :
+    (3,) or (elements, 3) direction of the warp yarn, projected on each facet. pressures : MPa,
+    increasing: increments of inflation, and frames where nothing bends it. supports : degrees of
+    freedom held at zero, by node set. copies : how many times the mesh makes the whole (4 for a
+    quarter), for which forces and volume are reported. bending : after inflation.
 
-    Raises
-    ------
-    InputError : pressures or displacements that do not increase, a thickness that is not
-        positive, a node set that the mesh does not have.
+    Raises InputError for steps that do not increase, a thickness that is not positive, unknown
+    sets.
     """
 
     mesh: Mesh
@@ -432,7 +369,7 @@ class InflatedModel:
                 )  # fmt: skip
 
     def fixed(self, bent: bool = False) -> NDArray[np.intp]:
-        """Held unknowns, 3 * node + direction, sorted; fewer once `bent`."""
+        """Return held unknowns, 3 * node + direction, sorted; fewer once `bent`."""
         released = self.bending.released if bent and self.bending else None
         dofs = [
             3 * self.mesh.node_sets[name] + direction
@@ -475,21 +412,12 @@ def inflated_cylinder(
     gas: Gas | None = None,
     reading: CurveReading | None = None,
 ) -> CylinderModel:
-    """A cylinder that is inflated and bent.
+    """Return a cylinder that is inflated and bent.
 
-    Parameters
-    ----------
-    diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge.
-    thickness : mm of one layer; the seam has three.
-    size : mm of an element; around the tube 0.4 of that, and along it a quarter next to collar and
-        supports.
-    collar : `usual_collar` unless given.
-    deflections : mm; 60 equal ones to 240 mm unless given, each an increment.
-    reading : by the diameter unless given.
-
-    Raises
-    ------
-    InputError : as `CylinderModel` and `cylinder_mesh`; a pressure or thickness not above zero.
+    diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge. thickness : mm of
+    one layer; the seam has three. size : mm of an element; around the tube 0.4 of that, and along
+    it a quarter next to collar and supports. deflections : mm; 60 equal ones to 240 mm unless
+    given, each an increment. Raises InputError as `CylinderModel` and `cylinder_mesh`.
     """
     for name, value in (("pressure", pressure), ("thickness", thickness)):
         if not 0 < value < math.inf:

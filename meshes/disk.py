@@ -1,4 +1,12 @@
-"""Quadrilateral meshes of the flat circular specimen, whole or one quarter of it."""
+"""Quadrilateral meshes of the flat circular or elliptic specimen, whole or one quarter of it.
+
+The quarter of the unit disk has three structured blocks (an o-grid), by transfinite interpolation.
+The core is a square with its far corner K pulled towards the rim and two bulging sides; two ring
+blocks join those sides to the arc. Three quads meet in K, so the best any such mesh can do is 120
+degrees there: scaled Jacobian sin(120) = 0.866. The sides are arcs that leave the axes at right
+angles and turn just so far that all three angles in K are 120 degrees; every element of every count
+then has 0.866 or more.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BubblefitError, InputError
-from .mesh import Mesh, snapped, with_mirror_image
-
-# A quarter of the unit disk in three structured blocks (an o-grid), by transfinite interpolation.
-#
-# The core is a square with its far corner K pulled towards the rim and two bulging sides; two ring
-# blocks join those sides to the arc. Three quads meet in K, so the best any such mesh can do is
-# 120 degrees there: scaled Jacobian sin(120) = 0.866. The sides are arcs that leave the axes at
-# right angles and turn just so far that all three angles in K are 120 degrees; every element of
-# every count then has 0.866 or more.
-
-Array = NDArray[np.float64]
+from .mesh import Array, Mesh, snapped, with_mirror_image
 
 #: Layers of the ring for each division of the core, at least and at most: beyond, elements are
 #: drawn out.
@@ -32,24 +30,11 @@ THINNEST, THICKEST = 1 / 3, 1.0
 RING_TO_CORE = 1.2
 
 
-def quarter_disk(elements: float) -> tuple[Array, NDArray[np.intp]]:
-    """Mesh the quarter x, y >= 0 of the unit disk.
-
-    Parameters
-    ----------
-    elements : quads wanted; the nearest count n^2 + 2 n m with good shapes is made.
-
-    Returns
-    -------
-    points (p, 2), quads (q, 4) counter-clockwise.
-    """
-    return divided_quarter_disk(*divisions(elements))
-
-
 def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
-    """The same with n divisions of the core and m layers of the ring: n^2 + 2 n m quads.
+    """Mesh the quarter x, y >= 0 of the unit disk with n^2 + 2 n m quads.
 
-    The 2 n + 1 nodes of the rim lie at equal angles.
+    n : divisions of the core. m : layers of the ring; the 2 n + 1 nodes of the rim lie at equal
+    angles. Returns points (p, 2), quads (q, 4) counter-clockwise.
     """
     core, ring = _core_and_ring(n, m)
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
@@ -62,7 +47,7 @@ def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
 
 
 def divisions(elements: float) -> tuple[int, int]:
-    """Core divisions n and ring layers m whose n^2 + 2 n m is nearest to `elements`.
+    """Return core divisions n and ring layers m whose n^2 + 2 n m is nearest to `elements`.
 
     Ties go to m nearest to n / 2, where sizes are most even; 200 gives (10, 5).
     """
@@ -75,7 +60,7 @@ def divisions(elements: float) -> tuple[int, int]:
 
 
 def _core_and_ring(n: int, m: int) -> tuple[Array, Array]:
-    """Points (n + 1, n + 1, 2) of the core and (m + 1, 2 n + 1, 2) of the ring, inside out."""
+    """Return points (n + 1, n + 1, 2) of the core and (m + 1, 2 n + 1, 2) of the ring."""
     # The last chord of a side should lie at 105 degrees: 60 from the diagonal, on either side
     # of it. A chord of n lags half a division behind its arc, hence the factor.
     turn = math.radians(15) * 2 * n / (2 * n - 1)
@@ -94,7 +79,7 @@ def _core_and_ring(n: int, m: int) -> tuple[Array, Array]:
 
 
 def _arc(start: Array, end: Array, turn: float, t: Array) -> Array:
-    """Points (len(t), 2) of the circular arc that turns left by `turn` between two points."""
+    """Return points (len(t), 2) of an arc that turns left by `turn` between two points."""
     chord = end - start
     length = np.sin(turn * t / 2) / math.sin(turn / 2)
     lean = -turn * (1 - t) / 2
@@ -104,7 +89,7 @@ def _arc(start: Array, end: Array, turn: float, t: Array) -> Array:
 
 
 def _transfinite(floor: Array, top: Array, left: Array, right: Array) -> Array:
-    """Coons patch (u, v, 2): floor and top (u, 2) run along u, left and right (v, 2) along v."""
+    """Return a Coons patch (u, v, 2): floor, top (u, 2) run along u, left, right (v, 2) along v."""
     u = np.linspace(0, 1, len(floor))[:, None, None]
     v = np.linspace(0, 1, len(left))[None, :, None]
     corners = (
@@ -119,7 +104,7 @@ def _transfinite(floor: Array, top: Array, left: Array, right: Array) -> Array:
 
 
 def _quads(nodes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Quads (q, 4) of a structured grid of node numbers (a, b)."""
+    """Return quads (q, 4) of a structured grid of node numbers (a, b)."""
     corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
@@ -135,35 +120,21 @@ def disk_mesh(
     symmetry: Literal["full", "quarter"] = "full",
     generator: Literal["blocks", "gmsh"] = "blocks",
 ) -> Mesh:
-    """Mesh a disk in the xy plane around the origin; warp is x, fill is y.
+    """Mesh a disk of `radius` mm in the xy plane around the origin; warp is x, fill is y.
 
-    Parameters
-    ----------
-    radius : mm.
-    elements : quads wanted on the FULL disk, 8 or more (the thesis: 800). The mesh has the
-        nearest number that well-shaped elements allow, four times that of a quarter: 800 gives
-        800, and the gap is at most 16 quads below 200 and 7 % above.
-    symmetry : the whole disk, or the quarter x, y >= 0 with a fourth of the elements. The whole
-        is the quarter mirrored.
-    generator : `blocks` is our own and needs nothing; `gmsh` loads that program's library.
+    elements : quads wanted on the FULL disk, 8 or more (the thesis: 800); the gap to the number
+    made is at most 16 below 200 and 7 % above. symmetry : the whole disk, or the quarter x, y >= 0
+    with a fourth of the elements. generator : `blocks` needs nothing; `gmsh` loads that library.
 
-    Returns
-    -------
-    Mesh : quads counter-clockwise (normal +z). Node sets: `rim`, `apex` (the centre); on a
-        quarter also `symmetry_x` (nodes on x = 0, where u_x = 0) and `symmetry_y` (on y = 0).
-
-    Raises
-    ------
-    InputError : a radius that is not positive, a count out of range, an unknown name.
-    BubblefitError : `gmsh` is asked for and cannot be loaded.
+    Quads are counter-clockwise (normal +z). Node sets: `rim`, `apex` (the centre); on a quarter
+    also `symmetry_x` (nodes on x = 0, where u_x = 0) and `symmetry_y`. Raises InputError for wrong
+    arguments, BubblefitError where gmsh cannot be loaded.
     """
     _check(radius, elements, symmetry, generator)
     if generator == "gmsh":
-        pass  # PACKED  # loads X and GL libraries
-
         points, quads = quarter_disk_by_gmsh(elements / 4)
     else:
-        points, quads = quarter_disk(elements / 4)
+        points, quads = divided_quarter_disk(*divisions(elements / 4))
     points = snapped(points, NEAR)
     if symmetry == "full":
         for axis in (0, 1):
@@ -200,7 +171,7 @@ def _check(radius: float, elements: int, symmetry: str, generator: str) -> None:
 
 
 def monomials(count: int) -> list[tuple[int, int]]:
-    """Powers (of x, of y) of the first `count` monomials: 1; x, y; x^2, xy, y^2; x^3 ..."""
+    """Return powers (of x, of y) of the first `count` monomials: 1; x, y; x^2, xy, y^2; x^3 ..."""
     powers: list[tuple[int, int]] = []
     degree = 0
     while len(powers) < count:
@@ -210,11 +181,11 @@ def monomials(count: int) -> list[tuple[int, int]]:
 
 
 def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
-    """The first `count` modes at points (n, 2) mm, (n,) each, by name: z0_1, z0_x, z0_y, z0_xx ...
+    """Return the first `count` modes at points (n, 2) mm, (n,) each: z0_1, z0_x, z0_y, z0_xx ...
 
-    A mode is (1 - r^2) x^a y^b with all lengths over the radius (mm), so that z0_1 is the height
-    of a paraboloid at the centre. z0_1, z0_xx, z0_yy, z0_xxxx ... are doubly symmetric; the others
-    are not.
+    A mode is (1 - r^2) x^a y^b with all lengths over the radius (mm), so that z0_1 is the height of
+    a paraboloid at the centre. z0_1, z0_xx, z0_yy, z0_xxxx ... are doubly symmetric; the others are
+    not.
     """
     x, y = points[:, 0] / radius, points[:, 1] / radius
     dome = 1.0 - x**2 - y**2
@@ -225,7 +196,7 @@ def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
 
 
 def doubly_symmetric(count: int) -> bool:
-    """Whether the first `count` modes are all even in x and in y."""
+    """Return whether the first `count` modes are all even in x and in y."""
     return all(a % 2 == 0 and b % 2 == 0 for a, b in monomials(count))
 
 
@@ -233,10 +204,8 @@ def doubly_symmetric(count: int) -> bool:
 class Outline:
     """An ellipse in the plane of the sheet; warp is x, fill is y.
 
-    Parameters
-    ----------
-    major, minor : mm, semi-axes; equal for a circle.
-    angle : degrees from the warp towards the fill to the major one; without meaning for a circle.
+    major, minor : mm, semi-axes; equal for a circle. angle : degrees from the warp towards the fill
+    to the major one.
     """
 
     major: float
@@ -245,34 +214,31 @@ class Outline:
 
     @classmethod
     def circle(cls, radius: float) -> Outline:
-        """Of a radius in mm."""
         return cls(radius, radius)
 
     @property
     def round(self) -> bool:
-        """Whether it is a circle."""
         return self.major == self.minor
 
     @property
     def doubly_symmetric(self) -> bool:
-        """Whether warp and fill are axes of symmetry."""
+        """Return whether warp and fill are axes of symmetry."""
         return self.round or self.angle % 90.0 == 0.0
 
     @property
     def radius(self) -> float:
-        """mm, mean of the semi-axes: what lengths are compared with."""
+        """Return the mean of the semi-axes, mm, with which lengths are compared."""
         return self.minor + 0.5 * (self.major - self.minor)
 
     @property
     def words(self) -> str:
-        """For messages."""
         if self.round:
             return f"radius {self.major:g} mm"
         return f"semi-axes {self.major:g} and {self.minor:g} mm"
 
     @property
     def stretch(self) -> Array:
-        """(2, 2) mm, symmetric: takes the unit disk onto the disk; a multiple of 1 for a circle."""
+        """Return the symmetric map (2, 2) mm of the unit disk onto the disk."""
         turn = np.radians(self.angle)
         # The axes along the yarns are exactly so: 6e-17 would move nodes off lines of symmetry.
         along = np.round([np.cos(turn), np.sin(turn)], 15)
@@ -281,21 +247,21 @@ class Outline:
         )
 
     def places(self, points: Array) -> Array:
-        """(n, 2) mm, where points (n, 2) of the unit disk lie."""
+        """Return (n, 2) mm of points (n, 2) of the unit disk."""
         return np.asarray(points @ self.stretch)
 
     def unit(self, places: Array) -> Array:
-        """(n, 2), points of the unit disk from places (n, 2) mm; the inverse of `places`."""
+        """Return (n, 2), points of the unit disk from places (n, 2) mm; the inverse of `places`."""
         if self.round:
             return np.asarray(places / self.major)
         return np.asarray(places @ np.linalg.inv(self.stretch))
 
     def share(self, places: Array) -> Array:
-        """(n,) of places (n, 2) mm: 0 at the centre, 1 on the edge."""
+        """Return (n,) of places (n, 2) mm: 0 at the centre, 1 on the edge."""
         return np.asarray(np.hypot(*self.unit(places).T))
 
     def edge(self, count: int = 181) -> Array:
-        """(count, 2) mm, once around, the last point the first."""
+        """Return (count, 2) mm, once around, the last point the first."""
         turn = np.linspace(0.0, 2 * np.pi, count)
         return self.places(np.column_stack([np.cos(turn), np.sin(turn)]))
 
@@ -312,18 +278,8 @@ def elliptic_disk_mesh(
 ) -> Mesh:
     """Mesh the sheet within an outline, in the xy plane; a circle has the mesh of `disk_mesh`.
 
-    Parameters
-    ----------
-    elements, symmetry, generator : as for `disk_mesh`.
-
-    Returns
-    -------
-    Mesh : with the node sets of `disk_mesh`.
-
-    Raises
-    ------
-    InputError : semi-axes that are not positive, too far apart or the wrong way round, a quarter
-        of an ellipse of which warp and fill are no axes; as `disk_mesh`.
+    Raises InputError for semi-axes that are not positive, too far apart or the wrong way round, a
+    quarter of an ellipse of which warp and fill are no axes; as `disk_mesh`.
     """
     disk = disk_mesh(outline.major, elements, symmetry, generator)
     if outline.round:
@@ -342,29 +298,16 @@ def elliptic_disk_mesh(
     return replace(disk, points=points)
 
 
-# A quarter of the unit disk by gmsh: unstructured, to see whether a result hangs on the mesh.
-#
-# Triangles, each cut into three quads: worst scaled Jacobian 0.6, where gmsh's recombining of
-# triangles gave 0.3 to 0.5 (4.15, 50 to 200 quads) and two of its algorithms did not end.
-
 QUAD = 3  # gmsh's number of the element type
 ATTEMPTS = 5  # at the size of triangle that gives the count wanted
 
 
 def quarter_disk_by_gmsh(elements: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Mesh the quarter x, y >= 0 of the unit disk.
+    """Mesh the quarter by gmsh, unstructured, to see if a result depends on the mesh.
 
-    Parameters
-    ----------
-    elements : quads wanted; an unstructured mesh comes near, within some per cent.
-
-    Returns
-    -------
-    points (p, 2), quads (q, 4) counter-clockwise.
-
-    Raises
-    ------
-    BubblefitError : gmsh or a library that it loads is not there, or gmsh fails.
+    Triangles, each cut into three quads: worst scaled Jacobian 0.6, where gmsh's recombining of
+    triangles gave 0.3 to 0.5 (4.15, 50 to 200 quads) and two of its algorithms did not end. Returns
+    as `quarter_disk`, within some per cent of `elements`; raises BubblefitError where gmsh fails.
     """
     gmsh = _loaded()
     # A caller's own gmsh session is left as it was.
@@ -399,7 +342,7 @@ def _loaded() -> ModuleType:
 
 
 def _nearest(gmsh: ModuleType, elements: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """The mesh of some sizes tried whose count is nearest to the one wanted."""
+    """Return the mesh, of some sizes tried, with the count nearest to the one wanted."""
     # Equilateral triangles of side h, three quads each, on an area of pi / 4.
     size = math.sqrt(math.pi / 4 * 3 / elements * 4 / math.sqrt(3))
     best = None
@@ -439,10 +382,7 @@ def _meshed(gmsh: ModuleType, size: float) -> tuple[NDArray[np.float64], NDArray
 
 
 def rim_form(points: Array) -> Array:
-    """The symmetric matrix Q (2, 2), 1/mm^2, with p Q p = 1 at the rim nodes p (n, 2) mm.
-
-    By least squares; of a circle 1 / radius^2 times the unit matrix.
-    """
+    """Return the symmetric Q (2, 2), 1/mm^2, with p Q p = 1 at rim nodes p (n, 2)."""
     size = float(np.abs(points).max())
     x, y = points.T / size
     terms = np.stack([x * x, 2 * x * y, y * y], axis=1)
@@ -451,5 +391,5 @@ def rim_form(points: Array) -> Array:
 
 
 def rim_share(form: Array, points: Array) -> Array:
-    """(n,) of points (n, 2) mm: 0 at the centre, 1 on the curve of the form."""
+    """Return (n,) of points (n, 2) mm: 0 at the centre, 1 on the curve of the form."""
     return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", points, form, points)))

@@ -1,6 +1,4 @@
-"""Quadrilateral surface meshes as plain data."""
-
-from __future__ import annotations
+"""Quadrilateral surface meshes as plain data: interpolation, strain, enclosed volume."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,14 +15,11 @@ from ..caching import compiled
 class Mesh:
     """A surface of four-node quadrilaterals.
 
-    Parameters
-    ----------
-    points : (n, 3) mm; warp is x, fill is y, unless `warp` says otherwise.
-    quads : (m, 4) node numbers, counter-clockwise seen from the side that pressure inflates to.
-    node_sets : node numbers by name, each sorted and without repeats.
-    element_sets : numbers of quads by name, likewise.
-    warp : (m, 3) direction of the warp yarn in each quad, unit vectors; None where it is the same
-        for all and the model's to say. The fill yarn is a quarter turn from it, counter-clockwise.
+    points : (n, 3) mm; warp is x, fill is y, unless `warp` says otherwise. quads : (m, 4) node
+    numbers, counter-clockwise seen from the side that pressure inflates to. node_sets, element_sets
+    : numbers by name, each sorted and without repeats. warp : (m, 3) unit direction of the warp
+    yarn in each quad; None where the model has one for all. The fill yarn is a quarter turn from
+    it, counter-clockwise.
     """
 
     points: NDArray[np.float64]
@@ -39,22 +34,16 @@ Numbers = NDArray[np.intp]
 
 
 def snapped(points: Array, near: float) -> Array:
-    """Points (n, k) with coordinates within `near` of zero exactly zero: cos(pi/2) is not."""
+    """Return points (n, k) with coordinates within `near` of zero exactly zero."""
     return np.where(np.abs(points) < near, 0.0, points)
 
 
 def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, Numbers, Numbers]:
-    """The mesh and its image in the plane where coordinate `axis` is exactly zero, sewn there.
+    """Return the mesh and its image in the plane where coordinate `axis` is exactly zero, joined.
 
-    Parameters
-    ----------
-    points : (n, k) mm. quads : (m, 4).
-
-    Returns
-    -------
-    points (n', k), those given first; quads (2 m, 4), those given first and then their images in
-    the same order, wound so that a normal is the image of the normal; and (n',) which of the
-    points given each node is or mirrors.
+    Returns points (n', k) and quads (2 m, 4), those given first, then their images in the same
+    order, wound so that a normal is the image of the normal; and (n',) the given point that each
+    node is or mirrors.
     """
     off = points[:, axis] != 0
     image = np.arange(len(points))
@@ -71,15 +60,9 @@ INSIDE = 1.0 + 1e-6
 
 
 def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
-    """Bilinear interpolation from the nodes of a mesh in the xy plane to points in it.
+    """Return bilinear interpolation from the nodes of a mesh in the xy plane to points (n, 2) mm.
 
-    Parameters
-    ----------
-    points : (n, 2) mm.
-
-    Returns
-    -------
-    matrix (inside points, nodes) and inside (n,): which points lie in the mesh at all.
+    Returns the matrix (inside points, nodes) and inside (n,), which points lie in the mesh.
     """
     corner = mesh.points[:, :2][mesh.quads]
     count = min(NEIGHBOURS, len(mesh.quads))
@@ -107,7 +90,7 @@ def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[n
 
 
 def _natural(corner: Array, point: Array) -> Array:
-    """Natural coordinates (n, 2) of point (n, 2) in quads (n, 4, 2), by Newton; NaN-free."""
+    """Return natural coordinates (n, 2) of point (n, 2) in quads (n, 4, 2), by Newton; NaN-free."""
     a = corner.mean(axis=1)
     b = 0.25 * (-corner[:, 0] + corner[:, 1] + corner[:, 2] - corner[:, 3])
     c = 0.25 * (-corner[:, 0] - corner[:, 1] + corner[:, 2] + corner[:, 3])
@@ -129,7 +112,7 @@ MIDDLE = 0.25 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
-    """(quads, 3) log strain (eps1, eps2, gamma12) of a mesh in the xy plane.
+    """Return (quads, 3) log strain (eps1, eps2, gamma12) of a mesh in the xy plane.
 
     displacement : (nodes, 3) mm; warp : (3,) direction of the warp yarn in the plane, at rest.
     """
@@ -143,10 +126,9 @@ def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
 
 
 def surface_strain(mesh: Mesh, displacement: Array) -> Array:
-    """(quads, 3) log strain (eps1, eps2, gamma12) in the middle of the quads of a curved mesh.
+    """Return (quads, 3) log strain (eps1, eps2, gamma12) at the middles of a curved mesh.
 
-    mesh : with the direction of its `warp` in each quad, which is projected on the quad's tangent
-    plane. displacement : (nodes, 3) mm.
+    mesh : its `warp` is projected on each quad's tangent plane. displacement : (nodes, 3) mm.
     """
     if mesh.warp is None:
         raise ValueError("surface_strain: the mesh has no direction of the warp in each quad")
@@ -166,7 +148,7 @@ def surface_strain(mesh: Mesh, displacement: Array) -> Array:
 
 
 def log_strain_of(gradient: Array) -> Array:
-    """Log strain (..., 3) of surface gradients (..., 3, 2): eps1, eps2, gamma12.
+    """Return log strain (..., 3) of surface gradients (..., 3, 2): eps1, eps2, gamma12.
 
     The columns of a gradient are the images of the unit warp and fill vectors.
     """
@@ -174,13 +156,6 @@ def log_strain_of(gradient: Array) -> Array:
     h = np.einsum("...ia,...a,...ja->...ij", axes, 0.5 * np.log(stretch), axes)
     return np.stack([h[..., 0, 0], h[..., 1, 1], 2 * h[..., 0, 1]], axis=-1)
 
-
-# The volume that a surface of quads encloses, and its derivative.
-#
-# By the divergence theorem V = 1/3 * integral of x . n over the surface. A plane of symmetry
-# through the origin adds nothing, so that a quarter needs no lids: its volume is a quarter of the
-# whole for as long as its open edges stay in their planes. One compiled loop serves meshes,
-# CalculiX' results and every iteration of the membrane solver.
 
 _G = 1 / np.sqrt(3)
 _AT = _G * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -197,36 +172,27 @@ _EVEN, _ORIGIN = np.full(3, 1 / 3), np.zeros(3)
 
 
 def enclosed_volume(points: Array, quads: NDArray[np.intp]) -> float:
-    """Volume inside a surface, mm^3, exact for bilinear quads; negative when normals point in.
+    """Return the volume inside a surface, mm^3; negative when normals point in.
 
-    Parameters
-    ----------
-    points : (n, 3) mm, deformed or not. quads : (m, 4), closed but for edges in planes through
-        the origin.
+    quads : (m, 4), closed but for edges in planes through the origin.
     """
     return volume_and_gradient(points, quads)[0]
-
-
-def volume_gradient(points: Array, quads: NDArray[np.intp]) -> Array:
-    """Derivative (n, 3) mm^2 of the enclosed volume with respect to the nodes' positions.
-
-    The integral of shape function times normal, exact for bilinear quads: times a pressure it is
-    the force of that pressure on each node. On an open edge it is the derivative for moves in the
-    plane of that edge, and the force on the part that is meshed.
-    """
-    return volume_and_gradient(points, quads)[1]
 
 
 def volume_and_gradient(
     points: Array, quads: NDArray[np.intp], weight: Array = _EVEN, origin: Array = _ORIGIN
 ) -> tuple[float, Array]:
-    """Volume (mm^3) and its derivative (n, 3) mm^2.
+    """Return the volume (mm^3) and its derivative (n, 3) mm^2, exact for bilinear quads.
 
-    Parameters
-    ----------
+    V = 1/3 * integral of x . n: a plane of symmetry through the origin adds nothing, so that a
+    quarter needs no lids as long as its open edges stay in their planes.
+
+    Times a pressure the latter is the force of that pressure on each node. On an open edge it is
+    for moves in the plane of that edge.
+
     weight : (3,) adding to one: V = sum_k weight_k * integral of (x_k - origin_k) n_k. A surface
-        that is open in direction k at both ends has weight 0 there.
-    origin : (3,) mm, in the planes of symmetry.
+    that is open in direction k at both ends has weight 0 there. origin : (3,) mm, in the planes of
+    symmetry.
     """
     gradient = np.zeros(points.shape)
     points = np.ascontiguousarray(points, dtype=float)

@@ -1,11 +1,16 @@
 """Nodal fields of a curved sheet read between its nodes: without the sag of flat quads.
 
 A quad of edge h under a surface of curvature k sags by up to k h^2 / 4 between its nodes: 0.2 to
-0.4 mm of an inflated bubble on a hundred quads, many times what a camera is uncertain by. The
-nodes themselves are far better than that. So every node has a quadratic of its own, through its
-value and as near as possible to its neighbours', and a point in a quad reads those of the four
-corners, weighted by its bilinear shape functions. Nodal values are kept, quadratics are exact, and
-what is read is continuous and linear in the nodal values.
+0.4 mm of an inflated bubble on a hundred quads, many times what a camera is uncertain by. The nodes
+themselves are far better than that. So every node has a quadratic of its own, through its value and
+as near as possible to its neighbours', and a point in a quad reads those of the four corners,
+weighted by its bilinear shape functions. Nodal values are kept, quadratics are exact, and what is
+read is continuous and linear in the nodal values.
+
+Image correlation does not see the displacement of a point. It fits a polynomial (its shape
+function) to all that lies in a square facet around it and takes its value in the middle; most
+programs then smooth neighbouring points. Both are linear: weights at places around the point, the
+same for a model as for the fabric, so that the model can be read in the same way.
 """
 
 from __future__ import annotations
@@ -18,9 +23,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Mesh, sampling_matrix
-
-Array = NDArray[np.float64]
+from .mesh import Array, Mesh, sampling_matrix
 
 #: Neighbours that a node needs for its quadratic; with fewer, theirs are asked, too.
 ENOUGH = 8
@@ -40,16 +43,10 @@ class SmoothReading:
 
     @classmethod
     def of(cls, mesh: Mesh) -> SmoothReading:
-        """Of a mesh."""
         return cls(mesh, _quadratics(mesh))
 
     def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
-        """From the nodes to points (n, 2) mm.
-
-        Returns
-        -------
-        matrix (inside points, nodes) and inside (n,): which points lie in the mesh at all.
-        """
+        """Return the matrix (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
         bilinear, inside = sampling_matrix(self.mesh, points)
         shares = bilinear.tocoo()
         away = points[inside][shares.row] - self.mesh.points[shares.col, :2]
@@ -88,7 +85,7 @@ def _quadratics(mesh: Mesh) -> sp.csr_matrix:
 
 
 def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
-    """Nodes of the quads around each node, and of those around them where they are too few."""
+    """Return nodes of the quads around each node, and of those around them where too few."""
     count, each = len(mesh.points), mesh.quads.shape[1]
     of_quad = np.repeat(np.arange(len(mesh.quads)), each)
     ones = np.ones(mesh.quads.size, dtype=np.int64)
@@ -106,13 +103,6 @@ def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
     return found
 
 
-# Nodal fields as a camera's correlation reads them: over a facet, and smoothed over a window.
-#
-# Image correlation does not see the displacement of a point. It fits a polynomial (its shape
-# function) to all that lies in a square facet around it and takes its value in the middle; most
-# programs then smooth neighbouring points. Both are linear: weights at places around the point,
-# the same for a model as for the fabric, so that the model can be read in the same way.
-
 #: Gauss points along a side of a facet: exact for polynomials to the ninth degree.
 GAUSS = 5
 #: Of a facet, that has to lie in the mesh.
@@ -121,18 +111,12 @@ LEAST_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Facet:
-    """How a camera's correlation sees a place.
+    """The way in which a camera's correlation sees a place.
 
-    Parameters
-    ----------
-    size : mm, side of the square facet in the reference picture.
-    order : of its shape function, 1 (the mean, and a slope) or 2.
-    window : points along a side of the square over whose mean displacements are smoothed, odd.
-    step : mm, between neighbouring points; needed for a window of more than one.
-
-    Raises
-    ------
-    InputError : what is none of these.
+    size : mm, side of the square facet in the reference picture. order : of its shape function, 1
+    (the mean, and a slope) or 2. window : points along a side of the square over whose mean
+    displacements are smoothed, odd. step : mm between neighbouring points, needed for a window.
+    Raises InputError.
     """
 
     size: float
@@ -152,21 +136,21 @@ class Facet:
 
     @cached_property
     def places(self) -> tuple[Array, Array]:
-        """(m, 2) mm from the middle of a facet, and the shares (m,) of its area there."""
+        """Return (m, 2) mm from the middle of a facet, and the shares (m,) of its area there."""
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
         x, y = np.meshgrid(0.5 * self.size * nodes, 0.5 * self.size * nodes)
         return np.column_stack([x.ravel(), y.ravel()]), np.outer(weights, weights).ravel() / 4
 
     @cached_property
     def centres(self) -> Array:
-        """(window^2, 2) mm, of the facets over which a point is smoothed."""
+        """Return (window^2, 2) mm, of the facets over which a point is smoothed."""
         half = (self.window - 1) // 2
         along = np.arange(-half, half + 1) * (self.step or 0.0)
         x, y = np.meshgrid(along, along)
         return np.column_stack([x.ravel(), y.ravel()])
 
     def weights(self, seen: NDArray[np.bool_]) -> Array:
-        """(m,) weights of the places of which `seen` says that the camera sees them; zero else.
+        """Return (m,) weights of the places that the camera sees; zero of the others.
 
         By least squares over what is seen: a polynomial of the order keeps its value in the middle.
         """
@@ -187,12 +171,7 @@ class FacetReading:
     facet: Facet
 
     def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
-        """From the nodes to points (n, 2) mm; of a facet that reaches over the edge the rest.
-
-        Returns
-        -------
-        matrix (inside points, nodes) and inside (n,): which points lie in the mesh at all.
-        """
+        """Return as `SmoothReading.matrix`; a facet over the edge reads the rest."""
         _, inside = self.reading.matrix(points)
         own = points[inside]
         total = sp.csr_matrix((len(own), len(self.reading.mesh.points)))
@@ -209,7 +188,7 @@ class FacetReading:
         return sp.csr_matrix(sp.diags(1.0 / np.maximum(count, 1.0)) @ total), inside
 
     def _facets(self, middles: Array) -> tuple[sp.csr_matrix, Array]:
-        """Rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
+        """Return rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
         offsets, share = self.facet.places
         places = (middles[:, None] + offsets).reshape(-1, 2)
         read, inside = self.reading.matrix(places)

@@ -1,6 +1,4 @@
-"""The uniaxial strip tests (thesis chapter 3.3) as plain data."""
-
-from __future__ import annotations
+"""The uniaxial strip tests (thesis chapter 3.3) and the biaxial patch as plain data."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,9 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .bubble_model import OfThickness
-from .mesh import Mesh
-
-Array = NDArray[np.float64]
+from .mesh import Array, Mesh
 
 
 def strip_mesh(
@@ -26,28 +22,17 @@ def strip_mesh(
     gauge_length: float | None = None,
     symmetry: Literal["full", "half"] = "full",
 ) -> Mesh:
-    """Rectangular quads in the xy plane, the middle of the width at x = 0, y from 0 to length.
+    """Mesh a rectangle in the xy plane, the middle of the width at x = 0, y from 0 to length.
 
-    Parameters
-    ----------
-    width : mm, of the WHOLE strip.
-    length : mm, between the lower and the upper end.
-    across, along : quads in each direction, across counted on what is meshed; even across on a
-        whole strip, so that there are nodes on its middle line.
-    gauge_length : mm between the two gauge nodes, which lie on the middle line at equal distance
-        from both ends; the rows between them are stretched or squeezed to meet it exactly. The
-        whole length unless given.
-    symmetry : the whole strip, or the half x >= 0.
+    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed; even across on
+    a whole strip, so that there are nodes on its middle line. gauge_length : mm between the two
+    gauge nodes on the middle line, at equal distance from both ends; the rows between them are
+    stretched or squeezed to meet it exactly. The whole length unless given. symmetry : the whole
+    strip, or the half x >= 0.
 
-    Returns
-    -------
-    Mesh : quads counter-clockwise (normal +z). Node sets: `bottom`, `top` (the ends), `gauge` (two
-        nodes, the lower first), `free_edges`; on a half also `symmetry_x` (x = 0, where u_x = 0).
-
-    Raises
-    ------
-    InputError : lengths that are not positive, a gauge that does not fit, counts that are not
-        whole numbers above zero, an odd number of quads across a whole strip.
+    Quads are counter-clockwise (normal +z). Node sets: `bottom`, `top` (the ends), `gauge` (two
+    nodes, the lower first), `free_edges`; on a half also `symmetry_x` (x = 0, where u_x = 0).
+    Raises InputError for lengths, counts or a gauge that do not fit.
     """
     gauge = length if gauge_length is None else gauge_length
     for name, value in (("width", width), ("length", length), ("gauge_length", gauge)):
@@ -82,7 +67,7 @@ def strip_mesh(
 
 
 def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
-    """Heights of the rows of nodes (along + 1,), and the row of the lower gauge node.
+    """Return heights of the rows of nodes (along + 1,), and the row of the lower gauge node.
 
     The gauge gets the number of rows, as odd or even as `along`, that keeps the quads nearest to
     one height.
@@ -108,7 +93,7 @@ def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
 
 
 def yarn_direction(angle: float) -> Array:
-    """Unit vector (3,) of a yarn at `angle` degrees from the pull (y), turned towards x."""
+    """Return the unit vector (3,) of a yarn `angle` degrees from the pull (y) towards x."""
     turn = math.radians(angle)
     return np.array([math.sin(turn), math.cos(turn), 0.0])
 
@@ -127,26 +112,17 @@ WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
 class UniaxialModel(OfThickness):
     """A strip in its plane whose lower end is pulled down until the gauge has a given length.
 
-    The elongation of the gauge is prescribed, as it was measured; the displacement of the pulled
-    end that brings it about is part of the answer. Both are the same where the gauge is the
-    whole strip.
+    The elongation of the gauge is prescribed, as measured; the displacement of the pulled end that
+    brings it about is part of the answer. mesh : mm, in the xy plane, pulled along y; node sets
+    `gauge` (two nodes), `bottom` and those in `supports`. warp : (3,) direction of the warp yarn;
+    the fill yarn is 90 degrees from it, counter-clockwise. thickness : mm, in the reference state.
+    elongations : mm of the gauge, increasing: the increments of the law, every one reported.
+    supports : degrees of freedom held at zero, by node set (every node stays in the plane). pulled
+    : the node set that moves along -y. load_factor : multiplies the reaction: 2 for one half of the
+    width.
 
-    Parameters
-    ----------
-    mesh : mm, in the xy plane, pulled along y; node sets `gauge` (two nodes), `bottom` and those
-        in `supports`.
-    warp : (3,) direction of the warp yarn. The fill yarn is 90 degrees from it, counter-clockwise.
-    thickness : mm, in the reference state.
-    elongations : mm of the gauge, strictly increasing: the increments over which the law is
-        integrated, every one reported.
-    supports : degrees of freedom held at zero, by node set (every node stays in the plane).
-    pulled : the node set that moves along -y.
-    load_factor : what the reaction is multiplied with: 2 for one half of the width.
-
-    Raises
-    ------
-    InputError : a node set that is not there, elongations that do not increase, a thickness or
-        load factor that is not positive, a pulled set that is also supported along y.
+    Raises InputError for a missing node set, elongations that do not increase, a thickness or load
+    factor that is not positive, a pulled set that is also supported along y.
     """
 
     mesh: Mesh
@@ -176,18 +152,18 @@ class UniaxialModel(OfThickness):
 
     @property
     def gauge_length(self) -> float:
-        """Distance of the two gauge nodes, mm."""
+        """Return the distance of the two gauge nodes, mm."""
         lower, upper = self.mesh.points[self.mesh.node_sets["gauge"]]
         return float(np.linalg.norm(upper - lower))
 
     @property
     def driven(self) -> NDArray[np.intp]:
-        """Degrees of freedom that move with the pulled end, 3 * node + direction, sorted."""
+        """Return degrees of freedom that move with the pulled end, 3 * node + direction, sorted."""
         return np.sort(3 * self.mesh.node_sets[self.pulled] + 1).astype(np.intp)
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Degrees of freedom held at zero, sorted: the supports, and all out of the plane."""
+        """Return degrees of freedom held at zero, sorted, all out of the plane included."""
         held = [3 * self.mesh.node_sets[n] + k for n, ks in self.supports.items() for k in ks]
         return np.unique(np.concatenate([*held, 3 * np.arange(len(self.mesh.points)) + 2]))
 
@@ -202,13 +178,10 @@ def straight_strip(
     across: int = QUADS["straight"][0],
     along: int = QUADS["straight"][1],
 ) -> UniaxialModel:
-    """Warp or fill test: one half of the width over the gauge length (Fig. 3.5; 40 quads).
+    """Return a warp or fill test: half of the width over the gauge length (Fig. 3.5; 40 quads).
 
-    Parameters
-    ----------
-    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1).
-    width : mm, of the whole strip; the load is that of the whole strip, too.
-    across, along : quads on the half.
+    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1). width : mm, of the
+    whole strip, of which the load is. across, along : quads on the half.
     """
     if direction not in ("warp", "fill"):
         raise InputError(None, "direction", f"expected 'warp' or 'fill', got {direction!r}")
@@ -230,13 +203,10 @@ def bias_strip(
     across: int = QUADS["bias"][0],
     along: int = QUADS["bias"][1],
 ) -> UniaxialModel:
-    """Bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
+    """Return a bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
 
-    Parameters
-    ----------
-    gauge_length, final_length : mm, of the virtual strain gauge in the middle (Table 3.1).
-    length : mm, between the grips at the start.
-    angle : degrees from the pull to the warp yarn.
+    gauge_length, final_length : mm, of the virtual strain gauge in the middle (Table 3.1). length :
+    mm, between the grips at the start. angle : degrees from the pull to the warp yarn.
     """
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
@@ -244,10 +214,7 @@ def bias_strip(
 
 
 def refined_quads(strip: Literal["straight", "bias"], factor: float) -> dict[str, int]:
-    """The thesis' `across` and `along` of a strip times a factor, to the nearest that can be made.
-
-    A bias strip is whole and has nodes on its middle line: an even number across.
-    """
+    """Return the thesis' `across` and `along` times a factor, to the nearest that can be made."""
     across, along = (factor * count for count in QUADS[strip])
     if strip == "bias":
         return {"across": max(2, 2 * round(across / 2)), "along": max(3, round(along))}
@@ -278,15 +245,8 @@ FAR_CORNER = 2
 class PatchModel(OfThickness):
     """A square of the sheet, warp along x and fill along y, with loads per width on its edges.
 
-    Parameters
-    ----------
-    loads : (n, 2) N/mm (the same number as kN/m) along warp and fill, forces over the width before
-        the test: the increments over which the law is integrated, every one reported.
-    thickness : mm, before the test.
-
-    Raises
-    ------
-    InputError : loads that are not such numbers, a thickness that is not positive.
+    loads : (n, 2) N/mm (kN/m) along warp and fill over the width before the test: the increments of
+    the law, every one reported. thickness : mm, before the test. Raises InputError.
     """
 
     loads: Array
@@ -304,7 +264,7 @@ class PatchModel(OfThickness):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """One quad, for solvers that need a mesh."""
+        """Return one quad, for solvers that need a mesh."""
         points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
         return Mesh(
@@ -314,7 +274,7 @@ class PatchModel(OfThickness):
         )
 
     def displacements(self, elongation: ArrayLike) -> Array:
-        """(n, 4, 3) mm of the corners at elongations (n, 2)."""
+        """Return (n, 4, 3) mm of the corners at elongations (n, 2)."""
         e = np.asarray(elongation, dtype=float)
         moved = np.zeros((len(e), 4, 3))
         moved[:, :, :2] = self.mesh.points[:, :2] * e[:, None, :]
@@ -322,5 +282,6 @@ class PatchModel(OfThickness):
 
 
 def elongations(displacement: ArrayLike) -> Array:
-    """(n, 2, ...) elongation along warp and fill from displacements (n, 4, 3, ...) of a patch."""
+    """Return (n, 2, ...) elongations along warp and fill of displacements (n, 4, 3, ...) of a
+    patch."""
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE

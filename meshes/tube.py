@@ -1,11 +1,10 @@
 """The cylinder of the bending test: a tube with a seam, closed by flat caps.
 
 Axes: z along the cylinder, y up (the collar pushes along -y), x sideways; the origin is the middle
-of the axis. The seam lies at the bottom, on the supports (thesis section 6.2). The planes of
-symmetry of three-point bending are x = 0, the vertical one through the axis, and z = 0, mid-span.
+of the axis. Angles go from the bottom (y < 0), where the seam lies on the supports (thesis section
+6.2), by the side x > 0 to the top. The planes of symmetry of three-point bending are x = 0, the
+vertical one through the axis, and z = 0, mid-span.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -19,20 +18,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .disk import divided_quarter_disk
-from .mesh import Mesh, snapped, with_mirror_image
+from .mesh import Array, Mesh, snapped, with_mirror_image
 
-# Half of a tube along z as a grid of quads, and the half disk that closes its end.
-#
-# Angles go from the bottom (y < 0) by the side x > 0 to the top.
-
-Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 NEAR = 1e-9  # in radii
 
 
 def angles(n: int, seam: float) -> Array:
-    """Angles (4 n + 1,) of the rows of nodes from the bottom (0) to the top (pi).
+    """Return angles (4 n + 1,) of the rows of nodes from the bottom (0) to the top (pi).
 
     Equal but for the lowest quarter, where a row is put on the edge of the seam, at `seam`.
     """
@@ -46,20 +40,19 @@ def angles(n: int, seam: float) -> Array:
 
 
 def of_equal_area(angle: Array, radius: float) -> float:
-    """How far (mm) from the axis the nodes at these angles enclose the area of the circle.
+    """Return how far (mm) from the axis nodes at these angles enclose the area of the circle.
 
-    A polygon inscribed in the circle has too little area, 2.6 % of it with 16 sides: too little gas
-    in it, and too little force of the gas on a cross-section. Half of the polygon with its corners
-    at a distance r has r^2/2 times the sum of the sines of the angles between them, half of the
-    circle pi/2 radius^2.
+    An inscribed polygon has too little area (2.6 % with 16 sides), too little gas in it, and too
+    little force on a cross-section. Half of the polygon with its corners at r has r^2/2 times the
+    sum of the sines of the angles between them, half of the circle pi/2 radius^2.
     """
     return radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))
 
 
 def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Numbers]:
-    """Points, quads row by row, and the grid of node numbers (along, around).
+    """Return points, quads row by row, and the grid of node numbers (along, around).
 
-    radius : mm, of the nodes, as `of_equal_area` has it.
+    radius : mm, of the nodes, as `of_equal_area` returns it.
     """
     circle = radius * snapped(np.stack([np.sin(angle), -np.cos(angle)], axis=1), NEAR)
     points = np.concatenate(
@@ -74,7 +67,7 @@ def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Nu
 def with_cap(
     points: Array, quads: Numbers, grid: Numbers, angle: Array, n: int
 ) -> tuple[Array, Numbers, int]:
-    """The tube with the half disk that closes it sewn on; and how many quads are the tube's."""
+    """Return the tube with the half disk that closes it; and how many quads are the tube's."""
     quarter, pattern = divided_quarter_disk(n, max(1, round(n / 2)))
     disk, pattern, _ = with_mirror_image(snapped(quarter, NEAR), pattern, 1)
     at, far = np.arctan2(disk[:, 0], -disk[:, 1]), np.hypot(disk[:, 0], disk[:, 1])
@@ -101,16 +94,9 @@ SAMPLES = 20
 class Refinement:
     """Small elements around a place on the axis, and a row of nodes exactly there.
 
-    Parameters
-    ----------
-    name : of the node set that holds the row.
-    position : mm from the middle, 0 or more.
-    reach : mm to either side in which the elements are small; beyond, they grow.
-    size : mm along the axis.
-
-    Raises
-    ------
-    InputError : a name that is not letters, digits and _; lengths that are negative or no numbers.
+    name : of the node set that holds the row. position : mm from the middle, 0 or more. reach : mm
+    to either side in which the elements are small; beyond, they grow. size : mm along the axis.
+    Raises InputError.
     """
 
     name: str
@@ -132,19 +118,10 @@ class Refinement:
 
 
 def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Array:
-    """Positions of rows from 0 to `end`, `size` apart and closer at the refinements.
+    """Return positions (rows,) from 0 to `end`, `size` apart (mm) and closer at the refinements.
 
-    Parameters
-    ----------
-    end, size : mm.
-
-    Returns
-    -------
-    (rows,) mm, increasing, with 0, `end` and the position of every refinement among them.
-
-    Raises
-    ------
-    InputError : a refinement beyond the end, or nearer than half its size to the end or another.
+    Among them are 0, `end` and the position of every refinement. Raises InputError for a refinement
+    beyond the end, or nearer than half its size to the end or another.
     """
     places = sorted({0.0, float(end)} | {float(r.position) for r in refinements})
     for r in refinements:
@@ -163,7 +140,7 @@ def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Arr
 
 
 def _between(start: float, end: float, size: float, refinements: Sequence[Refinement]) -> Array:
-    """Rows after `start` up to `end`: equal parts of the integral of the wanted density."""
+    """Return rows after `start` up to `end`: equal parts of the integral of the wanted density."""
     finest = min([size, *(r.size for r in refinements)])
     count = max(SAMPLES, math.ceil(SAMPLES * (end - start) / finest))
     z = np.linspace(start, end, count + 1)
@@ -207,34 +184,21 @@ def cylinder_mesh(
     """Mesh the middle surface of a cylinder with flat caps.
 
     The nodes of the tube lie a little further out than the radius, so that its cross-sections and
-    the caps, which are polygons, have the area of the circle, and the cylinder its volume.
-
-    Parameters
-    ----------
-    length, diameter : mm, of the whole cylinder before inflation.
-    size : mm, of an element.
-    seam_width : mm around the tube, centred at the bottom; its edges are rows of nodes.
-    symmetry : the quarter x, z >= 0, or the whole: the quarter mirrored twice.
-    refinements : places along the half z >= 0 with smaller elements (supports, collar).
-    cap_warp : axis that the warp yarn of the caps follows.
+    the caps, which are polygons, have the area of the circle, and the cylinder its volume. length,
+    diameter : mm, of the whole cylinder before inflation. size : mm, of an element. seam_width : mm
+    around the tube, centred at the bottom; its edges are rows of nodes. symmetry : the quarter x, z
+    >= 0, or the whole: the quarter mirrored twice. refinements : places along the half z >= 0 with
+    smaller elements (supports, collar). cap_warp : axis that the warp yarn of the caps follows.
     around : sides around the tube, in sizes: a whole number of quads, a multiple of eight, goes
-        around it, at most 5 % longer where the seam lets them. The caps' quads are as large.
+    around it, at most 5 % longer where the seam lets them.
 
-    Returns
-    -------
-    Mesh : normals out of the cylinder; `warp` is z on the tube and as given on the caps. Element
-        sets, which share no quad: `body`, `seam` (where there is one), `caps`. Node sets: the
-        nodes of each of them, `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`,
-        `bottom_line` and `side_line` (along the tube: highest, lowest, at y = 0), `cap_centres`,
-        by the name of each refinement its row of nodes, on the whole cylinder at z and -z, and
-        NAME_bottom, the lowest of them; on a quarter also `symmetry_x` (nodes on x = 0, where
-        u_x = 0) and `symmetry_z` (on z = 0).
-
-    Raises
-    ------
-    InputError : lengths that are not positive, elements larger than the radius or too many of
-        them, a seam too narrow for them or wider than a quarter of the tube, refinements that do
-        not fit or share a name.
+    Normals point out; `warp` is z on the tube and as given on the caps. Element sets, which share
+    no quad: `body`, `seam` (where there is one), `caps`. Node sets: the nodes of each of them,
+    `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`, `bottom_line` and `side_line`
+    (along the tube), `cap_centres`, by the name of each refinement its row of nodes (on the whole
+    cylinder at z and -z), and NAME_bottom, the lowest of them; on a quarter also `symmetry_x`
+    (nodes on x = 0, where u_x = 0) and `symmetry_z`. Raises InputError for lengths, sizes, a seam
+    or refinements that do not fit.
     """
     _check(length, diameter, size, seam_width, symmetry, cap_warp, around)
     radius = 0.5 * diameter
@@ -311,7 +275,7 @@ def _check(
 def _lines(
     count: int, grid: Numbers, points: Array, z: Array, refinements: Sequence[Refinement]
 ) -> Masks:
-    """Node sets of the tube's rows and of the caps' centres."""
+    """Return node sets of the tube's rows and of the caps' centres."""
     middle = grid.shape[1] // 2
     members = {
         "ends": grid[-1],
@@ -330,27 +294,21 @@ def _lines(
     return {name: np.isin(np.arange(count), nodes) for name, nodes in members.items()}
 
 
-def merged(points: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes at one place made one."""
-    _, first, inverse = np.unique(
-        np.round(points, 6), axis=0, return_index=True, return_inverse=True
-    )
-    return points[first], inverse.ravel()[quads]
-
-
 def block(surface: np.ndarray, first: int) -> np.ndarray:
-    """Quads of a grid of points (rows, columns, 3) numbered from `first`."""
+    """Return quads of a grid of points (rows, columns, 3) numbered from `first`."""
     rows, columns = surface.shape[:2]
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel() + first
     return np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=1)
 
 
 def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
-    """Blocks joined, outward seen from the middle of the surface; sets by plane and pole."""
+    """Join blocks, outward seen from the middle of the surface; sets by plane and pole."""
     starts = np.cumsum([0] + [b.shape[0] * b.shape[1] for b in blocks])
     points = np.concatenate([b.reshape(-1, 3) for b in blocks])
     quads = np.concatenate([block(b, s) for b, s in zip(blocks, starts, strict=False)])
-    points, quads = merged(points, quads)
+    rounded = np.round(points, 6)
+    _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    points, quads = points[first], inverse.ravel()[quads]
     p = points[quads]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     inward = np.einsum("mk,mk->m", normal, p.mean(axis=1)) < 0
@@ -362,7 +320,7 @@ def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
 
 
 def sphere_octant(n: int, radius: float) -> Mesh:
-    """3 n^2 facets of a cube blown up, in x, y, z >= 0."""
+    """Return 3 n^2 facets of a cube blown up, in x, y, z >= 0."""
     side = np.tan(np.linspace(0, np.pi / 4, n + 1))
     a, b = np.meshgrid(side, side, indexing="ij")
     cube = np.stack([np.ones_like(a), a, b], axis=-1)
@@ -371,10 +329,10 @@ def sphere_octant(n: int, radius: float) -> Mesh:
 
 
 def half_tube(across: int, along: int, radius: float, length: float, caps: bool = True) -> Mesh:
-    """x >= 0 half of a tube along z from 0 to length, at `length` a flat cap (or nothing).
+    """Mesh the x >= 0 half of a tube along z from 0 to length, closed at `length` by a flat cap.
 
-    `across` facets (a multiple of 4) around the half circle; set "end" at z = length, "foot" on
-    the lowest line.
+    `across` facets (a multiple of 4) around the half circle; set "end" at z = length, "foot" on the
+    lowest line.
     """
     angle = np.linspace(-np.pi / 2, np.pi / 2, across + 1)
     circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -409,6 +367,6 @@ def half_tube(across: int, along: int, radius: float, length: float, caps: bool 
 
 
 def tube_warp(mesh: Mesh, length: float) -> np.ndarray:
-    """Warp along the tube; along x in the cap."""
+    """Return the warp along the tube, and along x in the cap."""
     cap = mesh.points[mesh.quads][..., 2].min(axis=1) > length - 1e-6
     return np.where(cap[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

@@ -13,8 +13,7 @@ from pydantic import ConfigDict, Field
 from ..errors import InputError
 from ..experiments.kinds import Place
 from ..materials.card import MaterialCard, read_card
-from ..materials.forms.base import UNLIMITED
-from ..materials.forms.registry import form_named
+from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import Name, Number, Positive, Section, StrainTriple
 

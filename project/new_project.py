@@ -9,7 +9,8 @@ from typing import Any
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
 from ..files import TEMPLATES, __version__, render
-from ..materials.forms.registry import form_names
+from ..inference.methods import method_names
+from ..materials.forms.base import form_names
 from ..writing import write_text
 from .project import read_project
 
@@ -75,6 +76,7 @@ def project_text(
         thickness=thickness,
         form=_quoted(form),
         fitted=bool(fitted),
+        methods=", ".join(f'"{name}"' for name in method_names()),
         predicted=len(fitted) < len(asked),
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,

@@ -13,8 +13,9 @@ import tomli_w
 from ..errors import InputError
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
+from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
-from ..materials.forms.registry import form_settings
+from ..materials.forms.base import form_settings
 from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
@@ -200,9 +201,13 @@ class Project:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        if self.fit.method == "lm" and self.fit.constraints == "boolean":
-            problem = "boolean flags have no slope: use 'margin' with method 'lm', or 'slsqp'"
-            raise InputError(self.path, "fit.constraints", problem + " or 'cobyla'")
+        name = self.fit.method
+        if self.fit.constraints == "boolean" and name in method_names():
+            if not method_named(name).boolean:
+                others = [other for other in method_names() if method_named(other).boolean]
+                problem = f"boolean flags have no slope: use 'margin' with method {name!r}, or "
+                problem += " or ".join(map(repr, others))
+                raise InputError(self.path, "fit.constraints", problem)
 
     @property
     def title(self) -> str:

@@ -12,15 +12,17 @@ from ..errors import InputError, SolverFailure
 from ..experiments.kinds import Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
-from ..inference.discretisation import Limit, limit_of, residual_of
 from ..inference.linear import (
     NOT_DEFINITE,
     TOO_LITTLE,
     WORTH,
+    Limit,
     Linear,
     Order,
     definite,
     large,
+    limit_of,
+    residual_of,
     second_of,
 )
 from ..inference.noise import Noise

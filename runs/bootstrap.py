@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..experiments.kinds import by_strain
 from ..files import __version__
+from ..inference.descent import descend
 from ..inference.linear import moduli_of, summary
-from ..inference.methods.descent import descend
 from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
-from ..inference.resampling import Group, Unit, drawn, factors_of, rows_of
+from ..inference.resampling import Group, Unit, draw_counts, factors_of, rows_of
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
@@ -404,7 +404,7 @@ def _task(found: Refound, groups: Sequence[Group], seed: int) -> Task:
     tolerance = found.setup.project.fit.tolerance
 
     def sample(number: int, tell: Callable[[Any], None]) -> Sample:
-        counts = drawn(groups, np.random.default_rng([seed, number]))
+        counts = draw_counts(groups, np.random.default_rng([seed, number]))
         own = WeightedProblem.of(problem, factors_of(problem, groups, counts))
         assert point is not None  # it ran a moment ago
         best, status = descend(

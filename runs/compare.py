@@ -17,7 +17,7 @@ from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.resampling import folds_of
 from ..inference.search import feasible_start, fit_from
-from ..materials.forms.registry import form_names, form_settings, of_load_ratio
+from ..materials.forms.base import form_names, form_settings, of_load_ratio
 from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios

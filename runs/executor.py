@@ -24,7 +24,7 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
-from ..inference.methods.base import FitOptions
+from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..project.project import Project
 from ..reading import process_context

@@ -28,7 +28,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kinds
 from ..inference.linear import Array as Array_of_linear
-from ..inference.linear import Asked, information, information_of, summary
+from ..inference.linear import LawQuery, information, information_of, summary
 from ..inference.noise import Noise
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
@@ -343,7 +343,7 @@ def plan(
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     setup = prepare_fit(project, chosen)
     present = present_tests(setup, material)
-    asked = Asked(present.problem.unknowns, present.law, present.point.unknowns,
+    asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns,
                   _ends(project, material, present, strain))  # fmt: skip
     before = present.information
     make = setup.make_leading
@@ -444,7 +444,7 @@ def _added(
 
 
 def _following(
-    asked: Asked,
+    asked: LawQuery,
     before: Array_of_linear,
     found: Sequence[tuple[Planned, Array_of_linear]],
     rank: str,

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..errors import InputError, SolverFailure
 from ..experiments.kinds import FittableTest
 from ..inference.assessment import Certainty
+from ..inference.descent import descend
 from ..inference.linear import Linear
-from ..inference.methods.descent import descend
 from ..inference.noise import Noise
 from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem

@@ -25,9 +25,8 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import report_of
 from ..files import __version__
-from ..inference.assessment import Verdict, notes_of_verdicts, pinned_by, verdicts
-from ..inference.misfit import NoiseTest, noise_tests, notes_of_noise
-from ..inference.noise import Misfit, misfits
+from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
+from ..inference.noise import Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import Posterior
 from ..inference.problem import FitProblem
 from ..materials.card import MaterialCard
@@ -494,7 +493,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "mesh_error": TAKEN_OUT if sure.taken_out else TOLD,
             "second_order": None if sure.order is None else sure.order.numbers,
             "smooth_beyond_noise": {
-                name: {**asdict(d), "told": d.told} for name, d in sure.discrepancy.items()
+                name: {**asdict(d), "told": d.significant} for name, d in sure.discrepancy.items()
             },
         }
     if fit.verdicts:
@@ -528,7 +527,7 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
         name: [names.index(c.name) for c in fitted.comparisons]
         for name, fitted in fit.tests.items()
     }
-    sigma = partial(pinned_by, leading, point, fit.law, fit.best.valid, noise=sure.rows)
+    sigma = partial(uncertainty_from, leading, point, fit.law, fit.best.valid, noise=sure.rows)
     alone = {name: sigma(numbers=own) for name, own in numbers.items()}
     return {**alone, TOGETHER: dict(sure.sigma)}
 

@@ -25,7 +25,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kind_named
 from ..inference.comparison import Comparison, Nuisance
-from ..inference.methods.base import FitOptions
+from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
 from ..inference.unknowns import (
     LawBounds,
@@ -35,8 +35,7 @@ from ..inference.unknowns import (
     Starts,
     Unknowns,
 )
-from ..materials.forms.base import Form
-from ..materials.forms.registry import form_named, form_settings, of_strain
+from ..materials.forms.base import Form, form_named, form_settings, of_strain
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..project.schema import BoundsSection, UnknownSection
@@ -324,8 +323,6 @@ def proposals(
 
 #: Leads the fit where the solver that counts gives no derivatives.
 SURROGATE = "membrane"
-#: Most analyses of one start, unless the file says otherwise.
-MOST_ANALYSES = {"lm": 100, "slsqp": 500, "cobyla": 2000}
 #: Where a project names its solver.
 SOLVER_KEY = "fit.solver"
 #: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
@@ -404,7 +401,7 @@ class FitSetup:
     def options(self) -> FitOptions:
         """How each start is fitted."""
         fit = self.project.fit
-        most = fit.max_analyses or MOST_ANALYSES[fit.method]
+        most = fit.max_analyses or method_named(fit.method).max_analyses
         return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, most)
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.kinds import RunRecord, strains_of
-from ..inference.methods.base import FitOptions
+from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..inference.search import feasible_start, fit_from
 from ..writing import telling

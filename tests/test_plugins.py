@@ -16,8 +16,7 @@ import pandas as pd
 import pytest
 from bubblefit.errors import PlugInFailure
 from bubblefit.files import names_with, plug_in_named, plug_ins
-from bubblefit.materials.forms.base import Form, pieces_of
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import Form, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -174,7 +173,7 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
     put(
         house / "materials/forms/saturating.py",
         "saturating.py",
-        "from bubblefit.materials.forms.registry import register_form\n\nregister_form(SATURATING)",
+        "from bubblefit.materials.forms.base import register_form\n\nregister_form(SATURATING)",
     )
     put(
         house / "readers/formats/riglog.py",

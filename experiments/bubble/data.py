@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError, SolverFailure
-from ...materials.forms.registry import form_named
+from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
 from ...readers.fields import DisplacementField, read_fields
 from ...readers.surfaces import DisplacementSurface, fit_surface

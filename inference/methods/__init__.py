@@ -1,30 +1,70 @@
-"""Optimisers: one file each, one line each in the registry."""
+"""Optimisers: each module of this package is one, by its file's name, and defines `METHOD`."""
 
 from __future__ import annotations
 
-from ...errors import InputError
-from .base import FitOptions, Method
-from .cobyla import Cobyla
-from .lm import LevenbergMarquardt
-from .slsqp import Slsqp
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Literal, Protocol
 
-METHODS: dict[str, Method] = {
-    "lm": LevenbergMarquardt(),
-    "slsqp": Slsqp(),
-    "cobyla": Cobyla(),
-}
+from ...errors import InputError
+from ...materials.forms.base import Array
+
+if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that only print help
+    from ..problem import FitProblem, Optimum
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of the fit from each start.
+
+    method : name of an optimiser. gradient : "exact" or forward "differences", for an optimiser
+    that takes either. constraints : "margin" (linear inequalities) or "boolean" (flags without a
+    slope), likewise. tolerance : of the objective e, below which the fit has converged.
+    max_analyses : of the problem, those counted already included. max_runs : of a solver that a
+    differentiating surrogate leads to the minimum of its objective.
+    """
+
+    method: str = "lm"
+    gradient: Literal["exact", "differences"] = "exact"
+    constraints: Literal["margin", "boolean"] = "margin"
+    tolerance: float = 1e-7
+    max_analyses: int = 100
+    max_runs: int = 10
+
+
+class Method(Protocol):
+    """An optimiser, which goes from a start to the minimum of a problem's objective e.
+
+    It sees a `FitProblem`: `evaluate` (residual, exact Jacobian, e; None where the analysis
+    failed), `blocks`, and of its `unknowns` the linear `inequalities` and the box. It must not go
+    to an analysis that fails or to an equilibrium that is not `stable`.
+
+    needs_slope : needs derivatives. A fit with it is led in by the comparisons that are easy to
+    run, and for a solver without derivatives by a surrogate. boolean : also takes
+    `constraints = "boolean"`. max_analyses : of one start, unless the project gives a number.
+    """
+
+    needs_slope: bool
+    boolean: bool
+    max_analyses: int
+
+    def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
+        """Fit from the unknowns `start`; None when the analysis there fails."""
+
+
+@cache
+def method_names() -> tuple[str, ...]:
+    """Return the names of all optimisers, the default first."""
+    names = sorted(module.name for module in iter_modules([str(Path(__file__).parent)]))
+    return tuple(sorted(names, key=lambda name: name != FitOptions.method))
 
 
 def method_named(name: str) -> Method:
-    """The optimiser of that name.
-
-    Raises
-    ------
-    InputError : there is none.
-    """
-    if name not in METHODS:
-        raise InputError(None, "method", f"{name!r} is not one of {', '.join(METHODS)}")
-    return METHODS[name]
-
-
-__all__ = ["METHODS", "FitOptions", "Method", "method_named"]
+    """Return the optimiser of that name; raise InputError where there is none."""
+    if name not in method_names():
+        raise InputError(None, "method", f"{name!r} is not one of {', '.join(method_names())}")
+    method: Method = import_module(f".{name}", __package__).METHOD
+    return method

@@ -1,26 +1,25 @@
-"""Linear approximations without any gradient (NLopt's COBYLA)."""
-
-from __future__ import annotations
+"""Linear approximations from values of e alone (NLopt's COBYLA): slow, and needs no derivatives."""
 
 import nlopt
-import numpy as np
-from numpy.typing import NDArray
 
+from ...materials.forms.base import Array
+from ..nlopt_search import nlopt_minimise
 from ..problem import FitProblem, Optimum
-from .base import FitOptions
-from .nlopt_search import nlopt_minimise
+from . import FitOptions
 
 FIRST_STEP = 0.1  # of each bound's width
 
 
 class Cobyla:
-    """Only values of e: slow, and it asks nothing of the solver."""
+    """NLopt's COBYLA with linear or boolean constraints."""
 
-    name = "cobyla"
     needs_slope = False
+    boolean = True
+    max_analyses = 2000
 
-    def minimise(
-        self, problem: FitProblem, start: NDArray[np.float64], options: FitOptions
-    ) -> Optimum | None:
+    def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
         """Fit from the unknowns `start`; None when the analysis there fails."""
         return nlopt_minimise(nlopt.LN_COBYLA, problem, start, options, FIRST_STEP)
+
+
+METHOD = Cobyla()

@@ -4,16 +4,12 @@ The sum of squared blocks is minimised while e is far from its least; once that 
 residual that is not zero, the blocks are weighted so that e itself (a sum of norms) is minimised.
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ...materials.forms.base import Array
+from ..descent import bounded_step, descend
 from ..problem import ANALYSES_USED_UP, LEVEL, Evaluation, FitProblem, Optimum
-from .base import FitOptions
-from .descent import bounded_step, descend
-
-Array = NDArray[np.float64]
+from . import FitOptions
 
 SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
@@ -22,16 +18,17 @@ STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
 
 
 class LevenbergMarquardt:
-    """Steps that are small convex quadratic programmes; needs the exact Jacobian."""
+    """Levenberg-Marquardt by convex quadratic programmes; needs the exact Jacobian."""
 
-    name = "lm"
     needs_slope = True
+    boolean = False
+    max_analyses = 100
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
         """Fit from the unknowns `start`; None when the analysis there fails.
 
         Stops when e is below the tolerance, on no progress, or when the analyses are used up (some
-        more only where the fit turns out to hang on its warm starts).
+        more only where the fit turns out to depend on its warm starts).
         """
         tolerance, most = options.tolerance, options.max_analyses
         before_last = most - 1  # the last one checks the optimum from the unloaded state
@@ -78,7 +75,7 @@ def _squares_then_norms(
 def _from_stiffer(
     problem: FitProblem, best: Evaluation, factor: float, tolerance: float, max_analyses: int
 ) -> tuple[Evaluation, str]:
-    """Again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
+    """Fit again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
 
     At the border of instability a fit stops short of a minimum, usually because the shear modulus
     makes up for others that are still wrong: so these go first, and then all.
@@ -95,3 +92,6 @@ def _from_stiffer(
         return best, LEVEL
     point, _ = descend(problem, point, tolerance, max_analyses, only=~shear)
     return _squares_then_norms(problem, point, tolerance, max_analyses)
+
+
+METHOD = LevenbergMarquardt()

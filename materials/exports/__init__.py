@@ -1,1 +1,1 @@
-"""Material cards for other programs: one module a format; see docs/how-to/exports.md."""
+"""Export material cards to other programs; see docs/how-to/exports.md."""

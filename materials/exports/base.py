@@ -1,6 +1,4 @@
-"""What every export gives, and what heads its text."""
-
-from __future__ import annotations
+"""Describe formats of exports and their options, head their text, and write CSV tables."""
 
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
@@ -9,16 +7,25 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, one_line
 from ...files import __version__
 from ...notes import Note, NoteKind
 from ..card import LEVEL, MaterialCard, strains_of
-from ..forms.base import COMPONENTS, UNLIMITED, ratios_of
+from ..forms.base import COMPONENTS, UNLIMITED, Array, ratios_of
 from ..law import HypoelasticLaw
-from ..responses import Measure, trellis_angle, trellis_curve, uniaxial_curve
-from ..tables import POINTS, REACH, modulus_table, piece_constants
+from ..responses import (
+    POINTS,
+    REACH,
+    Measure,
+    ModulusTable,
+    modulus_table,
+    modulus_tables,
+    piece_constants,
+    trellis_angle,
+    trellis_curve,
+    uniaxial_curve,
+)
 
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
@@ -32,7 +39,7 @@ BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
 
 @dataclass(frozen=True)
 class Says:
-    """What the target does with the law: carries, loses, and what is to be confirmed there."""
+    """What the target does with the law: it carries, it loses, and what to confirm there."""
 
     carries: tuple[str, ...]
     loses: tuple[str, ...] = ()
@@ -40,12 +47,12 @@ class Says:
 
     @property
     def notes(self) -> list[Note]:
-        """What the user should know: all that is lost, and all that is to be confirmed."""
+        """Return notes on all that is lost and all that is to be confirmed."""
         lost = [Note(NoteKind.LOSES, words) for words in self.loses]
         return [*lost, *(Note(NoteKind.CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
-        """The same as lines of at most WIDTH characters."""
+        """Return lines of at most WIDTH characters."""
         found: list[str] = []
         for head, texts in (
             ("carries", self.carries),
@@ -60,20 +67,14 @@ class Says:
 
 @dataclass(frozen=True)
 class Export:
-    """Files of one export: text by suffix, the one that is asked for first; and what it says."""
+    """The files of one export by suffix, the requested one first, and its remarks."""
 
     files: Mapping[str, str]
     says: Says
 
 
 def check_positive(card: MaterialCard) -> None:
-    """No program can use a law without stiffness.
-
-    Raises
-    ------
-    InputError : a modulus is not positive somewhere in the card's range (at zero strain where it
-        has none), or 1 - nu12 nu21 is not at zero strain.
-    """
+    """Raise InputError where a modulus, or 1 - nu12 nu21 at zero strain, is not positive."""
     law = card.law
     for name, component in COMPONENTS.items():
         end = law.strain_range[component]
@@ -91,7 +92,7 @@ def check_positive(card: MaterialCard) -> None:
 
 
 def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
-    """The comment that begins every file: which card, which format, what it carries and loses."""
+    """Return the comment that begins every file: card, format, what it carries and loses."""
     lines = [f"{what}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
         # One line each, whatever the card's text holds.
@@ -104,16 +105,16 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
 
 
 def title_of(card: MaterialCard, most: int) -> str:
-    """The card's name as a title of at most so many letters of ASCII, on one line."""
-    words = " ".join(card.name.encode("ascii", "replace").decode().split())
-    return one_line(words)[:most] or "fabric"
+    """Return the card's name as a title of at most so many letters of ASCII, on one line."""
+    return one_line(_ascii(card.name))[:most] or "fabric"
+
+
+def _ascii(text: str) -> str:
+    return " ".join(text.encode("ascii", "replace").decode().split())
 
 
 def band_lines(card: MaterialCard) -> list[str]:
-    """How sure the moduli are, at a few strains; that it is not known where the card has nothing.
-
-    The program that reads the export takes the moduli as they are: this is for people.
-    """
+    """Return lines on the uncertainty of the moduli at a few strains, for people."""
     sure, law = card.certainty, card.law
     if sure is None:
         return ["band of the moduli: not known, the card says nothing of it"]
@@ -125,17 +126,16 @@ def band_lines(card: MaterialCard) -> list[str]:
     for name, strain in strains_of(law).items():
         at = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
         ends = zip(at, *sure.band(law, name, at), strict=True)
-        told = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
-        lines.append(f"  - {name}, MPa: {told}")
+        band = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
+        lines.append(f"  - {name}, MPa: {band}")
     return lines
 
 
 def band_table(card: MaterialCard) -> str:
-    """Every modulus over the strain that the card holds for, with the ends of its band, as CSV."""
+    """Return every modulus over the card's strains, with the ends of its band, as CSV."""
     sure, law = card.certainty, card.law
     assert sure is not None
-    words = " ".join(f"{sure.words}".split()).encode("ascii", "replace").decode()
-    rows = [f"# {100 * LEVEL:g} % band of the moduli: {words}", BAND_COLUMNS]
+    rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
     for name, strain in strains_of(law).items():
         values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
         for row in zip(*values, strict=True):
@@ -144,14 +144,14 @@ def band_table(card: MaterialCard) -> str:
 
 
 def density_remarks(density: float | None) -> tuple[str, ...]:
-    """What a format that needs a density (t/mm3) has to say of it."""
+    """Return the remark of a format that needs a density (t/mm3)."""
     if density is not None:
         return ()
     return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
 
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
-    """What a tabulated format has to say of strain ranges."""
+    """Return the remark of a tabulated format on missing strain ranges."""
     if (card.law.strain_range < UNLIMITED).all():
         return ()
     return (
@@ -162,11 +162,10 @@ def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Option:
-    """What a command has to know of one option of a format.
+    """An option of a format for a command.
 
-    help : one sentence; the default follows in brackets. kind : int, float or str.
-    least : smallest value. above, most : excluded and included end of the values.
-    choices : the values there are, instead.
+    help : one sentence; the default follows in brackets. kind : int, float or str. least : smallest
+    value. above, most : excluded and included end. choices : the values allowed, instead.
     """
 
     help: str
@@ -177,47 +176,42 @@ class Option:
     choices: tuple[str, ...] = ()
 
 
-def option(text: str, kind: type = float, **limits: Any) -> dict[str, Option]:
-    """Metadata of a field of a format's options; as Option."""
-    return {"option": Option(text, kind, **limits)}
+def option(default: Any, text: str, kind: type = float, **limits: Any) -> Any:
+    """Return a field of a format's options with a default; the rest as `Option`."""
+    return field(default=default, metadata={"option": Option(text, kind, **limits)})
 
 
 @dataclass(frozen=True)
 class NoOptions:
-    """A format that takes the card as it is."""
+    """The options of a format that takes the card as it is."""
 
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Of every format with tables or curves."""
+    """The options of every format with tables or curves."""
 
-    points: int = field(
-        default=POINTS, metadata=option(f"Points of a table or curve [{POINTS}].", int, least=2)
-    )
-    reach: float = field(
-        default=REACH,
-        metadata=option(
-            f"Log strain where a table ends if the card has no range [{REACH}].", above=0, most=10
-        ),
+    points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
+    reach: float = option(
+        REACH,
+        f"Log strain where a table ends if the card has no range [{REACH}].",
+        above=0,
+        most=10,
     )
 
 
 @dataclass(frozen=True)
 class CurveOptions(TableOptions):
-    """Of the fabric materials of explicit programs."""
+    """The options of the fabric materials of explicit programs."""
 
-    density: float | None = field(
-        default=None, metadata=option("t/mm3, where the target needs one.", above=0)
-    )
+    density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
 
 
 @dataclass(frozen=True)
 class Format:
     """One way to write a card for another program.
 
-    name : what the command calls it. write : from card and options to the files. options : the
-    frozen dataclass of these options, each field with metadata made by `option`. load_ratios :
-    whether it takes laws whose moduli depend on the ratio of the loads along warp and fill.
+    write : from card and options to the files. options : frozen dataclass, each field with metadata
+    made by `option`. load_ratios : takes laws whose moduli depend on the load ratio.
     """
 
     name: str
@@ -226,13 +220,7 @@ class Format:
     load_ratios: bool = False
 
     def export(self, card: MaterialCard, **given: Any) -> Export:
-        """The files of a card, with the options that are given, and of its band where it has one.
-
-        Raises
-        ------
-        InputError : an option that means nothing here; a card that the format cannot take, among
-            them one without stiffness where it is to hold.
-        """
+        """Return the files of a card, and of its band if any; raise InputError if unfit."""
         self.check(given)
         if card.law.of_load_ratio and not self.load_ratios:
             problem = (
@@ -255,7 +243,7 @@ class Format:
 
 
 def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:
-    """Every option of these formats by its name; those of one name mean the same."""
+    """Return every option of these formats by its name; those of one name mean the same."""
     found: dict[str, Option] = {}
     for each in formats:
         for entry in fields(each.options):
@@ -263,10 +251,9 @@ def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:
     return found
 
 
-Array = NDArray[np.float64]
 #: Log strain of the one point in compression: a curve has to begin somewhere.
 COMPRESSION = -0.1
-#: Log strain of both yarns at which the loss of nu12 is told, and increments up to there.
+#: Log strain of both yarns at which the loss of nu12 is stated, and increments up to there.
 BIAXIAL, INCREMENTS = 0.05, 50
 
 
@@ -276,8 +263,8 @@ class FabricCurves:
 
     Warp and fill from compression through zero; shear from zero, odd. Curves that do not couple
     leave out: yarns, the largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone;
-    softer, the share of the stress that is missing along warp and fill when both have the log
-    strain biaxial.
+    softer, the share of the stress missing along warp and fill when both have the log strain
+    biaxial.
     """
 
     warp: Array
@@ -289,7 +276,7 @@ class FabricCurves:
 
     @property
     def uncoupled(self) -> str:
-        """What it costs that nu12 is lost, in words."""
+        """Describe the cost of losing nu12."""
         warp, fill = (100 * share for share in self.softer)
         return (
             "under biaxial tension softer than the card, as the contraction of the strips is in "
@@ -299,12 +286,7 @@ class FabricCurves:
 
 
 def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -> FabricCurves:
-    """The curves of a card, to the end of its range or `options.reach`.
-
-    Raises
-    ------
-    InputError : a modulus is not positive on the way.
-    """
+    """Return the curves of a card, to the end of its range or `options.reach`."""
     strains = {
         name: modulus_table(card.law, name, options.points, options.reach).strain
         for name in COMPONENTS
@@ -324,7 +306,7 @@ def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -
 
 
 def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
-    """Share of the biaxial stress that the curves of strips do not give, warp and fill."""
+    """Return the share of the biaxial stress missing in the curves of strips, warp and fill."""
     ends = np.linspace(0.0, log_strain, INCREMENTS + 1)
     strain = np.stack([ends, ends, 0 * ends], axis=1)
     stress = np.zeros(3)
@@ -338,18 +320,61 @@ def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:
 
 
 def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:
-    """nu12, how many pieces E1, E2 and G12 have, and each piece: its end, four coefficients (MPa).
-
-    4 + 5 numbers a piece.
-    """
+    """Return nu12, the numbers of pieces of E1, E2 and G12, and each piece: its end, four MPa."""
     return (law.nu12, *piece_constants(law))
 
 
 def double(value: float) -> str:
-    """A double precision literal with every digit."""
+    """Return a double precision literal with every digit."""
     return f"{value:.16e}".replace("e", "d")
 
 
 def logical(value: bool) -> str:
-    """A logical literal."""
+    """Return a logical literal."""
     return ".true." if value else ".false."
+
+
+CSV_COLUMNS = "direction,log_strain,tangent_modulus_MPa,test_strain,test_stress_MPa"
+
+
+def csv(card: MaterialCard, options: TableOptions) -> Export:
+    """Write tangent modulus and nominal stress by strain: warp, fill, shear."""
+    tables = modulus_tables(card.law, options.points, options.reach)
+    says = Says(
+        carries=(
+            "E1 of eps1, E2 of eps2, G12 of gamma12 (engineering; even in it), at "
+            f"{options.points} log strains each",
+            "test_strain and test_stress: nominal strain and stress (force over reference area) "
+            "of a strip along warp or fill, free to contract; for shear the change of angle in "
+            "radians and the stress that does work on it, yarns held at their length",
+        ),
+        loses=(
+            "everything between the points; nu12 is in this heading and in the contraction of "
+            "the strips only",
+            *range_remarks(card, options.reach),
+        ),
+    )
+    head = [
+        heading(card, "Tables of a fabric", says, "#"),
+        f"# nu12: {float(card.law.nu12)!r}",
+        CSV_COLUMNS,
+    ]
+    rows = [row for name in ("E1", "E2", "G12") for row in _csv_rows(card, tables[name])]
+    return Export({".csv": "\n".join([*head, *rows]) + "\n"}, says)
+
+
+def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
+    keep = table.strain >= 0
+    strain, modulus = table.strain[keep], table.modulus[keep]
+    if table.name == "G12":
+        direction = "shear"
+        angles = np.array([trellis_angle(gamma) for gamma in strain])
+        x, y, _ = trellis_curve(card.law, angles, "nominal")
+    else:
+        direction, pulled = ("warp", 0) if table.name == "E1" else ("fill", 1)
+        x, y = uniaxial_curve(card.law, pulled, strain, "nominal")
+    columns = zip(strain, modulus, x, y, strict=True)
+    return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]
+
+
+CSV = Format("csv", csv, TableOptions)

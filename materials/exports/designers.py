@@ -1,10 +1,12 @@
-"""Linear constants per width, for programs that designers of membrane structures type them into."""
+"""Export linear constants per width, for programs that designers of membranes type them into.
 
-from __future__ import annotations
+Oasys GSA takes stiffnesses per width (its reference on theory, "Fabric Material"); Dlubal RFEM
+force over area and a thickness: the stiffness per width over that thickness (Dlubal, FAQ 004396).
+"""
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from ...errors import InputError
@@ -26,41 +28,30 @@ from .base import Export, Format, Says, heading, option
 #: Engineering shear strain up to which G is averaged where the card has no range; and the least
 #: range that is one: no test of the card's fit sheared the fabric where it ends before.
 SHEAR, SHEARED = 0.1, 1e-3
-#: Of what a spread is told.
+#: Constants with a spread.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
 @dataclass(frozen=True)
 class ConstantsOptions:
-    """Over which loads the law is made linear, and how."""
+    """The loads over which the law is made linear, and how."""
 
-    lowest: float = field(
-        default=0.0, metadata=option("kN/m, where the paths of each load ratio begin [0].", least=0)
-    )
-    highest: float | None = field(
-        default=None,
-        metadata=option(
-            "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
-            above=0,
-        ),
-    )
-    shear: float | None = field(
-        default=None,
-        metadata=option(
-            "Shear strain up to which G is averaged [the end of the card's range].", above=0, most=1
-        ),
-    )
-    paths: Literal["8", "10"] = field(
-        default="8",
-        metadata=option(
-            "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].",
-            str,
-            choices=("8", "10"),
-        ),
-    )
-    minimise: Literal["strain", "load"] = field(
-        default="strain",
-        metadata=option("Whose squares are least [strain].", str, choices=("strain", "load")),
+    lowest: float = option(0.0, "kN/m, where the paths of each load ratio begin [0].", least=0)
+    highest: float | None = option(
+        None,
+        "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
+        above=0,
+    )  # fmt: skip
+    shear: float | None = option(
+        None, "Shear strain up to which G is averaged [the end of the card's range].",
+        above=0, most=1,
+    )  # fmt: skip
+    paths: Literal["8", "10"] = option(
+        "8", "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].", str,
+        choices=("8", "10"),
+    )  # fmt: skip
+    minimise: Literal["strain", "load"] = option(
+        "strain", "Whose squares are least [strain].", str, choices=("strain", "load")
     )
 
 
@@ -76,7 +67,7 @@ class Linear:
 
     @property
     def says(self) -> Says:
-        """What constants carry and lose."""
+        """Return what constants carry and lose."""
         found = self.found
         least, largest = found.shear
         unknown: tuple[str, ...] = ()
@@ -108,12 +99,10 @@ class Linear:
 
 
 def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
-    """The constants of a card.
+    """Return the constants of a card.
 
-    Raises
-    ------
-    InputError : no end of the loads is said or known, a law that does not carry them, or constants
-        that no program takes (nu_warp nu_fill of 1 or more).
+    Raises InputError without a known end of the loads, for a law that does not carry them, or for
+    nu_warp nu_fill of 1 or more.
     """
     law, thickness = card.law, card.thickness
     highest = options.highest
@@ -136,28 +125,18 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
 
 
 def evaluations(linear: Linear) -> list[Evaluation]:
-    """That was asked for, then the others."""
+    """Return the requested evaluation, then the others."""
     return [linear.found.evaluation, *linear.found.others]
 
 
 def _end_of_range(card: MaterialCard) -> float:
-    """kN/m, the largest load that every ratio carries within the card's strains.
-
-    Raises
-    ------
-    InputError : the card has no range along warp or fill.
-    """
+    """Return the largest load (kN/m) that every ratio carries within the card's strains."""
     ends = card.law.strain_range[:2]
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
         raise InputError(None, "--highest", problem)
     return largest_load(card.law, card.thickness, [shares(ratio) for ratio in RATIOS], ends)
 
-
-# What to type into programs whose material is a form: Oasys GSA's fabric, Dlubal RFEM's membrane.
-#
-# GSA: stiffnesses per width (its reference on theory, "Fabric Material"). RFEM takes force over
-# area and a thickness: the stiffness per width over a reference thickness (Dlubal, FAQ 004396).
 
 WHICH_NU = (
     "which of both Poisson's ratios the program means: pull a strip along the warp and compare its "
@@ -178,7 +157,7 @@ def _with(says: Says, *confirm: str) -> Says:
 
 
 def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """The four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
+    """Write the four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
     linear = linear_card(card, options)
     c = linear.found.constants
     rows = [
@@ -191,7 +170,7 @@ def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """An orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
+    """Write an orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
     linear = linear_card(card, options)
     c, t = linear.found.constants, card.thickness
     assert c.shear is not None
@@ -207,12 +186,6 @@ def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
     return _sheet(card, "Orthotropic membrane of Dlubal RFEM", says, rows)
 
 
-FORMATS = (
-    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
-    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
-)
-
-
 COLUMNS = (
     "chosen", "minimise", "reciprocal", "unloaded_yarns", "ratios", "paths", "E_warp_kN_per_m",
     "E_fill_kN_per_m", "nu_warp", "nu_fill", "A_warp_kN_per_m", "A_fill_kN_per_m",
@@ -221,7 +194,7 @@ COLUMNS = (
 
 
 def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
-    """Inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
+    """Write inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
     linear = linear_card(card, options)
     rows = []
     for number, one in enumerate(evaluations(linear)):
@@ -242,10 +215,14 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def _text(value: Any) -> str:
-    """As the table has it: yes or no, nine digits, words."""
+    """Format a value: yes or no, nine digits, words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
-FORMAT = Format("constants", constants, ConstantsOptions, load_ratios=True)
+FORMATS = (
+    Format("constants", constants, ConstantsOptions, load_ratios=True),
+    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
+    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
+)

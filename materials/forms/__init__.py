@@ -1,1 +1,1 @@
-"""Forms of the tangent moduli: how the numbers of a law make three curves."""
+"""Define forms of the moduli, a module each: how the numbers of a law make three curves."""

@@ -1,26 +1,31 @@
-"""What every form of the moduli answers, and what is the same for all of them.
+"""Describe forms of the moduli, and register them: modules of this package, and plug-ins.
 
 A form says how the numbers beta of a law make the three tangent moduli. Whatever the form, a
-modulus is a PIECEWISE CUBIC of its own logarithmic strain, and its coefficients are linear in
-beta: the compiled law, the material libraries, the exports and the fit know no more than that.
-A form may also have `by_load_ratio`: its E1 and E2 are those cubics at equal loads along warp and
-fill, and gain more or less, linear in beta, by the normalised load ratio of their own yarn
-(`ratio_map`).
+modulus is a PIECEWISE CUBIC of its own logarithmic strain, and its coefficients are linear in beta:
+the compiled law, the material libraries, the exports and the fit know no more than that. A form may
+also have `by_load_ratio`: its E1 and E2 are those cubics at equal loads along warp and fill, and
+gain more or less, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`).
 
-A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which
-depends on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond
-the strain range, and below zero strain, a modulus is held.
+A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which depends
+on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond the strain
+range, and below zero strain, a modulus is held.
 """
 
-from __future__ import annotations
-
+import difflib
 import math
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ...errors import BubblefitError, InputError
+from ...files import Group, PlugIn, names_with, plug_in_named
 
 Array = NDArray[np.float64]
 
@@ -45,82 +50,71 @@ GRID = 31
 
 @runtime_checkable
 class Form(Protocol):
-    """How beta makes the moduli. Forms are frozen, hashable, and equal when they say the same."""
+    """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
+
+    name : in cards and projects. size : length of beta. labels : (size,) for histories and tables.
+    free : entries of beta that a fit may change; the others are zero. modulus_of : the modulus
+    ("G12", "E2" or "E1") of each free entry.
+    """
 
     @property
-    def name(self) -> str:
-        """What a card and a project say: "cubic"."""
-        ...
+    def name(self) -> str: ...
 
     @property
-    def size(self) -> int:
-        """Length of beta."""
-        ...
+    def size(self) -> int: ...
 
     @property
-    def labels(self) -> tuple[str, ...]:
-        """(size,) what each entry of beta is called in histories and tables."""
-        ...
+    def labels(self) -> tuple[str, ...]: ...
 
     @property
-    def free(self) -> tuple[int, ...]:
-        """The entries of beta that a fit may change; the others are zero."""
-        ...
+    def free(self) -> tuple[int, ...]: ...
 
     @property
-    def modulus_of(self) -> tuple[str, ...]:
-        """The modulus ("G12", "E2" or "E1") that each free entry belongs to."""
-        ...
+    def modulus_of(self) -> tuple[str, ...]: ...
 
     def piece_map(self) -> Array:
-        """(3, P, 4, size): d (coefficients of every piece, highest power first) / d beta.
+        """Return (3, P, 4, size), d (coefficients of each piece, highest power first) / d beta.
 
-        The coefficients are those of powers of the strain itself. A component with fewer pieces
-        repeats its last one.
+        Coefficients are of powers of the strain itself. A component with fewer pieces repeats its
+        last.
         """
         ...
 
     def uppers(self) -> Array:
-        """(3, P) upper ends of the pieces, increasing; the last is UNLIMITED, repeated or not."""
+        """Return (3, P) upper ends of the pieces, increasing; the last is UNLIMITED."""
         ...
 
     def grid(self, component: int, end: float) -> Array:
-        """Increasing strains from 0 to `end` at which positivity and bounds are asked."""
+        """Return increasing strains from 0 to `end` at which positivity and bounds are checked."""
         ...
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """(free, free): free entries of beta = this @ moduli at as many control strains.
+        """Return (free, free) so that free entries of beta = this @ moduli at control strains.
 
         A fit works in these values: they have the size of a modulus and depend little on each
-        other, as the entries of beta may not.
+        other.
         """
         ...
 
     def to_card(self) -> dict[str, Any]:
-        """What a card says beside beta, as `form_named` reads it: knots, breaks."""
+        """Return what a card says beside beta, as `form_named` reads it: knots, breaks."""
         ...
 
     def describe(self) -> str:
-        """One sentence for a card's header and a report: what the entries of beta are."""
+        """Describe the entries of beta in one sentence, for a card's header and a report."""
         ...
 
     def __hash__(self) -> int: ...
 
 
 def ratio_map(form: Form) -> Array:
-    """(2, size): d (what E1 and E2 gain by their normalised load ratio, from 0 to 1) / d beta.
-
-    Zero of a form that has no `by_load_ratio`, which is this.
-    """
+    """Return (2, size), d (gain of E1 and E2 by their load ratio, from 0 to 1) / d beta."""
     own = getattr(form, "by_load_ratio", None)
     return np.zeros((2, form.size)) if own is None else np.asarray(own(), dtype=float)
 
 
 def ratios_of(form: Form, name: str) -> tuple[float, ...]:
-    """Normalised load ratios at which "E1", "E2" or "G12" is asked whether it is positive.
-
-    Equal loads first; the ends where the modulus depends on them: it is linear in between.
-    """
+    """Return load ratios at which positivity is checked: equal loads, then the ends."""
     component = COMPONENTS[name]
     depends = name != SHEAR and ratio_map(form)[component].any()
     return (EVEN, *RATIO_ENDS) if depends else (EVEN,)
@@ -128,7 +122,7 @@ def ratios_of(form: Form, name: str) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
-    """Upper ends (3, P) and map (3, P, 4, size) without what begins at or beyond the range."""
+    """Return upper ends (3, P) and map (3, P, 4, size) without pieces beyond the range."""
     uppers, rows = form.uppers(), form.piece_map()
     lowers = np.column_stack([np.zeros(3), uppers[:, :-1]])
     # Of a repeated last piece the first is enough.
@@ -142,12 +136,12 @@ def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
 
 
 def map_in_range(form: Form, strain_range: Sequence[float]) -> Array:
-    """(3, P, 4, size): `piece_map` without the pieces that the strain range cuts away."""
+    """Return (3, P, 4, size), `piece_map` without the pieces that the strain range cuts away."""
     return _in_range(form, tuple(float(end) for end in strain_range))[1]
 
 
 def pieces_of(form: Form, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
-    """(3, P, 5) MPa, read-only: the moduli as the compiled law reads them.
+    """Return (3, P, 5) MPa, read-only: the moduli as the compiled law reads them.
 
     Piece k of a component holds for strains up to `[component, k, 0]` with the coefficients
     `[component, k, 1:]`, highest power of the strain first. The last upper end is that of the
@@ -162,19 +156,15 @@ def pieces_of(form: Form, beta: ArrayLike, strain_range: Sequence[float]) -> Arr
 
 
 def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
-    """The strain at which a modulus is taken: in [0, end], its size for shear."""
+    """Return the strain at which a modulus is taken: in [0, end], its size for shear."""
     x = np.asarray(strain, dtype=float)
     return np.clip(np.abs(x) if component == 2 else x, 0.0, end)
 
 
 def modulus_rows(
-    form: Form,
-    name: str,
-    strain: ArrayLike,
-    strain_range: Sequence[float],
-    ratio: float = EVEN,
+    form: Form, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
 ) -> Array:
-    """(n, size): d modulus / d beta at strains (n,) of "E1", "E2" or "G12", held ones included.
+    """Return (n, size), d modulus / d beta at strains (n,), held ones included.
 
     ratio : the normalised load ratio of the modulus' own yarn.
     """
@@ -188,7 +178,7 @@ def modulus_rows(
 
 
 def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Rows (n, size) for G12, E2, E1 on the form's own grids; rows @ beta are moduli.
+    """Return rows (n, size) for G12, E2, E1 on the form's own grids; rows @ beta are moduli.
 
     At equal loads first, from zero strain on; then at the other load ratios of `ratios_of`.
     """
@@ -200,3 +190,117 @@ def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array
             [modulus_rows(form, name, strain, strain_range, ratio) for ratio in several]
         )
     return found
+
+
+GROUP: Group = "bubblefit.laws"
+
+
+#: From the name, the settings and the ends of the strain range (eps1, eps2, gamma12) to a form.
+Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A form by name: its maker, and the settings it takes beside the name.
+
+    of_strain : its moduli depend on strain; a fit of others needs no range. of_load_ratio : they
+    depend on the ratio of the loads, which not every solver carries.
+    """
+
+    name: str
+    make: Maker
+    settings: tuple[str, ...] = ()
+    of_strain: bool = True
+    of_load_ratio: bool = False
+
+
+_OFFERS: dict[str, Offer] = {}
+
+
+def register_form(offer: Offer) -> None:
+    """Add one of our own forms: the last statement of its module."""
+    _OFFERS[offer.name] = offer
+
+
+def form_names() -> tuple[str, ...]:
+    """Return the names that a project's `[law] form` and a card's `form` may say: ours first."""
+    _import_forms()
+    # By module, whichever was imported first.
+    ours = sorted(_OFFERS.values(), key=lambda offer: offer.make.__module__)
+    return names_with(GROUP, [offer.name for offer in ours])
+
+
+def form_settings(name: str) -> tuple[str, ...]:
+    """Return the settings that a form takes beside its name; none for an unknown form."""
+    offer, _ = _offer(name)
+    return offer.settings if offer else ()
+
+
+def of_strain(name: str) -> bool:
+    """Return whether the moduli of a form depend on strain, as far as is known."""
+    offer, _ = _offer(name)
+    return getattr(offer, "of_strain", True)
+
+
+def of_load_ratio(name: str) -> bool:
+    """Return whether the moduli of a form depend on the ratio of the loads, as far as is known."""
+    offer, _ = _offer(name)
+    return getattr(offer, "of_load_ratio", False)
+
+
+def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:
+    """Return the form of that name, as a project's `[law]` or a card says it.
+
+    settings : what stands beside the name: `breaks`, `knots`. strain_range : ends (eps1, eps2,
+    gamma12); UNLIMITED where there is none. Raises InputError for an unknown name or bad settings,
+    PlugInFailure for a plug-in that does not work.
+    """
+    offer, plug_in = _offer(name)
+    if offer is None:
+        near = difflib.get_close_matches(name, form_names(), n=1, cutoff=0.5)
+        meant = f"did you mean {near[0]!r}? " if near else ""
+        problem = f"no form is called {name!r}; {meant}known: {', '.join(form_names())}"
+        raise InputError(None, "form", problem)
+    for key in settings:
+        if key not in offer.settings:
+            raise InputError(None, key, f"a {name} law has no {key}")
+    if plug_in is None:
+        return offer.make(name, settings, strain_range)
+    return _made(plug_in, offer, settings, strain_range)
+
+
+def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
+    """Return our offer, else that of a plug-in, which never takes the place of one of ours."""
+    _import_forms()
+    if name in _OFFERS:
+        return _OFFERS[name], None
+    plug_in = plug_in_named(GROUP, name)
+    if plug_in is None:
+        return None, None
+    offer: Offer = plug_in.load("form", ("name", "make", "settings"))
+    if offer.name != name:
+        raise plug_in.failure(f"calls its form {offer.name!r}; both must have one name")
+    return offer, plug_in
+
+
+def _made(
+    plug_in: PlugIn, offer: Offer, settings: Mapping[str, Any], strain_range: Sequence[float]
+) -> Form:
+    try:
+        form = offer.make(offer.name, settings, strain_range)
+    except BubblefitError:
+        raise
+    except Exception as error:
+        raise plug_in.failure("fails when it is made", error) from error
+    if not isinstance(form, Form):
+        known = [name for name in dir(Form) if not name.startswith("_")]
+        missing = ", ".join(name for name in known if not hasattr(form, name))
+        raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
+    return form
+
+
+@cache
+def _import_forms() -> None:
+    """Import each module beside this one, which registers its forms."""
+    for module in iter_modules([str(Path(__file__).parent)]):
+        import_module(f".{module.name}", __package__)

@@ -1,18 +1,12 @@
 """Moduli that are one polynomial each, of degree 0 to 3 (Eqs 3.1-3.3)."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .base import COMPONENTS, GRID, ORDER, UNLIMITED
-from .registry import Offer, register_form
-
-Array = NDArray[np.float64]
+from .base import COMPONENTS, GRID, ORDER, UNLIMITED, Array, Offer, register_form
 
 DEGREES = ("constant", "linear", "quadratic", "cubic")
 
@@ -21,8 +15,8 @@ DEGREES = ("constant", "linear", "quadratic", "cubic")
 class Polynomial:
     """Four coefficients a modulus, highest power first: G12, then E2, then E1.
 
-    Whatever the degree beta has twelve entries, so that laws of different degrees compare; those
-    of higher powers are zero.
+    Whatever the degree beta has twelve entries, so that laws of different degrees compare; those of
+    higher powers are zero.
     """
 
     degree: int
@@ -55,7 +49,7 @@ class Polynomial:
         return np.linspace(0.0, end, GRID)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """Control strains are Chebyshev points: condition 6e3 where monomials have 1e8."""
+        """Return the map from Chebyshev points: condition 6e3 where monomials have 1e8."""
         n = self.degree + 1
         share = 0.5 * (1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
         whole = np.zeros((3 * n, 3 * n))
@@ -78,12 +72,6 @@ class Polynomial:
 CONSTANT, LINEAR, QUADRATIC, CUBIC = (Polynomial(degree) for degree in range(4))
 
 
-def polynomial_named(
-    name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
-) -> Polynomial:
-    """The polynomial of that name; it takes no settings."""
-    return Polynomial(DEGREES.index(name))
-
-
-for _name in DEGREES:
-    register_form(Offer(_name, polynomial_named, of_strain=_name != DEGREES[0]))
+for _degree, _form_name in enumerate(DEGREES):
+    _made = Polynomial(_degree)
+    register_form(Offer(_form_name, lambda *_, form=_made: form, of_strain=_degree > 0))

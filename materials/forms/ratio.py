@@ -11,19 +11,13 @@ at every ratio. Here they are tangent moduli: on a path on which the stresses gr
 they are also the secant ones.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .base import COMPONENTS, EVEN, UNLIMITED
-from .registry import Offer, register_form
-
-Array = NDArray[np.float64]
+from .base import COMPONENTS, EVEN, UNLIMITED, Array, Offer, register_form
 
 #: Of beta: G12, then E2 and E1 where both yarns carry the same, each followed by what it gains
 #: where its own normalised load ratio goes from 0 to 1.
@@ -60,9 +54,9 @@ class LoadRatio:
         return np.array([0.0, end])
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """The values are E2 and E1 where their own yarn carries nothing, and where it does all.
+        """Return the map from E2 and E1 where their own yarn carries nothing, and all.
 
-        Whatever they are, if they are positive the modulus is at every ratio.
+        If these are positive the modulus is at every ratio.
         """
         whole = np.eye(self.size)
         for name in ("E1", "E2"):
@@ -80,11 +74,4 @@ class LoadRatio:
         )
 
 
-def load_ratio_named(
-    name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
-) -> LoadRatio:
-    """The form; it takes no settings."""
-    return LoadRatio()
-
-
-register_form(Offer("load-ratio", load_ratio_named, of_strain=False, of_load_ratio=True))
+register_form(Offer("load-ratio", lambda *_: LoadRatio(), of_strain=False, of_load_ratio=True))

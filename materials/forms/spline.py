@@ -15,13 +15,9 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError
-from .base import COMPONENTS, ORDER, STRAIN_NAMES, UNLIMITED
-from .registry import Offer, register_form
-
-Array = NDArray[np.float64]
+from .base import COMPONENTS, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer, register_form
 
 #: Parts of a piece between which positivity and bounds are asked: a cubic that is positive at
 #: their ends can dip between them by no more than 4 % of its largest value in the piece.
@@ -33,12 +29,8 @@ MOST_KNOTS = 50
 class Spline:
     """Moduli (MPa) at knots: beta lists G12 at its knots, then E2, then E1.
 
-    A straight line between two knots, a parabola through three, a cubic spline from four on.
-    Beyond its last knot a modulus is held.
-
-    Parameters
-    ----------
-    knots : increasing strains from 0, of eps1, of eps2 and of gamma12; `Spline.at` checks them.
+    A straight line between two knots, a parabola through three, a cubic spline from four on. Beyond
+    its last knot a modulus is held. knots : increasing strains from 0, of eps1, eps2, gamma12.
     """
 
     knots: tuple[tuple[float, ...], ...]
@@ -47,12 +39,7 @@ class Spline:
 
     @classmethod
     def at(cls, knots: Sequence[Sequence[float]]) -> Spline:
-        """The form with these knots of eps1, eps2 and gamma12.
-
-        Raises
-        ------
-        InputError : not three rows of at least two finite strains that increase from 0.
-        """
+        """Return the form with these knots; raise InputError unless they increase from 0."""
         if len(knots) != 3:
             raise InputError(None, "knots", f"expected those of 3 strains, got {len(knots)}")
         for key, row in zip(STRAIN_NAMES, knots, strict=True):
@@ -121,7 +108,7 @@ class Spline:
 
 
 def _coefficients(knots: Sequence[float]) -> Array:
-    """(n - 1, 4, n): powers of the strain itself, highest first, by the values at n knots."""
+    """Return (n - 1, 4, n): powers of strain, highest first, by the values at n knots."""
     from scipy.interpolate import CubicSpline  # half a second, and only splines need it
 
     spline = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
@@ -135,7 +122,7 @@ def _coefficients(knots: Sequence[float]) -> Array:
 
 
 def _digits(knots: Sequence[float]) -> int:
-    """Digits after the point that tell the knots apart, at least three."""
+    """Return the digits after the point that keep the knots apart, at least three."""
     return next(
         n for n in range(3, 18) if n == 17 or len({f"{k:.{n}f}" for k in knots}) == len(knots)
     )
@@ -153,15 +140,11 @@ def _increasing(row: Any) -> bool:
 
 
 def spline_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Spline:
-    """The form of the setting `knots`.
+    """Return the form of the setting `knots`.
 
     `knots = 6`: as many for each modulus, evenly spaced over the strain range. `knots = [0, 0.02,
     ...]`: the same strains for each. `knots = {warp = [0, 0.02, ...], fill = 5, shear = ...}`:
-    strains or a number for each.
-
-    Raises
-    ------
-    InputError : knots that are missing, do not increase from 0, or leave the strain range.
+    strains or a number for each. Raises InputError.
     """
     given = settings.get("knots")
     if given is None:

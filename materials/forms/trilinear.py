@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from .base import COMPONENTS, GRID, ORDER, STRAIN_NAMES, UNLIMITED
-from .registry import Offer, register_form
-
-Array = NDArray[np.float64]
+from .base import COMPONENTS, GRID, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer, register_form
 
 Pair = tuple[float, float]
 
@@ -23,11 +20,8 @@ class TriLinear:
     """Three moduli up to the first break, between the breaks, and beyond the second.
 
     G12 is beta_3, beta_2 and beta_1 there, E2 beta_7 to beta_5, E1 beta_11 to beta_9; beta_0,
-    beta_4 and beta_8 are zero. A break belongs to the region below it.
-
-    Parameters
-    ----------
-    pairs : the two breaks of eps1, of eps2 and of gamma12; `TriLinear.at` checks them.
+    beta_4 and beta_8 are zero. A break belongs to the region below it. pairs : the two breaks of
+    eps1, of eps2 and of gamma12.
     """
 
     pairs: tuple[Pair, Pair, Pair]
@@ -40,12 +34,7 @@ class TriLinear:
 
     @classmethod
     def at(cls, breaks: ArrayLike) -> TriLinear:
-        """The form with breaks (3, 2): two strains for each of eps1, eps2, gamma12.
-
-        Raises
-        ------
-        InputError : not three pairs of finite, positive, increasing strains.
-        """
+        """Return the form with breaks (3, 2); raise InputError unless positive and increasing."""
         try:
             pairs = np.array(breaks, dtype=float)
         except (TypeError, ValueError):
@@ -63,7 +52,7 @@ class TriLinear:
 
     @property
     def breaks(self) -> Array:
-        """(3, 2) breaks of (eps1, eps2, gamma12), read-only."""
+        """Return (3, 2) breaks of (eps1, eps2, gamma12), read-only."""
         breaks = np.array(self.pairs)
         breaks.flags.writeable = False
         return breaks
@@ -79,7 +68,7 @@ class TriLinear:
         return np.column_stack([self.breaks, np.full(3, UNLIMITED)])
 
     def grid(self, component: int, end: float) -> Array:
-        """As many strains in a narrow region as in a wide one."""
+        """Return as many strains in a narrow region as in a wide one."""
         breaks = self.breaks[component]
         knots = np.concatenate([[0.0], breaks[breaks < end], [end]])
         at = np.linspace(0.0, len(knots) - 1, GRID)
@@ -102,12 +91,7 @@ class TriLinear:
 def trilinear_named(
     name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
 ) -> TriLinear:
-    """The form of the setting `breaks`, {warp = [first, second], fill = ..., shear = ...}.
-
-    Raises
-    ------
-    InputError : breaks that are missing or no two increasing strains.
-    """
+    """Return the form of `breaks`, {warp = [first, second], fill = ..., shear = ...}."""
     breaks = settings.get("breaks")
     if not isinstance(breaks, Mapping):
         problem = "a trilinear law needs breaks = {warp = [first, second], fill = ..., shear = ...}"

@@ -17,7 +17,7 @@ from ...files import render
 from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
-from ...materials.tables import piece_constants
+from ...materials.responses import piece_constants
 
 # The file that carries a law's moduli into the material library, whatever their number.
 #

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import __version__
-from ...materials.exports.marc import STATE_VARIABLES
+from ...materials.exports.subroutines import STATE_VARIABLES
 from ...materials.law import HypoelasticLaw
-from ...materials.tables import ModulusTable, modulus_tables
+from ...materials.responses import ModulusTable, modulus_tables
 from ...meshes.mesh import Mesh
 from ..decks import render
 from .settings import MarcSettings

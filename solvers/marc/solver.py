@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...errors import SolverFailure
-from ...materials.exports.marc import hypela2_source
+from ...materials.exports.subroutines import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel

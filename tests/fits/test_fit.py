@@ -18,7 +18,7 @@ from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.kinds import Around, Doubt, Judgement, Reach, laws_around
 from bubblefit.inference.unknowns import Unknowns, allowed, draw
 from bubblefit.materials.card import CardCertainty, MaterialCard, read_card
-from bubblefit.materials.forms.registry import form_names
+from bubblefit.materials.forms.base import form_names
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, read_project
 from bubblefit.reports.content import Exhibit, Report, Table, read_page_data

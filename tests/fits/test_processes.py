@@ -17,7 +17,7 @@ import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.comparison import Comparison
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.polynomial import Polynomial

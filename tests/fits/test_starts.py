@@ -20,7 +20,7 @@ from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
 from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
-from bubblefit.inference.discretisation import limit_of, residual_of
+from bubblefit.inference.linear import limit_of, residual_of
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import NoteKind
 from bubblefit.runs import best as mesh_error

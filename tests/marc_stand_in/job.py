@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from bubblefit.errors import BubblefitError
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.mesh import volume_gradient
+from bubblefit.meshes.mesh import volume_and_gradient
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from numpy.typing import NDArray
 
@@ -273,7 +273,7 @@ class Running:
                 level = content.tables[c.tables[0]].at(float(self.schedule.times[i - 1]))
                 quads = (content.connectivity - 1).astype(np.intp)
                 moved = content.coordinates + state.displacement
-                external = level * volume_gradient(moved, quads)
+                external = level * volume_and_gradient(moved, quads)[1]
         found = {
             "Displacement": state.displacement,
             "External Force": external,

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports.abaqus import umat
 from bubblefit.materials.exports.base import NoOptions
+from bubblefit.materials.exports.subroutines import umat
 from bubblefit.materials.law import HypoelasticLaw
 
 from ..fortran_build import (

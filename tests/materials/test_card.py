@@ -22,9 +22,8 @@ from bubblefit.materials.card import (
     write_card,
 )
 from bubblefit.materials.exports.base import BAND_COLUMNS
-from bubblefit.materials.forms.base import UNLIMITED
+from bubblefit.materials.forms.base import UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC
-from bubblefit.materials.forms.registry import form_named
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.exports import FORMATS
@@ -34,7 +33,6 @@ from hypothesis.extra.numpy import arrays
 
 from ..complaints import complaint
 
-# --- card ---
 GOOD: dict[str, Any] = {
     "name": "Valmex 7318", "source": "a test", "unit": "GPa",
     "beta": [0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.8], "nu12": 0.24,
@@ -297,7 +295,6 @@ def test_a_card_is_in_gpa_unless_told_otherwise(tmp_path):
         assert (said["unit"], said["beta"][11]) == (unit, pytest.approx(e1))
 
 
-# --- certainty ---
 ENDS = [0.1, 0.12, 0.2]
 
 

@@ -21,7 +21,7 @@ from bubblefit.materials.designers import (
     line_of,
     shares,
 )
-from bubblefit.materials.exports.radioss import yarn_of
+from bubblefit.materials.exports.curves import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response, trellis_curve, uniaxial_curve
 from bubblefit.solvers.exports import FORMATS
@@ -32,7 +32,6 @@ from ..biaxial_files import BENT, THICKNESS
 from ..complaints import complaint_with
 from ..fortran_build import LAWS
 
-# --- constants ---
 #: Published for a glass/PTFE fabric with free Poisson's ratios (test T2, 2 to 30 kN/m).
 FREE = DesignersConstants(1188.0, 864.0, 0.73, 0.69)
 RECIPROCAL = DesignersConstants.of_stiffness([[1000.0, 400.0], [400.0, 800.0]])
@@ -147,7 +146,6 @@ def test_paths_that_settle_no_constants_are_refused():
     complaint_with(["1.32", "below 1"], lambda: unstable.stiffness)
 
 
-# --- of laws ---
 def test_a_linear_law_gives_its_own_constants_at_small_loads():
     law = HypoelasticLaw.linear(1000.0, 800.0, 30.0, 0.24)
     found = constants_of_law(law, THICKNESS, 0.0, 1e-3, 0.1)
@@ -176,7 +174,6 @@ def test_loads_that_a_law_does_not_carry_are_refused():
     complaint_with(["carries no more", "lower"], constants_of_law, falling, THICKNESS, 0, 90, 0.1)
 
 
-# --- designers exports ---
 LINEAR = MaterialCard(HypoelasticLaw.linear(1000.0, 800.0, 30.0, 0.24), 0.8, "linear")
 CARD = MaterialCard(BENT, 0.8, "bent")
 
@@ -245,7 +242,6 @@ def test_what_a_card_does_not_know_of_the_shear_is_said():
     assert fields_of(found.files[".txt"])["Poisson's ratio (warp-weft)"] < 1.0
 
 
-# --- LAW58 ---
 def cards_of(text: str) -> list[list[float]]:
     """The numbers of the rows below the title: columns of 20, N1 and N2 of 10."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
@@ -296,7 +292,6 @@ def test_a_yarn_that_stiffens_has_no_negative_softening_and_it_is_said():
     assert (bent.modulus, bent.softening) == (pytest.approx(500), pytest.approx(4000))
 
 
-# --- biaxial response ---
 T = 0.8
 
 

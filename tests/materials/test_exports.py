@@ -13,8 +13,15 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import trellis_angle, trellis_curve, uniaxial_curve
-from bubblefit.materials.tables import JUMP, REACH, modulus_table, modulus_tables
+from bubblefit.materials.responses import (
+    JUMP,
+    REACH,
+    modulus_table,
+    modulus_tables,
+    trellis_angle,
+    trellis_curve,
+    uniaxial_curve,
+)
 from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
 from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner
@@ -28,7 +35,6 @@ from ..fortran_build import BETA, KNOTS, LAWS
 from ..published_laws import TABLE_4_2
 from ..solvers.calculix.test_calculix_law import expected, patch_deck, tensor, voigt
 
-# --- exports ---
 CARD = MaterialCard(LAWS["cubic"], 0.8, "Valmex 7318", "Table 4.2")
 TABULATED = ("marc", "abaqus-fabric", "ls-dyna-mat34", "csv")
 E1, E2 = (np.poly1d(BETA[first : first + 4]) for first in (8, 4))
@@ -50,7 +56,6 @@ def strip(pulled, log_strain):
     return np.expm1(log_strain), stress * np.exp(across)
 
 
-# --- curves ---
 @pytest.mark.parametrize("pulled", [0, 1])
 def test_a_strip_is_the_closed_form(pulled):
     log_strain = np.linspace(0, 0.13, 66)
@@ -98,7 +103,6 @@ def test_a_law_that_fails_on_the_way_has_no_curve():
     assert "trellis" in complaint(trellis_curve, weak, np.linspace(0, 0.2, 5), "true")
 
 
-# --- reading back ---
 def fixed(line, widths):
     """Fields of fixed columns."""
     ends = np.cumsum(widths)
@@ -317,7 +321,6 @@ def test_ccx_runs_the_exported_card(ccx, tmp_path, monkeypatch):
     np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=2e-6 * wanted.max())
 
 
-# --- what is said ---
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_file_begins_with_what_is_carried_lost_and_to_be_confirmed(name):
     made = export(name)
@@ -359,7 +362,6 @@ def test_the_limits_of_each_target_are_named():
         assert "no valid_strain" not in loses(name)
 
 
-# --- the command ---
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -500,7 +502,6 @@ def test_json_points_and_a_missing_card(folder):
     assert "nowhere.toml: cannot be read" in run("nowhere.toml", "--format", "csv", code=2)
 
 
-# --- modulus tables ---
 # MPa.
 TABLE = 1e3 * np.array(TABLE_4_2)
 CUBIC = HypoelasticLaw(TABLE, strain_range=np.array([0.13, 0.12, 0.14]))

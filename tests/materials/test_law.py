@@ -20,7 +20,6 @@ from ..places import PUBLISHED
 from ..published_laws import TABLE_4_2
 from .paths import follow
 
-# --- law ---
 BETA = 1e3 * np.array(TABLE_4_2)
 RANGE = [0.13, 0.13, 0.13]
 E1, E2, G12, NU = 300.0, 220.0, 5.0, 0.24
@@ -370,7 +369,6 @@ def test_the_law_cannot_be_changed_in_place():
     assert CONSTANT.with_beta(2 * CONSTANT.beta).nu12 == CONSTANT.nu12
 
 
-# --- trilinear ---
 #: First coefficient of each modulus.
 FIRST = {"E1": 8, "E2": 4, "G12": 0}
 VALUES = dict(zip(("E1", "E2", "G12"), MODULI_3, strict=True))

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from ..mesh_quality import edges, least_scaled_jacobian
 
-# --- cylinder mesh ---
 LENGTH, DIAMETER, SEAM = 3000.0, 150.0, 40.0  # thesis, section 6.1
 RADIUS = DIAMETER / 2
 BENDING = (Refinement("collar", 0.0, 90.0, 12.0), Refinement("support", 1000.0, 40.0, 12.0))
@@ -296,7 +295,6 @@ def test_refinements_are_checked(change):
         Refinement(**({"name": "support", "position": 1.0, "reach": 1.0, "size": 1.0} | change))
 
 
-# --- facet reading ---
 FINE = SmoothReading.of(disk_mesh(100.0, 3072, "full"))
 #: Of a wave of 50 mm, and where it is looked at.
 WAVE = 2 * np.pi / 50.0
@@ -375,7 +373,6 @@ def test_what_is_no_facet(given, said):
         Facet(**given)
 
 
-# --- smooth reading ---
 POINTS = np.random.default_rng(5).uniform(-100, 100, (900, 2))
 
 

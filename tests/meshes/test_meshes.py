@@ -23,7 +23,6 @@ from hypothesis import strategies as st
 from .. import needs
 from ..mesh_quality import edges, scaled_jacobian
 
-# --- meshes ---
 RADIUS = 100.0
 BEST = np.sin(np.deg2rad(120))  # three quads meet in a node of each quarter
 
@@ -180,7 +179,6 @@ def test_slow_packages_are_loaded_only_when_used():
     assert done.stdout.strip() == "[]", done.stderr
 
 
-# --- elliptic disk ---
 TURNED = Outline(120.0, 80.0, 30.0)
 
 

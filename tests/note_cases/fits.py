@@ -23,9 +23,8 @@ from bubblefit.inference.assessment import Certainty, certainty
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
 from bubblefit.inference.likelihood import BOUND, Side
 from bubblefit.inference.linear import Order
-from bubblefit.inference.misfit import Discrepancy, NoiseTest, notes_of_discrepancies
-from bubblefit.inference.misfit import notes_of_noise as notes_of_noise_tests
-from bubblefit.inference.noise import Misfit
+from bubblefit.inference.noise import Discrepancy, Misfit, NoiseTest, notes_of_discrepancies
+from bubblefit.inference.noise import notes_of_noise as notes_of_noise_tests
 from bubblefit.inference.resampling import Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.notes import Note
@@ -37,7 +36,7 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..identification import cases
+from ..inference import cases
 from ..projects import constant_strips, small
 
 

@@ -23,7 +23,7 @@ from bubblefit.solvers.marc.cylinder import may_touch
 from bubblefit.solvers.marc.results import bubble_history
 from bubblefit.solvers.marc.solver import MarcSolver
 
-from ..identification.cases import MODEL
+from ..inference.cases import MODEL
 from ..marc_files import sts_text, t19_text
 from ..solvers.marc.test_marc_cylinder import frames_of
 from ..solvers.membrane.test_bending import LINEAR

@@ -13,7 +13,7 @@ import pytest
 from bubblefit.experiments import registry as experiments
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.exports import marc as marc_nlelast
+from bubblefit.materials.exports import subroutines
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.curves import LoadCurve
@@ -91,4 +91,4 @@ def notes_of_gauge(folder: Path, _: Any) -> list[Note]:
 
 
 def notes_of_exports(*_: Any) -> list[Note]:
-    return marc_nlelast.FORMAT_MARC_NLELAST.export(CARD).says.notes
+    return subroutines.NLELAST.export(CARD).says.notes

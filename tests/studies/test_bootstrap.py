@@ -13,7 +13,7 @@ import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments.bubble import candidates as bubbles
 from bubblefit.experiments.strips import candidates as strips
-from bubblefit.inference.assessment import pinned_by
+from bubblefit.inference.assessment import uncertainty_from
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.card import MaterialCard, write_card
@@ -320,7 +320,7 @@ def test_what_is_known_now_is_what_a_fit_says_its_tests_pin_down(tmp_path, few):
         made = plan(read_project(path), bubble_card())
     present = here[0]
     noise = Noise.of(present.problem, present.point.residual).rows
-    pinned = pinned_by(present.problem, present.point, present.law, made.ends, [0], noise)
+    pinned = uncertainty_from(present.problem, present.point, present.law, made.ends, [0], noise)
     for name, sigma in made.now.sigma.items():
         np.testing.assert_allclose(sigma, pinned[name], rtol=1e-6)
 

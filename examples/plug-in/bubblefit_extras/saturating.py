@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError
-from bubblefit.materials.forms.base import COMPONENTS, ORDER, STRAIN_NAMES, UNLIMITED, Array
-from bubblefit.materials.forms.registry import Offer
+from bubblefit.materials.forms.base import COMPONENTS, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer
 
 #: Ends of the pieces in units of s; beyond the last, where 0.2 % is left, a modulus is constant.
 ENDS = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0])

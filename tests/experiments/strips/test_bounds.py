@@ -11,7 +11,7 @@ from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, draw
 from bubblefit.materials.forms.base import COMPONENTS, GRID, moduli_on_grid
 from bubblefit.materials.law import DEFINITE, HypoelasticLaw
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import CUBIC, FORMS, LARGEST, LAW, LEAST, RANGE, strips
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bubblefit.inference.assessment import certainty, pinned_by
-from bubblefit.inference.methods.descent import descend
+from bubblefit.inference.assessment import certainty, uncertainty_from
+from bubblefit.inference.descent import descend
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS
 
-from ...identification.scatter import follows, scatter_of
+from ...inference.scatter import follows, scatter_of
 from .problems import CONSTANT, CONSTANTS, CUBIC, LAW, STRIPS, joint, near, strips
 
 
@@ -35,7 +35,7 @@ def test_what_each_data_set_pins_down() -> None:
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
     reached, noise = np.array([0.1, 0.1, 0.3]), Noise.of(fit, point.residual).rows
     bubble, uniaxial, both = (
-        pinned_by(fit, point, LAW, reached, tests, noise)
+        uncertainty_from(fit, point, LAW, reached, tests, noise)
         for tests in ([0], [1, 2, 3], [0, 1, 2, 3])
     )
     for name in COMPONENTS:
@@ -45,6 +45,6 @@ def test_what_each_data_set_pins_down() -> None:
     assert worst["G12"] > 2 * max(worst["E1"], worst["E2"])
     assert uniaxial["G12"].max() < 0.2 * bubble["G12"].max()
     # A pull along the warp says nothing of the fill or of shear.
-    warp = pinned_by(fit, point, LAW, reached, [1], noise)
+    warp = uncertainty_from(fit, point, LAW, reached, [1], noise)
     assert warp["E1"].max() < 0.5
     assert min(warp["E2"].min(), warp["G12"].min()) > 1.0

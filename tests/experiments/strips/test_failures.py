@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 from bubblefit.inference.assessment import moduli_error
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.search import feasible_start, fit_from
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, found_beta, gauge_strains, joint, led, near, strips
 
 

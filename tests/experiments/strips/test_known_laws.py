@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import moduli_error
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import (
     BUBBLE,
     CUBIC,

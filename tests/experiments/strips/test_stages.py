@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from bubblefit.inference.methods import METHODS
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions, method_named
 from bubblefit.inference.search import approach, feasible_start, fit_from
 
-from ...identification.cases import levenberg_marquardt
+from ...inference.cases import levenberg_marquardt
 from .problems import CUBIC, LAW, Failing, joint, led, near
 
 
@@ -18,7 +17,7 @@ def test_strips_lead_into_a_joint_fit() -> None:
     start = feasible_start(fit, 2, 0)
     fit.reset()
     fit.watch = lambda y, value, status, solver: told.append((value, status))
-    y = approach(fit, start, METHODS["lm"], FitOptions())
+    y = approach(fit, start, method_named("lm"), FitOptions())
     groups = [words.split(" alone: ")[0] for _, words in told]
     assert list(dict.fromkeys(groups)) == ["warp, fill", "warp, fill, bias", "ok"]
     assert len(told) == fit.analyses and groups.count("ok") == 1
@@ -34,10 +33,10 @@ def test_a_joint_fit_starts_where_it_was_told_when_the_strips_lead_astray() -> N
     fit = joint(stages=True)
     start = near(CUBIC, LAW)
     fit.comparisons[0].solver = Failing([1])  # the bubble, at the optimum of the strips
-    assert (approach(fit, start, METHODS["lm"], FitOptions()) == start).all()
+    assert (approach(fit, start, method_named("lm"), FitOptions()) == start).all()
     fit.comparisons[1].solver = Failing(range(1, 1000))
-    assert (approach(fit, start, METHODS["lm"], FitOptions()) == start).all()
-    assert (approach(joint(), start, METHODS["lm"], FitOptions()) == start).all()
+    assert (approach(fit, start, method_named("lm"), FitOptions()) == start).all()
+    assert (approach(joint(), start, method_named("lm"), FitOptions()) == start).all()
 
 
 def test_the_surrogate_of_a_joint_fit_leads_in_too() -> None:

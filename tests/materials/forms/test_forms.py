@@ -10,6 +10,9 @@ from bubblefit.materials.forms.base import (
     ORDER,
     UNLIMITED,
     Form,
+    form_named,
+    form_names,
+    form_settings,
     map_in_range,
     moduli_on_grid,
     modulus_rows,
@@ -19,7 +22,6 @@ from bubblefit.materials.forms.base import (
 )
 from bubblefit.materials.forms.polynomial import CUBIC, DEGREES, LINEAR
 from bubblefit.materials.forms.ratio import LoadRatio
-from bubblefit.materials.forms.registry import form_named, form_names, form_settings
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus
@@ -33,7 +35,6 @@ from ..paths import follow
 from .pieces_of_laws import BETA, KNOTS, RANGE, integral, turning_points
 from .pieces_of_laws import LAWS as OF_STRAIN
 
-# --- forms ---
 LAWS = {
     **OF_STRAIN,
     "load-ratio": HypoelasticLaw(
@@ -222,7 +223,6 @@ def test_an_entry_that_a_form_does_not_have_is_named():
     assert "expected 13 finite" in complaint(HypoelasticLaw, BETA, form=LAWS["spline"].form)
 
 
-# --- increments ---
 EVERY_FORM = pytest.mark.parametrize("form", OF_STRAIN)
 STEPS = pytest.mark.parametrize("steps", [1, 2, 7, 50])
 names = st.sampled_from(sorted(COMPONENTS))
@@ -378,12 +378,11 @@ def test_the_tangent_of_the_law_is_that_of_its_stress(form):
         assert np.abs(off).max() < 1e-6 * np.abs(tangent).max()
 
 
-# --- form registry ---
 ENDS = (0.1, 0.2, 0.5)
 WORKING = """
 from dataclasses import dataclass, replace
 from bubblefit.materials.forms.polynomial import LINEAR
-from bubblefit.materials.forms.registry import Offer
+from bubblefit.materials.forms.base import Offer
 
 def make(name, settings, strain_range):
     {body}

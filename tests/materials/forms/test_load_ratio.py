@@ -14,8 +14,7 @@ from bubblefit.materials.forms.base import EVEN
 from bubblefit.materials.forms.ratio import LABELS, LoadRatio
 from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.point_law import RIGHT, load_angle
-from bubblefit.materials.responses import biaxial_response
-from bubblefit.materials.tables import piece_constants
+from bubblefit.materials.responses import biaxial_response, piece_constants
 from bubblefit.solvers.base import carries_load_ratios, check_carries
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.registry import solver_named

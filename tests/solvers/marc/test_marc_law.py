@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports.base import NoOptions
-from bubblefit.materials.exports.marc import hypela2, hypela2_source
+from bubblefit.materials.exports.subroutines import hypela2, hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.materials.exports.marc import hypela2_source
+from bubblefit.materials.exports.subroutines import hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder

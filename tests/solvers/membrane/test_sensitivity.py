@@ -18,9 +18,9 @@ from bubblefit.solvers.membrane.newton import named
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
-from ...identification.cases import CUBIC, RANGE
-from ...identification.cases import LAW as CASE_LAW
-from ...identification.cases import MODEL as CASE_MODEL
+from ...inference.cases import CUBIC, RANGE
+from ...inference.cases import LAW as CASE_LAW
+from ...inference.cases import MODEL as CASE_MODEL
 from ...published_laws import TABLE_4_2
 
 # --- sensitivity ---

@@ -9,6 +9,11 @@ the warp), nu_f how much the fill contracts when the warp is pulled (nu12 of thi
 Reciprocal constants have nu_w / E_f = nu_f / E_w. The direct form is its inverse:
 
     n_w = A_w eps_w + A_wf eps_f,    n_f = A_fw eps_w + A_f eps_f.
+
+Of every path each yarn's strain is replaced by its regression line over the larger of the two
+loads, likewise the loads. Constants have the least sum of squares, at points evenly spread along
+these lines, of strains (inverse form) or of loads (direct form). Two yarns of five ratios are ten
+strain paths; the eight without the unloaded yarns of 1:0 and 0:1 are the usual choice.
 """
 
 from __future__ import annotations
@@ -21,13 +26,12 @@ from itertools import product
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...errors import InputError
-from ..law import HypoelasticLaw
-from ..responses import biaxial_response
-
-Array = NDArray[np.float64]
+from ..errors import InputError
+from .forms.base import Array
+from .law import HypoelasticLaw
+from .responses import biaxial_response
 
 #: Relative: constants whose cross terms differ by less are reciprocal.
 SAME = 1e-9
@@ -35,11 +39,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class DesignersConstants:
-    """Stiffnesses per width in kN/m.
-
-    warp, fill : E_w, E_f. nu_warp, nu_fill : nu_w, nu_f as above. shear : G, None where it is not
-    known: a biaxial test along the yarns says nothing of it.
-    """
+    """Stiffnesses per width in kN/m, Poisson's ratios as above; shear : G, None where unknown."""
 
     warp: float
     fill: float
@@ -49,12 +49,8 @@ class DesignersConstants:
 
     @classmethod
     def of_compliance(cls, compliance: ArrayLike, shear: float | None = None) -> DesignersConstants:
-        """Of eps = C n, C (2, 2) per kN/m.
-
-        Raises
-        ------
-        InputError : a diagonal that is not positive: no such constants.
-        """
+        """Return the constants of eps = C n, C (2, 2) per kN/m; raise InputError for a bad
+        diagonal."""
         c = np.asarray(compliance, dtype=float)
         if not (np.isfinite(c).all() and c[0, 0] > 0 and c[1, 1] > 0):
             problem = "a fabric would get shorter when it is pulled: these paths have no constants"
@@ -64,12 +60,7 @@ class DesignersConstants:
 
     @classmethod
     def of_stiffness(cls, stiffness: ArrayLike, shear: float | None = None) -> DesignersConstants:
-        """Of n = A eps, A (2, 2) kN/m: the direct form.
-
-        Raises
-        ------
-        InputError : it has no inverse of that kind.
-        """
+        """Return the constants of n = A eps, A (2, 2) kN/m; raise InputError without an inverse."""
         a = np.asarray(stiffness, dtype=float)
         det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
         if not det > 0:
@@ -80,18 +71,13 @@ class DesignersConstants:
 
     @property
     def compliance(self) -> Array:
-        """C (2, 2) of eps = C n, per kN/m."""
+        """Return C (2, 2) of eps = C n, per kN/m."""
         across = -self.nu_warp / self.fill, -self.nu_fill / self.warp
         return np.array([[1 / self.warp, across[0]], [across[1], 1 / self.fill]])
 
     @property
     def stiffness(self) -> Array:
-        """A (2, 2) of n = A eps, kN/m: the direct form.
-
-        Raises
-        ------
-        InputError : nu_warp nu_fill is not below 1.
-        """
+        """Return A (2, 2) of n = A eps, kN/m; raise InputError unless nu_warp nu_fill < 1."""
         rest = 1.0 - self.nu_warp * self.nu_fill
         if not rest > 0:
             problem = f"nu_warp nu_fill is {1 - rest:.3g}; expected below 1"
@@ -101,28 +87,20 @@ class DesignersConstants:
 
     @property
     def reciprocal(self) -> bool:
-        """Whether a strain energy belongs to them."""
+        """Return whether a strain energy belongs to them."""
         one, other = self.nu_warp / self.fill, self.nu_fill / self.warp
         return abs(one - other) <= SAME * max(abs(one), abs(other), 1e-300)
 
     @property
     def stable(self) -> bool:
-        """Whether every stretch takes work: nu_warp nu_fill < 1 where they are reciprocal."""
+        """Return whether every stretch takes work: nu_warp nu_fill < 1 if reciprocal."""
         c = self.compliance
         return bool(c[0, 0] * c[1, 1] > (0.5 * (c[0, 1] + c[1, 0])) ** 2)
 
     def strain(self, loads: ArrayLike) -> Array:
-        """(n, 2) of loads (n, 2) kN/m."""
+        """Return (n, 2) of loads (n, 2) kN/m."""
         return np.asarray(np.asarray(loads, dtype=float) @ self.compliance.T)
 
-
-# Constants from biaxial paths by least squares, as the trade does it.
-#
-# Of every path each yarn's strain is replaced by its regression line over the larger of the two
-# loads (through the beginning of the path), likewise the loads. Constants are then those with the
-# least sum of squares, at points evenly spread along these lines, of strains (inverse form) or of
-# loads (direct form). Two yarns of five ratios are ten strain paths; the eight without the
-# unloaded yarns of 1:0 and 0:1 are the usual choice.
 
 Minimise = Literal["strain", "load"]
 
@@ -147,19 +125,14 @@ class LinearPath:
 
     @property
     def unloaded(self) -> tuple[bool, bool]:
-        """Whether the load of the warp, of the fill hardly changes."""
+        """Return whether the load of the warp, of the fill hardly changes."""
         least = UNLOADED * float(np.abs(self.load).max())
         warp, fill = np.abs(self.load) < least
         return bool(warp), bool(fill)
 
 
 def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
-    """The lines through the beginning of a path: loads (n, 2) kN/m, strains (n, 2).
-
-    Raises
-    ------
-    InputError : a load that does not change.
-    """
+    """Return the lines through the beginning of a path: loads (n, 2) kN/m, strains (n, 2)."""
     n, eps = np.asarray(load, dtype=float), np.asarray(strain, dtype=float)
     larger = n.max(axis=1)
     s = larger - larger[0]
@@ -175,10 +148,10 @@ def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
 
 @dataclass(frozen=True)
 class Options:
-    """What is evaluated, and how.
+    """Choices of an evaluation.
 
     unloaded : with the strains of unloaded yarns (ten paths of five ratios) or without (eight).
-    reciprocal : nu_w / E_f = nu_f / E_w is asked for. minimise : squares of strains, or of loads.
+    reciprocal : nu_w / E_f = nu_f / E_w is required. minimise : squares of strains, or of loads.
     ratios : those that count, all where it is empty.
     """
 
@@ -188,7 +161,7 @@ class Options:
     ratios: tuple[str, ...] = ()
 
     def counts(self, path: LinearPath) -> tuple[bool, bool]:
-        """Which yarns of a path count."""
+        """Return which yarns of a path count."""
         if self.ratios and path.ratio not in self.ratios:
             return False, False
         warp, fill = path.unloaded
@@ -199,8 +172,8 @@ class Options:
 class Evaluation:
     """Constants of some options.
 
-    paths : how many strain paths count. squares : sum of the squares of strain over them, %^2, at
-    `POINTS` of each. rms : by ratio, of the strains of both yarns, all ratios, in %.
+    paths : number of strain paths that count. squares : sum of the squares of strain over them,
+    %^2, at `POINTS` of each. rms : by ratio, of the strains of both yarns, in %.
     """
 
     options: Options
@@ -215,12 +188,7 @@ USUAL = Options()
 
 
 def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluation:
-    """The constants with the least squares.
-
-    Raises
-    ------
-    InputError : paths that do not settle them.
-    """
+    """Return the constants with the least squares; raise InputError if paths do not settle them."""
     matrix, right = _rows(paths, options)
     # Columns: C_ww, C_ff, C_wf, C_fw (or A), the last two one where they are reciprocal.
     if options.reciprocal:
@@ -245,7 +213,7 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
 
 
 def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluation | None:
-    """The constants; None where the paths do not settle them."""
+    """Return the constants; None where the paths do not settle them."""
     try:
         return evaluate(paths, options)
     except InputError:
@@ -253,15 +221,17 @@ def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluatio
 
 
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
-    """What every other choice gives; those that settle no constants are left out."""
+    """Return the results of every other choice that settles the constants."""
     others = [other for other in every_option(paths) if other != options]
     found = [evaluate_or_none(paths, other) for other in others]
     return [one for one in found if one is not None]
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:
-    """The choices that laboratories make: eight or ten paths, reciprocal or not, strains or loads,
-    and the ratios about 1:1 alone where there are others."""
+    """Return the choices of laboratories: eight or ten paths, reciprocal or not, strains or loads.
+
+    Also the ratios about 1:1 alone where there are others.
+    """
     kinds: tuple[Minimise, ...] = ("strain", "load")
     found = [
         Options(unloaded, reciprocal, minimise)
@@ -281,7 +251,7 @@ def _shares() -> Array:
 
 
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
-    """Rows of the linear equations, and their right sides."""
+    """Return rows of the linear equations, and their right sides."""
     rows, right = [], []
     # All points of a straight line say the same: one row with the root of their squares' sum.
     weight = float(np.sqrt((_shares() ** 2).sum()))
@@ -305,14 +275,10 @@ _RATIO = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$")
 
 
 def shares(ratio: str) -> tuple[float, float]:
-    """Loads along warp and fill where the larger is 1.
+    """Return loads along warp and fill where the larger is 1; raise InputError for no such ratio.
 
     >>> shares("1:2"), shares("2/1")
     ((0.5, 1.0), (1.0, 0.5))
-
-    Raises
-    ------
-    InputError : no such ratio.
     """
     found = _RATIO.match(ratio)
     pair = [float(text.replace(",", ".")) for text in found.groups()] if found else [0.0]
@@ -332,10 +298,9 @@ SHEARS = 61
 class LawConstants:
     """A law as designers' constants.
 
-    evaluation : that was asked for, its constants with the shear stiffness; others : of the other
-    options. lost : by ratio, RMS of what the constants are off the law's own strains along the
-    path, %. largest : by ratio, the law's largest strain, %. shear : (least, largest) G per width
-    over the shear strains, kN/m.
+    evaluation : its constants with the shear stiffness; others : of the other options. lost : by
+    ratio, RMS difference from the law's own strains along the path, %. largest : by ratio, the
+    law's largest strain, %. shear : (least, largest) G per width over the shear strains, kN/m.
     """
 
     evaluation: Evaluation
@@ -346,12 +311,11 @@ class LawConstants:
 
     @property
     def constants(self) -> DesignersConstants:
-        """What was asked for."""
         return self.evaluation.constants
 
     @property
     def rms(self) -> float:
-        """Over all ratios, %."""
+        """Return the RMS difference over all ratios, %."""
         return float(np.sqrt(np.mean(np.square([*self.lost.values()]))))
 
 
@@ -366,14 +330,9 @@ def constants_of_law(
 ) -> LawConstants:
     """Evaluate a law as a test of five ratios is evaluated.
 
-    Parameters
-    ----------
     thickness : mm. lowest, highest : kN/m, of the larger load of each ratio. shear_strain : up to
-        which G is averaged.
-
-    Raises
-    ------
-    InputError : loads that do not increase, a law that does not carry them.
+    which G is averaged. Raises InputError for loads that do not increase or that the law does not
+    carry.
     """
     if not 0 <= lowest < highest:
         problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
@@ -397,7 +356,7 @@ def constants_of_law(
 def _curve(
     law: HypoelasticLaw, thickness: float, ratio: str, lowest: float, highest: float
 ) -> tuple[Array, Array]:
-    """Loads (n, 2) kN/m of a ratio and the law's strains (n, 2)."""
+    """Return loads (n, 2) kN/m of a ratio and the law's strains (n, 2)."""
     larger = np.concatenate(
         [np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
          np.linspace(lowest, highest, STEPS + 1)]
@@ -414,12 +373,12 @@ def _curve(
     return loads[keep], found.elongation[keep]
 
 
-#: The constants of an evaluation whose spread is told.
+#: The constants of an evaluation with a spread.
 CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
 
 
 def row_of(one: Evaluation) -> dict[str, Any]:
-    """Options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
+    """Return options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
     c, o = one.constants, one.options
     direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
     return {
@@ -441,7 +400,7 @@ def row_of(one: Evaluation) -> dict[str, Any]:
 
 
 def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:
-    """Least and largest of each of `CONSTANTS` over the evaluations."""
+    """Return least and largest of each of `CONSTANTS` over the evaluations."""
     every = [one.constants for one in evaluations]
     return {
         name: (min(getattr(c, name) for c in every), max(getattr(c, name) for c in every))

@@ -5,16 +5,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.inference.assessment import Certainty, _on_bounds, certainty, moduli_error, pinned_by
+from bubblefit.inference.assessment import (
+    Certainty,
+    _on_bounds,
+    certainty,
+    moduli_error,
+    uncertainty_from,
+)
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
-from bubblefit.inference.discretisation import Limit
-from bubblefit.inference.linear import Asked, information, summary
-from bubblefit.inference.methods.descent import descend
-from bubblefit.inference.misfit import CHANCE, NoiseTest, noise_tests, notes_of_noise
-from bubblefit.inference.noise import Misfit, Noise, alike, alike_in
+from bubblefit.inference.descent import descend
+from bubblefit.inference.linear import LawQuery, Limit, information, summary
+from bubblefit.inference.noise import (
+    CHANCE,
+    Misfit,
+    Noise,
+    NoiseTest,
+    alike,
+    alike_in,
+    noise_tests,
+    notes_of_noise,
+)
 from bubblefit.inference.problem import Evaluation, FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.notes import NoteKind
@@ -25,7 +38,6 @@ from . import cases
 from .cases import CONSTANT, CUBIC, LAW, MODEL, PRESSURES, problem, reference, single, targets
 from .scatter import follows, scatter_of
 
-# --- assessment ---
 REACHED = np.array([0.08, 0.08, 0.08])
 FLAT_LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 PRESSURE = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
@@ -73,15 +85,15 @@ def test_what_a_nuisance_hides_is_not_determined():
     """At a single pressure that is not known for sure, moduli can only be told up to a factor."""
     model = replace(MODEL, pressures=PRESSURES[-1:], increments=PRESSURES)
     without, beside = flat(CONSTANT, model), flat(PRESSED, model)
-    sure, unsure = pinned_by_all(without), pinned_by_all(beside)
+    sure, unsure = uncertainty_from_all(without), uncertainty_from_all(beside)
     for name in ("E1", "E2"):
         assert sure[name].max() < 0.02 and unsure[name].min() > 0.5
 
 
-def pinned_by_all(fit: FitProblem) -> dict[str, np.ndarray]:
+def uncertainty_from_all(fit: FitProblem) -> dict[str, np.ndarray]:
     point = evaluated(fit)
     noise = Noise.of(fit, point.residual).rows
-    return pinned_by(fit, point, FLAT_LAW, REACHED, [0], noise)
+    return uncertainty_from(fit, point, FLAT_LAW, REACHED, [0], noise)
 
 
 def flat(unknowns: Unknowns, model: BubbleModel = MODEL) -> FitProblem:
@@ -143,7 +155,6 @@ def test_bounds_are_touched_within_a_millionth_of_their_width():
     assert {note.kind for note in notes} == {NoteKind.BOUND}
 
 
-# --- information ---
 INFORMATION_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 UNKNOWNS = Unknowns.of(
     INFORMATION_LAW.form, 0.24, [0.1] * 3,
@@ -152,9 +163,9 @@ UNKNOWNS = Unknowns.of(
 Y = UNKNOWNS.at(INFORMATION_LAW.beta[list(UNKNOWNS.free)])
 
 
-def asked() -> Asked:
+def asked() -> LawQuery:
     """Constant moduli; the unknowns are G12, E2, E1, each in a unit of its own."""
-    return Asked(UNKNOWNS, INFORMATION_LAW, Y, np.array([0.1, 0.1, 0.05]))
+    return LawQuery(UNKNOWNS, INFORMATION_LAW, Y, np.array([0.1, 0.1, 0.05]))
 
 
 def test_nuisance_is_what_the_whole_covariance_says_it_is():
@@ -203,7 +214,6 @@ def test_a_direction_of_which_nothing_is_known_is_unknown():
     assert found["E2"] == pytest.approx(0.01, rel=1e-4)
 
 
-# --- correlation ---
 SIDE, STEP = 40, 2.5
 NODES = MODEL.mesh.points[:, :2]
 PLACES = STEP * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
@@ -307,7 +317,6 @@ def test_along_a_curve():
         assert np.median(found) == 1.0 and np.mean(found) < 1.15
 
 
-# --- chi square ---
 NOISE = 0.05
 
 

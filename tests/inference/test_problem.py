@@ -12,7 +12,7 @@ from bubblefit.inference import search as room
 from bubblefit.inference.search import feasible_start
 from bubblefit.inference.unknowns import LawBounds, Unknowns, _between, allowed, draw
 from bubblefit.materials.forms import polynomial as forms
-from bubblefit.materials.forms.registry import form_named
+from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -35,7 +35,6 @@ from .cases import (
 )
 
 
-# --- problem ---
 @pytest.mark.parametrize("unknowns", [CUBIC, EVERYTHING, CONSTANT], ids=["12", "16", "3"])
 def test_jacobian_against_finite_differences(unknowns):
     """Through the whole chain: solver, Chebyshev values, units, nuisance parameters."""
@@ -82,7 +81,6 @@ def test_watch_hears_of_every_analysis():
     assert heard[0][1] == "ok" and heard[1] == (None, "on purpose")
 
 
-# --- unknowns ---
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_unknowns_are_moduli_at_chebyshev_points(degree):
     places = np.array([4 * b + k for b in range(3) for k in range(3 - degree, 4)])
@@ -192,7 +190,6 @@ def test_bounds_that_do_not_go_with_the_form_are_refused():
     assert "lower <= upper" in complaint(LawBounds.of_entries, [2.0], [1.0], MARGINS)
 
 
-# --- feasibility ---
 def test_feasible_starts_are_feasible_and_reproducible():
     fit, again = problem(), problem()
     a, c = CUBIC.inequalities
@@ -316,7 +313,6 @@ def test_both_ends_of_the_bounds_are_allowed():
     assert allowed(p, np.array(rows) @ p.from_values.T).tolist() == [True, True, False, False]
 
 
-# --- given law ---
 def asked(nuisance: tuple[str, ...], differentiates: bool, first: Any = "first") -> list[Any]:
     """What is asked of a problem of two coefficients, and of the descent."""
     calls: list[Any] = []

@@ -11,8 +11,7 @@ from bubblefit.experiments.strips.objective import LoadObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.misfit import alike_in_all, notes_of_discrepancies
-from bubblefit.inference.noise import Noise
+from bubblefit.inference.noise import Noise, alike_in_all, notes_of_discrepancies
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.resampling import folds_of
 from bubblefit.inference.unknowns import Unknowns
@@ -27,7 +26,6 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ..complaints import complaint
 from .cases import CUBIC, LAW, RANGE, levenberg_marquardt
 
-# --- comparison ---
 TIGHT = 1e-10
 PRESSURE = Nuisance("pressure_offset", -18.0, 50.0, "kPa", "pressure_offset", 1e-3)
 SHIFTS = tuple(Nuisance(f"offset_{axis}", -20.0, 20.0, "mm") for axis in "xyz")
@@ -179,7 +177,6 @@ def test_only_a_near_guess_is_a_warm_start():
     assert plain._guess(np.zeros(1)) is None
 
 
-# --- shared ---
 NU12 = Nuisance("nu12", 0.0, 0.5, "", start=0.3, law_parameter="nu12", shared=True)
 THICKNESS = Nuisance(
     "thickness", 0.6, 1.0, "mm", "thickness", prior=0.02, weight=1e-3, start=0.8, shared=True,
@@ -298,7 +295,6 @@ def test_verdicts_of_bounds_and_of_offsets():
     assert abs(rho) <= 1 and all(abs(value) <= 1 for value in nu12.correlation.values())
 
 
-# --- specimens ---
 PLACES = np.linspace(0.1, 3.0, 30)
 #: Of a law whose modulus is a constant: the load is proportional.
 SLOPES = 100.0 * PLACES[:, None] @ np.array([[1.0, 0.0, 0.0]])
@@ -329,7 +325,7 @@ def test_specimens_that_scatter_are_seldom_told(specimens):
         off -= (off @ SLOPES[:, :1] / (SLOPES[:, 0] @ SLOPES[:, 0])).mean() * SLOPES[:, 0]
         one = found(off)
         assert one is not None and one.specimens == specimens
-        told += one.told
+        told += one.significant
     assert told / sets <= 0.03
 
 
@@ -337,10 +333,10 @@ def test_a_wrong_form_is_told():
     """A curve that bends by 60 N where a constant modulus cannot."""
     random = np.random.default_rng(8)
     bend = 60.0 * ((PLACES / 1.5 - 1.0) ** 2 - 0.4)
-    told = [found(bend + scattered(5, random)).told for _ in range(100)]
+    told = [found(bend + scattered(5, random)).significant for _ in range(100)]
     assert sum(told) > 70
     ten = [found(bend + scattered(10, random)) for _ in range(50)]
-    assert all(one.told for one in ten)
+    assert all(one.significant for one in ten)
     # Without what another modulus would follow.
     beside = bend - SLOPES[:, 0] * (bend @ SLOPES[:, 0]) / (SLOPES[:, 0] @ SLOPES[:, 0])
     expected = float(np.sqrt(np.mean(beside**2)))
@@ -373,7 +369,6 @@ def test_too_few_to_compare():
     assert alike_in_all([np.ones(1)] * 5, [np.ones(1)] * 5, [np.ones((1, 1))] * 5, "N") is None
 
 
-# --- validation ---
 @pytest.mark.parametrize(
     ("specimens", "count"), [({"warp": [3, 3, 8]}, 2), ({"warp": [5, 5, 5, 5, 5]}, 3), ({}, 2)]
 )

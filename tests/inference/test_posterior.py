@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from bubblefit.inference import posterior as truncated
 from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
-from bubblefit.inference.discretisation import Limit
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
+from bubblefit.inference.linear import Limit, posteriors_of
 from bubblefit.inference.linear import Linear as LinearFit
-from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.misfit import (
+from bubblefit.inference.noise import (
     Discrepancy,
+    Noise,
     discrepancy,
     notes_of_discrepancies,
     smooth_shapes,
 )
-from bubblefit.inference.noise import Noise
 from bubblefit.inference.posterior import Posterior, bands_of, truncated_draws
 from bubblefit.inference.problem import Evaluation, WeightedProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
@@ -29,7 +28,6 @@ from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
 
 from .cases import CONSTANT, EVERYTHING, levenberg_marquardt, problem
 
-# --- posterior ---
 OFFSET = Nuisance("offset", -2.0, 2.0, "mm")
 BOUNDS = LawBounds.of_entries(
     [1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0], {"E1": 5.0, "E2": 5.0, "G12": 0.5}
@@ -169,7 +167,6 @@ def test_bands_hold_their_share_and_the_law_itself():
     assert bands_of(posterior, other, strains)["E1"][1] == pytest.approx([600.0, 600.0])
 
 
-# --- truncated ---
 COUNT = 4000
 COVARIANCE = np.array([[4.0, 1.5], [1.5, 1.0]])
 NOTHING = (np.zeros((0, 2)), np.zeros(0))
@@ -259,7 +256,6 @@ def test_oblique_bounds_that_nearly_meet(width):
     assert along.std() == pytest.approx(1.0, abs=0.05)
 
 
-# --- likelihood ---
 #: mm: so much that G12 is off its first order.
 NOISE = 0.3
 
@@ -327,7 +323,6 @@ def test_a_side_ends_where_no_analysis_does(bubble, monkeypatch):
     assert start + 0.5 * sigma <= side.values[-1] <= start + 0.7 * sigma
 
 
-# --- discrepancy ---
 SIDE, BLOCKS = 32, 9
 PLACES = 4.0 * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2)
 SHAPES = smooth_shapes(PLACES)
@@ -357,7 +352,7 @@ def test_noise_is_taken_for_more_in_one_of_a_hundred(width):
         blocks = smooth_noise(random, width)
         for k in range(3):
             blocks[k] = blocks[k] - SHAPES[:, k] * (SHAPES[:, k] @ blocks[k])
-        told += judged(blocks).told
+        told += judged(blocks).significant
     assert told <= 3  # more in one of 600 such tests, if one of a hundred is told
 
 
@@ -365,11 +360,11 @@ def test_a_smooth_field_is_found_below_the_noise():
     """0.005 mm of one shape in every block, beside noise of 0.02 mm."""
     random, shape = np.random.default_rng(6), 0.005 * SHAPES[:, 7] * SIDE
     told = [judged([b + shape for b in smooth_noise(random, 0.0)]) for _ in range(6)]
-    assert all(one.told for one in told)
+    assert all(one.significant for one in told)
     assert np.mean([one.rms for one in told]) == pytest.approx(0.005, rel=0.2)
     # What the mesh may be answerable for is none.
     found = judged([b + shape for b in smooth_noise(random, 0.0)], [shape] * BLOCKS)
-    assert not found.told and found.rms < 0.003
+    assert not found.significant and found.rms < 0.003
 
 
 def test_blocks_count_alike_whatever_their_size():

@@ -1,4 +1,4 @@
-"""One descent of Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
+"""Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
 
 Damping is scaled by diag(J'J) (Marquardt), modulus values at control strains are the unknowns,
 positivity and bounds the constraints, so every iterate is feasible; and every iterate is a stable
@@ -6,15 +6,13 @@ equilibrium (Eq. 4.9's "analysis ends well"): a soft membrane can fold, and what
 pressure can show must not lead the fit astray.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
-from ..problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
+from ..materials.forms.base import Array
+from .problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FIRST_DAMPING = 1e-2
@@ -37,17 +35,10 @@ def descend(
 ) -> tuple[Evaluation, str]:
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
 
-    Parameters
-    ----------
-    point : evaluated with its Jacobian.
-    norms : minimise e itself, the sum of the blocks' norms, not that of their squares.
-    only : (unknowns,) which may change; all unless given.
-    damping : to begin with. negligible : predicted relative decrease of the sum of squares that is
-        not worth an analysis.
-
-    Returns
-    -------
-    The last (best) point, and how it ended: CONVERGED, LEVEL or ANALYSES_USED_UP.
+    point : with its Jacobian. norms : minimise e itself, the sum of the blocks' norms, instead of
+    their squares. only : (unknowns,) which may change. damping : of the first step. negligible :
+    predicted relative decrease of the sum of squares that is not worth an analysis. Returns the
+    best point, and CONVERGED, LEVEL or ANALYSES_USED_UP.
     """
     end = CONVERGED if norms else LEVEL
     growth, idle = 2.0, 0
@@ -55,8 +46,9 @@ def descend(
     while True:
         if point.value < tolerance:
             return point, CONVERGED
+        assert point.jacobian is not None
         root = _block_weights(problem, point, norms)
-        r, j = point.residual * root, _jacobian(point) * root[:, None]
+        r, j = point.residual * root, point.jacobian * root[:, None]
         if only is not None:
             j[:, ~only] = 0.0
         merit = float(r @ r)
@@ -103,10 +95,10 @@ def descend(
 
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
-    """An inequality that keeps the next step half as far from the largest drop in shear.
+    """Return an inequality that keeps the next step half as far from the largest drop in shear.
 
-    A membrane loses its stability in shear: so a refused step says where that modulus was too low,
-    and the fit can slide along that border instead of stopping at it. None when it did not drop.
+    A membrane loses its stability in shear: a refused step shows where that modulus was too low,
+    and the fit can slide along that border. None when it did not drop.
     """
     rows = problem.unknowns.stability_rows
     before, after = rows @ stable, rows @ unstable
@@ -117,13 +109,8 @@ def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, fl
     return rows[k], float(0.5 * (before[k] + after[k]))
 
 
-def _jacobian(point: Evaluation) -> Array:
-    assert point.jacobian is not None
-    return point.jacobian
-
-
 def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:
-    """Square roots of the weights of the squared residuals, (m,).
+    """Return (m,) square roots of the weights of the squared residuals.
 
     1/norm of each block majorises e: its weighted sum of squares decreases only if e does.
     """

@@ -1,24 +1,18 @@
-"""A search by one of NLopt's algorithms on the objective e, with linear or boolean constraints."""
+"""Search with one of NLopt's algorithms on the objective e, constraints linear or boolean.
 
-from __future__ import annotations
+A NaN makes SLSQP run on to maxeval and COBYLA report success at the start; boolean +-1 constraints
+have no slope; COBYLA can return an infeasible point as a success. So NLopt never sees NaN or
+infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
+"""
 
 from dataclasses import dataclass
 
 import nlopt
 import numpy as np
-from numpy.typing import NDArray
 
-from ..problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
-from .base import FitOptions
-
-# What NLopt is told of a fit, and what is remembered of it.
-#
-# What is respected, because NLopt does not say it: a NaN makes SLSQP run on to maxeval and COBYLA
-# report success at the start; boolean +-1 constraints have no slope; COBYLA can return an
-# infeasible point as a success. So NLopt never sees NaN or infinity, always has limits, and the
-# best feasible point is our own record, not NLopt's answer.
-
-Array = NDArray[np.float64]
+from ..materials.forms.base import Array
+from .methods import FitOptions
+from .problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
 
 # An analysis that failed or ended unstable, or a point that may not be analysed, is this many times
 # worse than the start: finite, and worse than anything a line search would accept.
@@ -37,9 +31,7 @@ class BelowTolerance(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What is known of one point: e, its slope (empty unless asked for), whether its moduli are
-    positive, whether its analysis ended well, in a stable equilibrium.
-    """
+    """A point: e, its slope (empty unless asked for), moduli positive, analysis ended well."""
 
     value: float
     slope: Array
@@ -48,7 +40,7 @@ class Look:
 
 
 class Record:
-    """Maps NLopt's variables to unknowns, evaluates once a point, remembers the best feasible."""
+    """A map of NLopt's variables to unknowns that evaluates and keeps the best feasible point."""
 
     def __init__(self, problem: FitProblem, start: Evaluation, options: FitOptions) -> None:
         self.problem, self.best, self.options = problem, start, options
@@ -67,26 +59,16 @@ class Record:
         self._last: tuple[bytes, Look] | None = None
 
     def unknowns(self, x: Array) -> Array:
-        """Unknowns of NLopt's variables."""
+        """Return the unknowns of NLopt's variables."""
         return np.asarray(self.origin + self.basis @ x)
 
     def variables(self, y: Array) -> Array:
-        """NLopt's variables of unknowns."""
+        """Return NLopt's variables of unknowns."""
         return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
-    def box(self) -> tuple[Array, Array]:
-        """Bounds of the variables where the constraints are boolean."""
-        p = self.problem.unknowns
-        low, high = p.nuisance.bounds
-        return np.concatenate([np.zeros(p.size), low]), np.concatenate([np.ones(p.size), high])
-
     def at(self, x: Array, with_slope: bool) -> Look:
-        """What is known of the variables `x`; the same point is run only once.
-
-        Raises
-        ------
-        NoMoreAnalyses, BelowTolerance : to end NLopt's search.
-        """
+        """Evaluate the variables `x`, a repeated point once; NoMoreAnalyses or BelowTolerance ends
+        it."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key:
             before = self._last[1]
@@ -150,11 +132,8 @@ def nlopt_minimise(
 ) -> Optimum | None:
     """Minimise e from the unknowns `start`; None when the analysis at the start fails.
 
-    The returned point is the best feasible, stable one that was seen, whatever NLopt itself says.
-
-    Parameters
-    ----------
-    algorithm : NLopt's number. first_step : of each bound's width; NLopt's own unless given.
+    Returns the best feasible, stable point that was seen, whatever NLopt itself says. algorithm :
+    NLopt's number. first_step : of each bound's width; NLopt's own unless given.
     """
     problem.warm_starts = False  # e has to be a function of the point alone
     first = problem.evaluate(start, False)
@@ -174,7 +153,8 @@ def nlopt_minimise(
     if options.constraints == "margin":
         _constrain(optimiser, record)
     else:
-        low, high = record.box()
+        size, (low, high) = problem.unknowns.size, problem.unknowns.nuisance.bounds
+        low, high = np.concatenate([np.zeros(size), low]), np.concatenate([np.ones(size), high])
         x = np.clip(x, low, high)
         optimiser.set_lower_bounds(low)
         optimiser.set_upper_bounds(high)
@@ -197,7 +177,6 @@ def nlopt_minimise(
 
 
 def _constrain(optimiser: nlopt.opt, record: Record) -> None:
-    """The linear inequalities of the unknowns, as NLopt's variables see them."""
     a, c = record.problem.unknowns.inequalities
     rows = a @ record.basis
     limit = c - a @ record.origin
@@ -211,7 +190,7 @@ def _constrain(optimiser: nlopt.opt, record: Record) -> None:
 
 
 def _flag(optimiser: nlopt.opt, record: Record) -> None:
-    """Two flags without a slope: positive moduli, and an analysis that ends well (Eq. 4.9)."""
+    """Add two flags without a slope: positive moduli, and an analysis that ends well (Eq. 4.9)."""
 
     def positive(x: Array, gradient: Array) -> float:
         gradient[:] = 0.0

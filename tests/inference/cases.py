@@ -9,7 +9,7 @@ import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
-from bubblefit.inference.methods.base import FitOptions
+from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns

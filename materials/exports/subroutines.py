@@ -1,6 +1,4 @@
-"""MSC Marc: the law as user subroutine HYPELA2."""
-
-from __future__ import annotations
+"""Export the law as user subroutines (Marc HYPELA2, Abaqus UMAT), and as Marc's NLELAST tables."""
 
 import math
 from collections.abc import Mapping
@@ -12,8 +10,7 @@ from ...errors import InputError
 from ...files import render
 from ..card import MaterialCard
 from ..law import HypoelasticLaw
-from ..responses import bar
-from ..tables import JUMP, ModulusTable, modulus_tables
+from ..responses import JUMP, ModulusTable, bar, modulus_tables
 from .base import (
     Export,
     Format,
@@ -26,6 +23,7 @@ from .base import (
     logical,
     range_remarks,
 )
+from .curves import material_name
 
 #: STATE VARS, temperature included: strain, stress, and the transverse shears of thick shells.
 STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
@@ -45,7 +43,7 @@ SAYS = Says(
 
 
 def hypela2(card: MaterialCard, options: NoOptions) -> Export:
-    """The subroutine for one card, whatever the number of its material in Marc."""
+    """Write the subroutine for one card, whatever the number of its material in Marc."""
     head = heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
     return Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
 
@@ -56,12 +54,9 @@ def hypela2_source(
     own_state: bool = True,
     symmetric: bool = True,
 ) -> str:
-    """Fortran source, good as fixed and as free form.
+    """Return Fortran source, good as fixed and as free form.
 
-    Parameters
-    ----------
     laws : by user material identification number (MATUS(1)); a single one is for all numbers.
-    head : comment lines.
     own_state : strain and stress at the start from state variables, else from Marc's e and s.
     symmetric : hand over the symmetric part of the tangent, as Marc's default solver needs.
     """
@@ -90,7 +85,7 @@ def hypela2_source(
 
 
 def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
-    """What one element has to answer; None where the law fails on the way."""
+    """Return the answers expected of one element; None where the law fails on the way."""
     elongation = float(np.expm1(min(np.log1p(ELONGATION), law.strain_range[0])))
     ends = np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
     try:
@@ -107,7 +102,7 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
     }
 
 
-FORMAT = Format("marc-hypela2", hypela2)
+HYPELA2 = Format("marc-hypela2", hypela2)
 
 
 #: Table numbers in the deck, by modulus.
@@ -117,12 +112,12 @@ GUARD = 1.0
 
 
 def nlelast(card: MaterialCard, options: TableOptions) -> Export:
-    """TABLE and NLELAST blocks of an extended-format deck."""
+    """Write TABLE and NLELAST blocks of an extended-format deck."""
     tables = modulus_tables(card.law, options.points, options.reach)
     largest = max(table.error for table in tables.values())
     loses = [
         f"moduli are straight lines between {options.points} points (more where a modulus has "
-        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most",
+        f"pieces) from zero to the end of the range: off by {100 * largest:.2g} % at most"
     ]
     if any(len(table.jumps) for table in tables.values()):
         loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")
@@ -150,7 +145,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
         ],
         nu12=card.law.nu12,
         name=_name(card),
-        real=_real,
+        real=lambda value: f"{value:20.13E}",
     )
     return Export({".dat": text}, says)
 
@@ -163,14 +158,49 @@ def _rows(table: ModulusTable) -> list[tuple[float, float]]:
 
 
 def _name(card: MaterialCard) -> str:
-    """A name of at most 24 characters that Marc takes."""
+    """Return a name of at most 24 characters that Marc takes."""
     kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
     return kept.strip("_")[:24] or "fabric"
 
 
-def _real(value: float) -> str:
-    """20 columns with 13 digits."""
-    return f"{value:20.13E}"
+NLELAST = Format("marc", nlelast, TableOptions)
 
 
-FORMAT_MARC_NLELAST = Format("marc", nlelast, TableOptions)
+#: Section Poisson's ratio: how Abaqus changes the thickness (0: not at all; 0.5: incompressible).
+SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
+
+
+def umat(card: MaterialCard, options: NoOptions) -> Export:
+    """Write the subroutine (the same for all cards) and the *USER MATERIAL with its constants."""
+    poisson = SECTION_POISSON[card.law.thickness_change]
+    says = Says(
+        carries=(
+            "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
+            "moduli hold; the exact, unsymmetric tangent",
+            f"thickness: by the section, POISSON={poisson:g} ({card.law.thickness_change})",
+        ),
+        loses=("transverse shear: give *TRANSVERSE SHEAR STIFFNESS for shells",),
+        confirm=(
+            "no Abaqus was at hand: the interface is the documented one, compiled and compared "
+            "point by point; pull one element",
+            "STRAN is the sum of increments along axes that turn with the material: log strain "
+            "but for 1e-6 on paths of proportional stretch and shear (bubblefit docs exports)",
+        ),
+    )
+    context = {
+        "name": material_name(card),
+        "constants": list(law_constants(card.law)),
+        "poisson": poisson,
+        "thickness": card.thickness,
+        "exact": repr,
+    }
+    source = render(
+        "abaqus/umat.f.j2", head=heading(card, "Abaqus/Standard user subroutine UMAT", says, "!")
+    )
+    material = render(
+        "abaqus/umat.inp.j2", head=heading(card, "Abaqus/Standard material", says, "**"), **context
+    )
+    return Export({".f": source, ".inp": material}, says)
+
+
+UMAT = Format("abaqus-umat", umat)

@@ -1,0 +1,269 @@
+"""Export total curves to explicit programs: Abaqus *FABRIC, LS-DYNA *MAT_FABRIC, Radioss LAW58.
+
+Of LAW58 (FABR_A) yarns obey sigma = E eps - B eps^2/2, and the angle a between them tau = G0 tan(a)
+up to the locking angle, from there on with GT / (1 + tan^2). Columns as in OpenRadioss' reader (cfg
+radioss2017, matl58_fabr_a; starter hm_read_mat58). Left to itself the reader takes crimps S of 0.1,
+by which a yarn is 16 % softer at 5 % of strain than its modulus says; they are written small enough
+not to count.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...files import render
+from ..card import MaterialCard
+from ..forms.base import UNLIMITED, Array
+from ..responses import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
+from .base import (
+    DENSITY,
+    CurveOptions,
+    Export,
+    FabricCurves,
+    Format,
+    Says,
+    TableOptions,
+    density_remarks,
+    fabric_curves,
+    heading,
+    option,
+    range_remarks,
+    title_of,
+)
+from .designers import SHEARED
+
+#: Crimp that does not count, and the share of its modulus with which a yarn is pushed.
+CRIMP, FLEX = 1e-4, 1e-3
+POINTS = 121
+
+
+@dataclass(frozen=True, eq=False)
+class Yarn:
+    """sigma = E eps - B eps^2/2 nearest to a curve; off : RMS over its largest stress."""
+
+    modulus: float
+    softening: float
+    off: float
+    stiffens: bool
+
+
+@dataclass(frozen=True)
+class Law58Options(CurveOptions):
+    """The options of curves."""
+
+    points: int = field(
+        default=POINTS, metadata=TableOptions.__dataclass_fields__["points"].metadata
+    )
+
+
+def yarn_of(strain: Array, stress: Array) -> Yarn:
+    """Fit by least squares; without softening where the curve stiffens: B has to be positive."""
+    both = np.column_stack([strain, -0.5 * strain**2])
+    modulus, softening = np.linalg.lstsq(both, stress, rcond=None)[0].tolist()
+    stiffens = not (softening > 0 and modulus > 0)
+    if stiffens:
+        modulus, softening = float(strain @ stress / (strain @ strain)), 0.0
+    off = stress - both @ [modulus, softening]
+    rms = float(np.sqrt(np.mean(off**2)) / np.abs(stress).max())
+    return Yarn(modulus, softening, rms, stiffens)
+
+
+def law58(card: MaterialCard, options: Law58Options) -> Export:
+    """Write the material block from nominal curves of strips and trellis shear."""
+    law = card.law
+    ends = [float(end) if end < UNLIMITED else options.reach for end in law.strain_range]
+    sheared = ends[2] >= SHEARED
+    ends[2] = ends[2] if sheared else options.reach
+    unknown = "G0, GT: nothing that the card was fitted to sheared the fabric; type in others"
+    yarns = []
+    for pulled in range(2):
+        strain = np.linspace(0.0, ends[pulled], options.points)
+        yarns.append(yarn_of(*uniaxial_curve(law, pulled, strain, "nominal")))
+    warp, fill = yarns
+    angle = np.linspace(0.0, trellis_angle(ends[2]), options.points)
+    angle, tau, _ = trellis_curve(law, angle, "nominal")
+    tangent = np.tan(angle)
+    g0 = float(tangent @ tau / (tangent @ tangent))
+    lock = float(angle[-1])
+    # The same slope on both sides of the locking angle; so GT is above G0.
+    gt = g0 * (1 + math.tan(lock) ** 2)
+    shear_off = float(np.sqrt(np.mean((tau - g0 * tangent) ** 2)) / tau.max())
+    curves: FabricCurves = fabric_curves(card, options, "nominal")
+    straight = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
+    stiff = (
+        f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is written"
+    )
+    says = Says(
+        carries=(
+            f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
+            f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
+            f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear_off:.2g} %, "
+            f"to {math.degrees(lock):.3g} degrees and with the same slope beyond",
+        ),
+        loses=(
+            f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
+            f" {curves.uncoupled}",
+            *(() if sheared else [unknown]),
+            *([f"{stiff} is written"] if straight else ()),
+            f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
+            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            *density_remarks(options.density),
+            *range_remarks(card, options.reach),
+        ),
+        confirm=(
+            "the measure of strain of LAW58 (the change of length over the length is taken), with "
+            "one element of each test",
+            "/PROP/TYPE16 with the warp as its first direction",
+        ),
+    )
+    text = render(
+        "radioss/law58.rad.j2",
+        head=heading(card, "Radioss /MAT/LAW58", says, "#"),
+        title=title_of(card, 100),
+        density=DENSITY if options.density is None else options.density,
+        warp=warp,
+        fill=fill,
+        flex=FLEX,
+        g0=g0,
+        gt=gt,
+        lock=math.degrees(lock),
+        crimp=CRIMP,
+        f20=lambda value: f"{value:20.12E}",
+    )
+    return Export({".rad": text}, says)
+
+
+LAW58 = Format("radioss-law58", law58, Law58Options)
+
+
+MATERIAL = 1
+
+
+CURVES = {"warp": 101, "fill": 102, "shear": 103}
+
+
+MEASURE: Measure = "green"
+
+
+NAMES = {
+    "green": "2nd Piola-Kirchhoff stress by Green-Lagrange strain (shear: engineering, 2 E12)",
+    "nominal": "nominal stress by nominal strain (shear: change of angle, radians)",
+    "true": "Cauchy stress by log strain (shear: engineering)",
+}
+
+
+@dataclass(frozen=True)
+class Mat34Options(CurveOptions):
+    """The options of curves, and their measure: public sources disagree."""
+
+    measure: Measure = option(  # noqa: RUF009
+        MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
+    )
+
+
+def mat34(card: MaterialCard, options: Mat34Options) -> Export:
+    """Write *MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
+    measure = options.measure
+    curves, law = fabric_curves(card, options, measure), card.law
+    says = Says(
+        carries=(
+            f"curves LCA (warp), LCB (fill), LCAB (shear): {NAMES[measure]}; of strips free to "
+            "contract, and of shear with yarns held at their length",
+            "EA, EB, GAB and the Poisson's ratios of no strain, which LS-DYNA needs for its time "
+            "step and contact",
+        ),
+        loses=(
+            "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
+            f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
+            f"{curves.yarns:.3g} MPa in the card)",
+            "membrane elements only (ELFORM 5 or 9): no bending stiffness",
+            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            *density_remarks(options.density),
+            *range_remarks(card, options.reach),
+        ),
+        confirm=(
+            "the measure of the curves: public sources disagree (the manual names "
+            "Green-Lagrange strain for FORM 2, 4, 12 and 14, a converter true strain); "
+            "--measure green, nominal or true writes another; a strip of one element that is "
+            "stretched far tells",
+            "that LCAB is taken as odd in the shear strain",
+        ),
+    )
+    e1, e2 = float(law.E1(0.0)), float(law.E2(0.0))
+    text = render(
+        "ls-dyna/mat34.k.j2",
+        head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
+        title=title_of(card, 80),
+        material=MATERIAL,
+        density=DENSITY if options.density is None else options.density,
+        ea=e1,
+        eb=e2,
+        gab=float(law.G12(0.0)),
+        prab=law.nu12,
+        prba=law.nu12 * e2 / e1,
+        ids=CURVES,
+        curves={"warp": curves.warp, "fill": curves.fill, "shear": _odd(curves.shear)},
+        f10=_f10,
+    )
+    return Export({".k": text}, says)
+
+
+def _odd(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([-rows[:0:-1], rows])
+
+
+def _f10(value: float) -> str:
+    """Return as many digits as ten columns hold."""
+    for digits in range(9, 0, -1):
+        text = f"{value:.{digits}g}"
+        if len(text) <= 10:
+            return f"{text:>10}"
+    return f"{value:10.3E}"
+
+
+MAT34 = Format("ls-dyna-mat34", mat34, Mat34Options)
+
+
+def fabric(card: MaterialCard, options: CurveOptions) -> Export:
+    """Write *MATERIAL with *FABRIC and three *UNIAXIAL tests, and how to orient it."""
+    curves = fabric_curves(card, options, "nominal")
+    says = Says(
+        carries=(
+            "nominal stress by nominal strain of strips along warp and fill, free to contract, "
+            "and shear stress by change of angle: both elastic, path-independent",
+        ),
+        loses=(
+            f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; "
+            + curves.uncoupled,
+            "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
+            f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
+            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            *density_remarks(options.density),
+            *range_remarks(card, options.reach),
+        ),
+        confirm=(
+            "the order stress, strain of the data lines, and the sign and measure of the shear "
+            "(radians between the yarns), with one element of each test",
+        ),
+    )
+    text = render(
+        "abaqus/fabric.inp.j2",
+        head=heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
+        name=material_name(card),
+        density=DENSITY if options.density is None else options.density,
+        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())],
+        shear=curves.shear.tolist(),
+    )
+    return Export({".inp": text}, says)
+
+
+def material_name(card: MaterialCard) -> str:
+    """Return a name for Abaqus and CalculiX: letters, digits and underscores, a letter first."""
+    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.upper())
+    kept = kept.strip("_")[:32]
+    return kept if kept[:1].isalpha() else "FABRIC"
+
+
+FABRIC = Format("abaqus-fabric", fabric, CurveOptions)
