@@ -17,8 +17,7 @@ from typing import IO, Any
 import click
 
 from ..errors import OutputError
-from ..files import __version__
-from ..writing import telling
+from ..files import __version__, output_errors
 
 #: Between two lines of progress in which nothing more was done.
 EVERY_S = 1.0
@@ -39,7 +38,7 @@ class Events:
         ------
         OutputError : it cannot be written.
         """
-        with telling(path):
+        with output_errors(path):
             # What stdout has been sent to is nothing to write over.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
             self._file = open(path, mode, encoding="utf-8")

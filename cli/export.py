@@ -8,11 +8,11 @@ from typing import Any
 import click
 
 from ..errors import InputError, OutputError
+from ..files import replacing
 from ..materials.card import read_card
 from ..materials.exports.base import Export, Option, options_of
 from ..notes import rows
-from ..solvers.exports import FORMATS
-from ..writing import replacing
+from ..solvers.registry import FORMATS
 from .ending import tell
 from .examples import examples
 from .exits import exits

@@ -81,8 +81,8 @@ def command(folder: Path, example: str | None, own: bool, **given: Any) -> None:
 
 
 def _write_own(folder: Path, said: dict[str, Any]) -> None:
+    from ..files import write_text
     from ..project.new_project import writable_kinds, write_project
-    from ..writing import write_text
 
     path = folder / PROJECT
     _free(path)

@@ -24,8 +24,8 @@ def command(out: Path | None) -> None:
 
     Editors complete and check a project whose first line names it: #:schema project.schema.json
     """
+    from ..files import write_text
     from ..project.schema import schema_text
-    from ..writing import write_text
 
     if out is None:
         click.echo(schema_text(), nl=False)

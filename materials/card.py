@@ -21,9 +21,8 @@ from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
+from ..files import replacing, toml_of
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
-from ..reading import toml_of
-from ..writing import replacing
 from .forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, ratios_of
 from .forms.registry import form_named, form_names, form_settings
 from .law import HypoelasticLaw, ThicknessChange

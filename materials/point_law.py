@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..caching import compiled
+from ..files import compiled
 from .forms.base import EVEN
 
 # The tangent modulus of one increment at one integration point, compiled.

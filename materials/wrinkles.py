@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..caching import compiled
+from ..files import compiled
 from .point_law import increment_modulus, log_strain, referred_stress, stress_update
 
 Array = NDArray[np.float64]

@@ -13,6 +13,7 @@ import tomli_w
 from ..errors import InputError
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
+from ..files import content_of, is_file
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.registry import form_settings
 from ..readers.sections import (
@@ -21,7 +22,6 @@ from ..readers.sections import (
     PRESSURE_UNITS,
     beside,
 )
-from ..reading import content_of, is_file
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER

@@ -13,9 +13,8 @@ from typing import Any
 
 from jinja2 import FileSystemLoader
 
-from ..files import TEMPLATES, environment
+from ..files import TEMPLATES, environment, replacing
 from ..notes import percent as percent
-from ..writing import replacing
 from .chart_svg import chart_svg
 from .content import Report
 from .embedded import data_uri

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError
-from ..writing import write_text
+from ..files import write_text
 from .content import Report
 
 PAGE_DATA = "page.json"

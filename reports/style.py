@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from ..writing import replacing
+from ..files import replacing
 
 # Okabe and Ito's palette.
 BLUE, VERMILION, GREEN, SKY, GREY, BLACK = (

@@ -10,8 +10,8 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..files import replacing
 from ..meshes.mesh import Mesh
-from ..writing import replacing
 
 
 def write_vtu(

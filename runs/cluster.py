@@ -27,8 +27,7 @@ from .. import __version__
 from ..errors import BubblefitError, InputError
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
-from ..solvers.process import Unwanted, unless
-from ..solvers.scheduler import ANSWER_S, connected
+from ..solvers.process import ANSWER_S, Unwanted, connected, unless
 from .executor import Task
 
 log = logging.getLogger(__name__)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from bubblefit import caching
+from bubblefit import files
 
 #: Compiles one kernel that calls another file's functions, and prints what it computes.
 PROGRAM = """
@@ -34,13 +34,13 @@ def run(cache: Path, package: Path | None = None) -> str:
 
 def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BUBBLEFIT_CACHE", "/x")
-    assert caching.cache_folder() == Path("/x")
+    assert files.cache_folder() == Path("/x")
     monkeypatch.delenv("BUBBLEFIT_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", "/y")
-    assert caching.cache_folder() == Path("/y/bubblefit")
+    assert files.cache_folder() == Path("/y/bubblefit")
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", "/z")
-    assert caching.cache_folder() == Path("/z/.cache/bubblefit")
+    assert files.cache_folder() == Path("/z/.cache/bubblefit")
 
 
 def _compiles(file: Path) -> bool:
@@ -52,12 +52,12 @@ def _compiles(file: Path) -> bool:
 def test_every_file_with_compiled_functions_is_among_the_kernels() -> None:
     """One left out would keep code that was compiled before its edit."""
     outside = {"tests", "benchmarks", "build", "out"}
-    files = (file.relative_to(caching.ROOT) for file in caching.ROOT.rglob("*.py"))
-    ours = [f for f in files if f.parts[0] not in outside and not f.parts[0].startswith(".")]
-    with_kernels = {file.as_posix() for file in ours if _compiles(caching.ROOT / file)}
+    sources = (file.relative_to(files.ROOT) for file in files.ROOT.rglob("*.py"))
+    ours = [f for f in sources if f.parts[0] not in outside and not f.parts[0].startswith(".")]
+    with_kernels = {file.as_posix() for file in ours if _compiles(files.ROOT / file)}
     assert len(with_kernels) > 5
-    assert with_kernels == set(caching.KERNELS)
-    assert len(caching.KERNELS) == len(with_kernels)
+    assert with_kernels == set(files.KERNELS)
+    assert len(files.KERNELS) == len(with_kernels)
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
 def test_an_edit_reaches_code_compiled_from_another_file(tmp_path: Path) -> None:
     package = tmp_path / "copy" / "bubblefit"
     shutil.copytree(
-        caching.ROOT,
+        files.ROOT,
         package,
         ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
     )

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import InputError, one_line
+from bubblefit.files import check_regular, content_of
 from bubblefit.materials.card import read_card
 from bubblefit.project.project import read_project
 from bubblefit.readers.frames import read_frames
 from bubblefit.readers.tables import read_lines
-from bubblefit.reading import check_regular, content_of
 from bubblefit.solvers.marc.settings import site_settings
 
 from .complaints import complaint

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import replacing
 from ...materials.designers import (
     POINTS,
     USUAL,
@@ -28,7 +29,6 @@ from ...materials.designers import (
 from ...notes import Note, NoteKind, rows
 from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
 from ...reports.biaxial import BiaxialPanel, plot_biaxial
-from ...writing import replacing
 from .objective import PERCENT
 from .test import BiaxialData, BiaxialTest
 

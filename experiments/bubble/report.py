@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...files import replacing
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
@@ -31,7 +32,6 @@ from ...reports.scatter import plot_heights
 from ...reports.surface import plot_disk
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
-from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .findings import (
     clock_words,

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
+from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
@@ -26,7 +27,6 @@ from ...reports.orders import OrderErrors, plot_orders
 from ...reports.strip import plot_strip
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
-from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .data import Strip
 from .doubts import curves_of

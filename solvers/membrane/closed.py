@@ -477,11 +477,7 @@ def prepare(
 
 
 def closed_membrane(
-    model: InflatedModel,
-    law: HypoelasticLaw,
-    tolerance: float,
-    fixed: NDArray[np.intp],
-    wall: Wall,
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
     """The membrane of a model with these unknowns held."""
     points = np.array(model.mesh.points, dtype=float)

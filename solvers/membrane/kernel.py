@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caching import compiled
 from ...errors import InputError
+from ...files import compiled
 from ...materials.point_law import FAST, SLOPES, membrane_stress
 from ...materials.wrinkles import relaxed_membrane_stress
 

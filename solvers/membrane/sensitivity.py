@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caching import compiled
+from ...files import compiled
 from ...materials.point_law import (
     BEFORE1,
     BEFORE2,

@@ -163,11 +163,7 @@ class MembraneSolver:
 
     @BLAS.wrap(limits=1, user_api="blas")
     def _analyse(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        parameters: Sequence[str],
-        guess: Array | None,
+        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str], guess: Array | None
     ) -> tuple[History, Array]:
         asked = Asked(parameters, guess, self.progress)
         history, slope = analysis_of(ANALYSES, model, self.name).analyse(

@@ -88,11 +88,7 @@ class Pull:
     """
 
     def __init__(
-        self,
-        membrane: Membrane,
-        tangent: DrivenTangent,
-        direction: Array,
-        gauge: NDArray[np.intp],
+        self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
     ) -> None:
         self.membrane, self.tangent = membrane, tangent
         self.direction, self.gauge = direction, gauge

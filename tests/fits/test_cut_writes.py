@@ -9,7 +9,7 @@ from typing import Any
 
 import bubblefit as bf
 import pytest
-from bubblefit import writing
+from bubblefit import files
 from bubblefit.errors import OutputError
 from bubblefit.runs import starts as running_files
 from bubblefit.runs.folder import Store
@@ -31,7 +31,7 @@ ENDS: dict[str, Callable[[], BaseException]] = {
 def counted(patch: pytest.MonkeyPatch, last: int, end: Callable[[], BaseException]) -> list[str]:
     """What is written, in order; in place of number `last` comes the end."""
     written: list[str] = []
-    replace, append = writing.os.replace, running_files._append
+    replace, append = files.os.replace, running_files._append
 
     def note(what: str) -> None:
         written.append(what)
@@ -49,7 +49,7 @@ def counted(patch: pytest.MonkeyPatch, last: int, end: Callable[[], BaseExceptio
         note("a line")
         append(stream, text)
 
-    patch.setattr(writing.os, "replace", replacing)
+    patch.setattr(files.os, "replace", replacing)
     patch.setattr(running_files, "_append", appending)
     return written
 

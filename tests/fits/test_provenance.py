@@ -9,8 +9,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import bubblefit.content
 import bubblefit.fits.facts
+import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
@@ -155,7 +155,7 @@ def test_another_version_is_named(
     first: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     setup = prepared(read_project(written(tmp_path)))
-    for module in (bubblefit.content, bubblefit.fits.facts):
+    for module in (bubblefit.solvers.run_cache, bubblefit.fits.facts):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'

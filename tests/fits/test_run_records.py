@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
 from bubblefit.experiments.kinds import RunRecord
@@ -20,6 +19,7 @@ from bubblefit.runs.predictions import mark_of
 from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
+from bubblefit.solvers.run_cache import digest_of
 
 from ..cylinder_cases import FAILS, STOPS, Formula, ran
 

@@ -16,7 +16,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import trellis_angle, trellis_curve, uniaxial_curve
 from bubblefit.materials.tables import JUMP, REACH, modulus_table, modulus_tables
 from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
-from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.registry import FORMATS
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import OutputError
+from bubblefit.files import replacing
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports.cuts import node_cut, point_cut
 from bubblefit.reports.html import number, percent
@@ -18,7 +19,6 @@ from bubblefit.reports.profiles import plot_profiles
 from bubblefit.reports.scatter import _below_one, plot_heights
 from bubblefit.reports.style import BLACK, SKY, VERMILION
 from bubblefit.reports.vtu import write_vtu
-from bubblefit.writing import replacing
 from matplotlib.figure import Figure
 
 from ..drawings import data, legend, lines

@@ -18,19 +18,9 @@ from bubblefit.meshes.cylinder_model import (
     inflated_cylinder,
 )
 from bubblefit.meshes.mesh import log_strain_of
-from bubblefit.runs.verification.closed_forms import (
-    ISOTROPIC,
-    NU,
-    E,
-    capped_strain,
-    in_the_middle,
-)
-from bubblefit.runs.verification.closed_forms import (
-    RADIUS_THIN_WALLS as RADIUS,
-)
-from bubblefit.runs.verification.closed_forms import (
-    THICKNESS_THIN_WALLS as THICKNESS,
-)
+from bubblefit.runs.verification.closed_forms import ISOTROPIC, NU, E, capped_strain, in_the_middle
+from bubblefit.runs.verification.closed_forms import RADIUS_THIN_WALLS as RADIUS
+from bubblefit.runs.verification.closed_forms import THICKNESS_THIN_WALLS as THICKNESS
 from bubblefit.runs.verification.closed_forms import sphere_model as sphere
 from bubblefit.runs.verification.closed_forms import tube_model as tube
 from bubblefit.solvers.base import History
