@@ -48,7 +48,6 @@ KERNELS = (
     "materials/responses.py",
     "meshes/mesh.py",
     "solvers/membrane/kernel.py",
-    "solvers/membrane/sensitivity.py",
 )
 
 # Reading

@@ -1,4 +1,4 @@
-"""The embedded solver: its law on the bars."""
+"""Diagnosis of the embedded solver by its law on the bars."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ EMBEDDED = "embedded"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """One entry; there is no program to name."""
+    """Return one entry; there is no program to name."""
     stresses = tuple(
-        _end_stress(bar_law(bar.model), bar.elongation, 0 if bar.direction == "warp" else 1)
-        for bar in BARS
+        _end_stress(bar_law(one.model), one.elongation, int(one.direction == "fill"))
+        for one in BARS
     )
     off = difference(stresses)
     good = off < TOLERANCE
@@ -29,9 +29,6 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
 
 
 def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
-    """Cauchy stress (MPa) of a bar pulled along warp (0) or fill (1), the other direction free.
-
-    The law's own increments, the ones the membrane solver takes.
-    """
+    """Return the end stress (MPa) of a bar pulled along warp (0) or fill (1), by the law."""
     ends = np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
     return float(bar(law, pulled, ends)[1][-1, pulled])
