@@ -1,7 +1,5 @@
 """Compiled code is kept where that can be done, follows every edit, and is never required."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shutil
@@ -21,7 +19,7 @@ print(law.increment(np.zeros(3), np.array([0.01, 0.0, 0.0]), np.zeros(3))[0])
 """
 
 
-def run(cache: Path, package: Path | None = None) -> str:
+def run(cache, package=None):
     environment = {**os.environ, "BUBBLEFIT_CACHE": str(cache)}
     if package is not None:
         environment["PYTHONPATH"] = str(package)
@@ -32,7 +30,7 @@ def run(cache: Path, package: Path | None = None) -> str:
     return done.stdout
 
 
-def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_cache_is(monkeypatch):
     monkeypatch.setenv("BUBBLEFIT_CACHE", "/x")
     assert files.cache_folder() == Path("/x")
     monkeypatch.delenv("BUBBLEFIT_CACHE")
@@ -43,13 +41,13 @@ def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch) -> None:
     assert files.cache_folder() == Path("/z/.cache/bubblefit")
 
 
-def _compiles(file: Path) -> bool:
+def _compiles(file):
     functions = (n for n in ast.walk(ast.parse(file.read_text())) if isinstance(n, ast.FunctionDef))
     decorators = (d for function in functions for d in function.decorator_list)
     return any("compiled" in ast.unparse(decorator) for decorator in decorators)
 
 
-def test_every_file_with_compiled_functions_is_among_the_kernels() -> None:
+def test_every_file_with_compiled_functions_is_among_the_kernels():
     """One left out would keep code that was compiled before its edit."""
     outside = {"tests", "benchmarks", "build", "out"}
     sources = (file.relative_to(files.ROOT) for file in files.ROOT.rglob("*.py"))
@@ -60,14 +58,14 @@ def test_every_file_with_compiled_functions_is_among_the_kernels() -> None:
     assert len(files.KERNELS) == len(with_kernels)
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path):
     (tmp_path / "file").write_text("in the way")
     kept = run(tmp_path / "cache")
     assert list((tmp_path / "cache").glob("kernels-*/*/*.nbi"))
     assert run(tmp_path / "file" / "cache") == kept
 
 
-def test_an_edit_reaches_code_compiled_from_another_file(tmp_path: Path) -> None:
+def test_an_edit_reaches_code_compiled_from_another_file(tmp_path):
     package = tmp_path / "copy" / "bubblefit"
     shutil.copytree(
         files.ROOT,

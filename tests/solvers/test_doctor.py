@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +27,7 @@ from ..places import PUBLISHED
 from ..programs import program
 
 
-def fake(path: Path, version: str = "2.99", then: str = "exit 0") -> Path:
+def fake(path, version="2.99", then="exit 0"):
     """A script that tells a version and does something else when it is to run a deck."""
     return program(path, f'#!/bin/sh\n[ "$1" = -v ] && echo "This is Version {version}"\n{then}\n')
 

@@ -193,7 +193,7 @@ NO_CCX = "/nowhere/ccx"
 
 
 @pytest.fixture
-def templates(tmp_path: Path) -> Path:
+def templates(tmp_path):
     folder = tmp_path / "templates"
     (folder / "parts").mkdir(parents=True)
     (folder / "bubble.inp.j2").write_text("{% include 'heading.inp' %}\n*STEP\n")
@@ -203,7 +203,7 @@ def templates(tmp_path: Path) -> Path:
     return folder
 
 
-def solvers(folder: Path) -> list[Solver]:
+def solvers(folder):
     return [CalculixSolver(NO_CCX, templates=folder), MarcSolver(templates=str(folder))]
 
 

@@ -9,17 +9,11 @@ from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import SLOPES
 from bubblefit.materials.wrinkles import relaxed_update
-from bubblefit.meshes.cylinder_model import (
-    Bending,
-    CylinderModel,
-    InflatedModel,
-    RigidCylinder,
-    inflated_cylinder,
-)
+from bubblefit.meshes.cylinder_model import Bending, InflatedModel, RigidCylinder, inflated_cylinder
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.tube import half_tube, tube_warp
 from bubblefit.runs.verification.closed_forms import FIRST, PlaneEnds, published_moment
-from bubblefit.solvers.base import BandedSolver, History
+from bubblefit.solvers.base import BandedSolver
 from bubblefit.solvers.membrane import bending
 from bubblefit.solvers.membrane import bending as cylinder
 from bubblefit.solvers.membrane import closed as closed_model
@@ -50,7 +44,7 @@ RING = RigidCylinder("collar", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 120.0, True, 14
 LINEAR = HypoelasticLaw.linear(5000.0, 4000.0, 200.0)
 
 
-def beam(displacements=(2.0, 6.0, 10.0), penalty: float = 5.0, across: int = 8) -> InflatedModel:
+def beam(displacements=(2.0, 6.0, 10.0), penalty=5.0, across=8):
     """A quarter of a short beam, 150 mm, at 100 kPa."""
     mesh = half_tube(across, 24, RADIUS, LENGTH)
     foot = mesh.node_sets["foot"]
@@ -63,13 +57,13 @@ def beam(displacements=(2.0, 6.0, 10.0), penalty: float = 5.0, across: int = 8) 
     )  # fmt: skip
 
 
-def bend(model: InflatedModel, law: HypoelasticLaw = LINEAR) -> tuple[History, ClosedMembrane]:
+def bend(model, law=LINEAR):
     solver = MembraneSolver(1e-9)
     return solver.run(model, law), solver._prepared[1]
 
 
 @pytest.fixture(scope="module")
-def bent() -> tuple[InflatedModel, History]:
+def bent():
     model = beam()
     return model, bend(model)[0]
 
@@ -146,7 +140,7 @@ def test_gas_keeps_its_mass(bent):
 
 
 def test_penetration_is_reported_and_shrinks_with_the_penalty(bent):
-    def depth(history: History) -> float:
+    def depth(history):
         (text,) = [r for r in history.remarks if "penetrate" in r]
         return float(text.split()[3])
 
@@ -259,7 +253,7 @@ def update(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
     return state, he, s, carried, tangent, slope
 
 
-def principal(a: float, b: float, c: float) -> np.ndarray:
+def principal(a, b, c):
     return np.linalg.eigvalsh([[a, c], [c, b]])
 
 
@@ -335,7 +329,7 @@ SHEET = HypoelasticLaw.linear(800.0, 140.0, 20.0, 0.24)
 PLANE = 1.0 / (1.0 - 0.24**2 * 140.0 / 800.0)
 
 
-def quarter(across: int, warp=None, thickness=THICKNESS, caps=False) -> tuple[np.ndarray, Flexure]:
+def quarter(across, warp=None, thickness=THICKNESS, caps=False):
     """Half of half a tube; planes x = 0 and both ends."""
     mesh = half_tube(across, 4, R, L, caps)
     p = mesh.points
@@ -347,12 +341,12 @@ def quarter(across: int, warp=None, thickness=THICKNESS, caps=False) -> tuple[np
     return p, flexure_of(p, mesh.quads, directions, thickness, planes)
 
 
-def energy(points: np.ndarray, flexure: Flexure) -> float:
+def energy(points, flexure):
     x = points.reshape(-1)
     return 0.5 * float(x @ (flexure.matrix(SHEET, len(points)) @ x))
 
 
-def rolled(modulus: float) -> float:
+def rolled(modulus):
     """D/2 curvature^2 times the surface of half a tube."""
     stiffness = modulus * PLANE * THICKNESS**3 / 12.0
     return 0.5 * stiffness / R**2 * np.pi * R * L
@@ -417,11 +411,11 @@ WALL_LAW = HypoelasticLaw.linear(700.0, 150.0, 20.0)
 
 
 @pytest.fixture(scope="module")
-def model() -> CylinderModel:
+def model():
     return inflated_cylinder(150.0, 0.14, 0.81, 75.0, deflections=[2.0])
 
 
-def membrane_of(solver: MembraneSolver, model: CylinderModel) -> ClosedMembrane:
+def membrane_of(solver, model):
     """What the solver would run."""
     return cylinder.prepare(model, WALL_LAW, 1e-8, solver.wall)
 

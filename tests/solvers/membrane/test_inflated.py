@@ -10,7 +10,6 @@ from bubblefit.meshes.cylinder_model import (
     Bending,
     ClosedGas,
     Collar,
-    CylinderModel,
     Gas,
     InflatedModel,
     RigidCylinder,
@@ -23,7 +22,6 @@ from bubblefit.runs.verification.closed_forms import RADIUS_THIN_WALLS as RADIUS
 from bubblefit.runs.verification.closed_forms import THICKNESS_THIN_WALLS as THICKNESS
 from bubblefit.runs.verification.closed_forms import sphere_model as sphere
 from bubblefit.runs.verification.closed_forms import tube_model as tube
-from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bending import settled
 from bubblefit.solvers.membrane.bubble import Wall
 from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity, closed_membrane
@@ -41,19 +39,19 @@ from ...published_laws import TABLE_4_2
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 
 
-def run(model: InflatedModel, law: HypoelasticLaw = ISOTROPIC, tolerance: float = 1e-9):
+def run(model, law=ISOTROPIC, tolerance=1e-09):
     """History and the membrane with the strain and stress of the last increment."""
     solver = MembraneSolver(tolerance)
     history = solver.run(model, law)
     return history, solver._prepared[1]
 
 
-def order(errors, factor: float = 2.0) -> float:
+def order(errors, factor=2.0):
     return float(np.log(abs(errors[-2] / errors[-1])) / np.log(factor))
 
 
 # Reference surface
-def twisted() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def twisted():
     """Facets that are not plane, and their warp directions, none of them in its facet."""
     x, y = np.meshgrid(np.linspace(0, 30, 5), np.linspace(0, 20, 4), indexing="ij")
     points = np.stack([x, y, 0.02 * x * y + 0.01 * x**2], axis=-1).reshape(-1, 3)
@@ -297,18 +295,18 @@ def test_a_limit_pressure_is_passed_by_volume():
 PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]
 
 
-def thesis_case(symmetry: str = "quarter") -> CylinderModel:
+def thesis_case(symmetry="quarter"):
     """150 mm at 140 kPa, coarse; increments of which two are reported."""
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, symmetry=symmetry)
     return replace(model, deflections=[4.0, 12.0], increments=INCREMENTS)
 
 
-def bend(model: CylinderModel | InflatedModel, law: HypoelasticLaw = LAW) -> History:
+def bend(model, law=LAW):
     return MembraneSolver(1e-9, wall="tension field").run(model, law)
 
 
 @pytest.fixture(scope="module")
-def quarter() -> tuple[CylinderModel, History]:
+def quarter():
     model = thesis_case()
     return model, bend(model)
 
@@ -394,7 +392,7 @@ def test_the_first_millimetres_hardly_hang_on_the_mesh():
 def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch):
     find = ClosedMembrane.equilibrium
 
-    def inflates_only(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def inflates_only(self, u, pressure):
         return None if self.bodies else find(self, u, pressure)
 
     monkeypatch.setattr(ClosedMembrane, "equilibrium", inflates_only)
@@ -407,7 +405,7 @@ def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch):
 def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch):
     find = ClosedMembrane.equilibrium
 
-    def tired(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def tired(self, u, pressure):
         if not self.bodies:
             return find(self, u, pressure)
         heights.append(self.bodies[-1].centre[1])
@@ -467,7 +465,7 @@ def test_the_inflated_frame_is_the_closed_form_away_from_caps(law):
 
 # --- settling ---
 @pytest.fixture
-def inflated() -> tuple[np.ndarray, ClosedMembrane]:
+def inflated():
     """A tube at 50 kPa, and the membrane with the strain and stress of that increment."""
     history, membrane = run(tube(8, 4, 100.0, [0.02, 0.05]), LAW)
     return history.displacement[-1], membrane

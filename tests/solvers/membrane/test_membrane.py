@@ -1,6 +1,5 @@
 """The membrane: kernel, equilibrium, failure, single elements, marching."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +39,7 @@ E1, E2, G12, NU, THICKNESS = 300.0, 220.0, 5.0, 0.24, 0.81
 BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
 
 
-def grid(across: int, along: int, width: float, length: float, distort: float = 0.0):
+def grid(across, along, width, length, distort=0.0):
     """Points (n, 3) and quads of a rectangle; inside nodes moved by `distort` of a cell."""
     x, y = np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, width, across + 1))
     points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
@@ -52,7 +51,7 @@ def grid(across: int, along: int, width: float, length: float, distort: float = 
     return points, quads
 
 
-def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11) -> Membrane:
+def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11):
     free = np.setdiff1d(np.arange(points.size), held)
     return Membrane(
         points, quads, reference_elements(points, quads), thickness, law, free,
@@ -60,18 +59,18 @@ def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11) -> 
     )  # fmt: skip
 
 
-def rotation(seed: int = 4) -> np.ndarray:
+def rotation(seed=4):
     turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
     return turn * np.sign(np.linalg.det(turn))
 
 
-def quarter_bubble(elements: int = 192, law_steps=None) -> BubbleModel:
+def quarter_bubble(elements=192, law_steps=None):
     mesh = disk_mesh(100.0, elements, "quarter")
     steps = default_increments(PRESSURES) if law_steps is None else law_steps
     return BubbleModel(mesh, THICKNESS, PRESSURES, steps)
 
 
-def inflated(model: BubbleModel, law: HypoelasticLaw = LAW) -> tuple[Membrane, np.ndarray]:
+def inflated(model, law=LAW):
     """A membrane that holds the stress of the last but one increment, and the last path point."""
     solver = MembraneSolver(1e-11)
     history = solver.run(model, law)
@@ -175,7 +174,7 @@ def test_rigid_rotation_turns_every_force_and_nothing_else(thickness_change):
     assert m.stress_new == pytest.approx(stress, abs=1e-9)
 
 
-def polygon_area(points: np.ndarray) -> float:
+def polygon_area(points):
     order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
     x, y = points[order, 0], points[order, 1]
     return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
@@ -222,7 +221,7 @@ def test_increments_converge_with_second_order():
     apex = seven.mesh.node_sets["apex"][0]
     exact = MembraneSolver().run(fine, LAW).displacement[:, apex, 2]
 
-    def error(model: BubbleModel) -> np.ndarray:
+    def error(model):
         return MembraneSolver().run(model, LAW).displacement[:, apex, 2] / exact - 1.0
 
     between = 0.5 * (PRESSURES + np.concatenate([[0.0], PRESSURES[:-1]]))
@@ -316,7 +315,7 @@ def test_cut_back_does_not_change_the_result(monkeypatch, level, refused):
     expected = MembraneSolver(1e-11).run(model, LAW)
     original, calls = Membrane.equilibrium, []
 
-    def stubborn(self: Membrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def stubborn(self, u, pressure):
         calls.append(pressure)
         # One level is refused until the load step has been halved often enough.
         if pressure == model.increments[level] and calls.count(pressure) <= refused:
@@ -500,7 +499,7 @@ class Ladder(Loading):
 
     most_cuts = 3
 
-    def __init__(self, reach: float, top: float = np.inf) -> None:
+    def __init__(self, reach, top=np.inf):
         self.reach, self.top, self.looks = reach, top, []
 
     def equilibrium(self, start, level):
@@ -521,7 +520,7 @@ class Ladder(Loading):
         return f"nothing between {before:g} and {level:g}, {place}"
 
 
-def ends(loading: Loading, levels: Sequence[float], **options) -> list[float]:
+def ends(loading, levels, **options):
     return [float(u[0, 0]) for u in march(loading, levels, Asked(), **options)]
 
 

@@ -3,7 +3,6 @@
 from functools import cache
 
 import numpy as np
-import pandas as pd
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
@@ -23,19 +22,19 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 
 # --- hencky ---
-def apex(elements: int, pressure: float, nu: float, change: str = "constant") -> float:
+def apex(elements, pressure, nu, change="constant"):
     law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2 / (1 + nu), nu, change)
     mesh = disk_mesh(RADIUS, elements, "quarter")
     history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, [pressure]), law)
     return float(history.displacement[0, mesh.node_sets["apex"][0], 2])
 
 
-def hencky(pressure: float, nu: float) -> float:
+def hencky(pressure, nu):
     scale = (pressure * RADIUS / (MODULUS * THICKNESS)) ** (1 / 3)
     return apex_coefficient(nu) * RADIUS * scale
 
 
-def pressure_for(height: float, nu: float) -> float:
+def pressure_for(height, nu):
     """MPa at which Hencky's apex is height * R."""
     return (height / apex_coefficient(nu)) ** 3 * MODULUS * THICKNESS / RADIUS
 
@@ -61,7 +60,7 @@ def test_second_order_convergence_to_hencky(capsys):
     """Nested meshes; what the small slopes of the theory leave out (height squared) is removed."""
     nu, counts = 0.3, [128, 512, 2048, 8192]  # n = 4, 8, 16, 32 divisions of the core
 
-    def errors(height: float) -> np.ndarray:
+    def errors(height):
         pressure = pressure_for(height, nu)
         return np.array([apex(n, pressure, nu) for n in counts]) / hencky(pressure, nu) - 1.0
 
@@ -94,7 +93,7 @@ ISOTROPIC = HypoelasticLaw.linear(400.0, 400.0, 400.0 / 2 / 1.24)
 ORTHOTROPIC = HypoelasticLaw.linear(700.0, 300.0, 15.0)
 
 
-def model(outline: Outline, elements=448, symmetry="full", pressures=(0.05, 0.15), **more):
+def model(outline, elements=448, symmetry="full", pressures=(0.05, 0.15), **more):
     mesh = elliptic_disk_mesh(outline, elements, symmetry)
     return BubbleModel(mesh, 0.81, pressures, **more)
 
@@ -167,7 +166,7 @@ MODELS = [(1, "e"), (1, "ew"), (2, "e"), (2, "ew")]
 
 
 @cache
-def compare(test: int, model: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+def compare(test, model):
     """Ours and theirs: apex and extreme in-plane displacements, a row a pressure."""
     rows = dict(cases())[test, model]
     return shapes(rows, 1600, MembraneSolver()), rows

@@ -35,9 +35,7 @@ OFFSET = "pressure_offset"
 TIGHT = 1e-10
 
 
-def changed(
-    law: HypoelasticLaw, model: BubbleModel, name: str, step: float
-) -> tuple[BubbleModel, HypoelasticLaw]:
+def changed(law, model, name, step):
     """Model and law with one parameter moved."""
     if name == "nu12":
         return model, replace(law, nu12=law.nu12 + step)
@@ -48,10 +46,10 @@ def changed(
     return model, law.with_beta(beta)
 
 
-def differences(law, name: str, slope, move: float = 0.01, model=MODEL) -> np.ndarray:
+def differences(law, name, slope, move=0.01, model=MODEL):
     """Central differences, extrapolated, with the step that moves the bubble by `move` mm."""
 
-    def central(step: float) -> np.ndarray:
+    def central(step):
         ahead, behind = (
             MembraneSolver(TIGHT).run(*changed(law, model, name, by)).displacement
             for by in (step, -step)
@@ -75,7 +73,7 @@ def test_each_parameter(name, thickness_change):
     assert first < 2e-5 * np.abs(expected[0]).max()
 
 
-def sheet(thickness_change: str) -> tuple[BubbleModel, HypoelasticLaw]:
+def sheet(thickness_change):
     """A whole disk that is neither flat nor taut, with a rim that moves."""
     mesh = disk_mesh(100.0, 64)
     modes = disk_modes(mesh.points, 100.0, 10)
@@ -231,16 +229,14 @@ LOOSE = replace(CASE_MODEL, slack=(0.04, 0.04))
 EVEN = HypoelasticLaw.linear(500.0, 500.0, 150.0)
 
 
-def drawn(number: int) -> list[HypoelasticLaw]:
+def drawn(number):
     """Random laws of the bubble's bounds, feasible; some are unstable somewhere."""
     draws = draw(FREE, np.random.default_rng([1, 0]), 2000)
     some = draws[allowed(FREE, draws)][:number]
     return [CASE_LAW.with_beta(FREE.beta(FREE.at(coefficients))) for coefficients in some]
 
 
-def judged(
-    monkeypatch: pytest.MonkeyPatch, model: BubbleModel, law: HypoelasticLaw
-) -> list[tuple[bool, bool]]:
+def judged(monkeypatch, model, law):
     """At every increment: whether the least eigenvalue is positive, and what the solver says."""
     every = replace(model, pressures=model.increments)
     solver, pairs = MembraneSolver(), []
@@ -248,7 +244,7 @@ def judged(
     tangent, count = membrane.tangent, len(membrane.free)
     accept = bubble.Record.accept
 
-    def look(self: bubble.Record, i: int, u: np.ndarray) -> None:
+    def look(self, i, u):
         tangent.factor()
         whole = np.linalg.inv(tangent.solve(np.eye(count)))
         least = float(np.linalg.eigvalsh(0.5 * (whole + whole.T))[0])

@@ -24,11 +24,11 @@ RIM = MESH.node_sets["rim"]
 FLAT = BubbleModel(MESH, 0.81, PRESSURES, STEPS, modes=disk_modes(MESH.points, 100.0, 6))
 
 
-def run(model: BubbleModel) -> np.ndarray:
+def run(model):
     return MembraneSolver(1e-10).run(model, LAW).displacement
 
 
-def with_rim(model: BubbleModel, motion: np.ndarray) -> BubbleModel:
+def with_rim(model, motion):
     """The rim moves so from the first increment on."""
     return replace(model, rim_motion=np.repeat(motion[None], len(STEPS), axis=0))
 
@@ -129,7 +129,7 @@ MODELS = {
 TIGHT = 1e-11
 
 
-def change(law: HypoelasticLaw, name: str, by: float) -> HypoelasticLaw:
+def change(law, name, by):
     if name == "nu12":
         return replace(law, nu12=law.nu12 + by)
     return law.with_beta(law.beta + by * np.eye(5)[int(name[-1])])

@@ -43,12 +43,12 @@ BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"
 STRAIGHT = pytest.mark.parametrize("direction", ["warp", "fill"])
 
 
-def straight(direction: str, increments: int = 100) -> UniaxialModel:
+def straight(direction, increments=100):
     lengths = WARP if direction == "warp" else FILL
     return straight_strip(direction, *lengths, THICKNESS, increments=increments)
 
 
-def bias(increments: int = 100, final: float = BIAS[1], **counts: int) -> UniaxialModel:
+def bias(increments=100, final=BIAS[1], **counts):
     return bias_strip(BIAS[0], final, THICKNESS, increments=increments, **counts)
 
 
@@ -115,7 +115,7 @@ def test_a_strip_has_no_pressure():
 
 
 # Warp and fill: the homogeneous strip
-def closed_form(direction: str, law: HypoelasticLaw, model: UniaxialModel):
+def closed_form(direction, law, model):
     """Load (N), Cauchy stress (MPa), strain across: the integral of the modulus.
 
     Across, d eps1 = -nu21 d eps2 with nu21 = nu12 E2/E1, and d eps2 = -nu12 d eps1. In the fill
@@ -285,15 +285,13 @@ def test_a_fine_strip_fails_where_its_corners_leave_the_modulus_positive():
 
 
 # Derivatives
-def differences(
-    model: UniaxialModel, law: HypoelasticLaw, name: str, scale: float, move: float
-) -> tuple[np.ndarray, np.ndarray]:
+def differences(model, law, name, scale, move):
     """Extrapolated central differences of load and displacement; `scale` is N per MPa.
 
     The step moves the load by `move` N.
     """
 
-    def central(step: float) -> list[np.ndarray]:
+    def central(step):
         ends = []
         for sign in (1.0, -1.0):
             if name == "nu12":
@@ -318,9 +316,7 @@ def differences(
     return load, displacement
 
 
-def check_derivatives(
-    model: UniaxialModel, law: HypoelasticLaw, names: list[str], move: float = 0.05
-) -> None:
+def check_derivatives(model, law, names, move=0.05):
     history, slope = MembraneSolver(1e-12).run_with_sensitivity(model, law, names)
     assert history.load_slope is not None
     assert history.load_slope.shape == (len(model.elongations), len(names))
@@ -410,7 +406,7 @@ def test_cut_back_does_not_change_the_result(monkeypatch, refused, at):
     original: Callable = Pull.equilibrium
     calls: list[float] = []
 
-    def stubborn(self: Pull, u: np.ndarray, elongation: float) -> np.ndarray | None:
+    def stubborn(self, u, elongation):
         calls.append(elongation)
         level = model.elongations[at]
         if elongation == level and calls.count(level) <= refused:
