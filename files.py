@@ -56,9 +56,7 @@ KERNELS = (
 def content_of(path: Path | str, most: int = LARGEST) -> bytes:
     """Read the whole of a regular file of at most `most` bytes; links are followed.
 
-    Raises
-    ------
-    InputError : a device, a pipe, a name with a NUL in it, a file that is too large.
+    Raises InputError : a device, a pipe, a name with a NUL in it, a file that is too large.
     OSError : no such file, no permission, a folder.
     """
     too_large = InputError(path, "", f"has more than {most // 2**20} MiB; is it the right file?")
@@ -80,10 +78,8 @@ def content_of(path: Path | str, most: int = LARGEST) -> bytes:
 def toml_of(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
-    Raises
-    ------
-    InputError : as `content_of`. OSError : it cannot be read. UnicodeDecodeError : it is not in
-        UTF-8. ValueError, RecursionError : it is not TOML.
+    Raises InputError : as `content_of`. OSError : it cannot be read. UnicodeDecodeError : it is not
+    in UTF-8. ValueError, RecursionError : it is not TOML.
     """
     text = content_of(path, LARGEST_WRITTEN).decode("utf-8")
     # A key of n parts costs tomllib n squared, in time and memory.
@@ -101,9 +97,7 @@ def is_file(path: Path) -> bool:
 def check_regular(path: Path | str) -> None:
     """Check that a path does not lead to a device or a pipe, which may never end.
 
-    Raises
-    ------
-    InputError : it does, or no file can have such a name. OSError : there is no such file.
+    Raises InputError : it does, or no file can have such a name. OSError : there is no such file.
     """
     try:
         mode = os.stat(path).st_mode
@@ -183,9 +177,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
     The parent folder is made. A reader sees the old file or the new one, never half of one.
 
-    Raises
-    ------
-    OutputError : the folder cannot be written or the disk is full.
+    Raises OutputError : the folder cannot be written or the disk is full.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
@@ -246,9 +238,7 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
 def render(template: str, /, **context: Any) -> str:
     """Return the text of `template` (a path below templates/) with the values of `context`.
 
-    Raises
-    ------
-    jinja2.UndefinedError : the template asks for a variable that the context does not have.
+    Raises jinja2.UndefinedError : the template asks for a variable that the context does not have.
     """
     import jinja2
 
@@ -271,14 +261,8 @@ class PlugIn:
     def load(self, what: str = "", needs: Sequence[str] = ()) -> Any:
         """Import the object that the entry point names.
 
-        Parameters
-        ----------
-        what : what it should be, in a word, for the complaint: "form".
-        needs : attributes that it must have.
-
-        Raises
-        ------
-        PlugInFailure : it cannot be imported, or lacks one of `needs`.
+        what : what it should be, in a word, for the complaint: "form". needs : attributes that it
+        must have. Raises PlugInFailure : it cannot be imported, or lacks one of `needs`.
         """
         try:
             thing = self.entry.load()
@@ -294,10 +278,8 @@ class PlugIn:
     def failure(self, what: str, error: BaseException | None = None) -> PlugInFailure:
         """Return an error of one line that names the distribution.
 
-        Parameters
-        ----------
-        what : what the plug-in does, "fails its check".
-        error : what it raised; its class and the first line of its message are shown.
+        what : what the plug-in does, "fails its check". error : what it raised; its class and the
+        first line of its message are shown.
         """
         cause = ""
         if error is not None:

@@ -79,9 +79,7 @@ def stress_of(model: UniaxialModel, history: History) -> float:
 def strip_stresses(solver: Solver) -> tuple[float, ...]:
     """Return the end stresses (MPa) of BARS by a solver's own uniaxial analysis.
 
-    Raises
-    ------
-    SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
+    Raises SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
     """
     found = []
     for bar in BARS:

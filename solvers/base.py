@@ -354,14 +354,9 @@ def cell_blocks(
 ) -> list[tuple[str, NDArray[Any]]]:
     """Return meshio's blocks of elements of one type, their nodes counted from 0.
 
-    Parameters
-    ----------
-    numbers : (n,) of the nodes in the file, increasing.
-    names : by the file's type: meshio's name, and its order of the nodes where it differs.
-
-    Raises
-    ------
-    InputError : a type that `names` does not have, a node that is not there.
+    numbers : (n,) of the nodes in the file, increasing. names : by the file's type: meshio's name,
+    and its order of the nodes where it differs. Raises InputError : a type that `names` does not
+    have, a node that is not there.
     """
     cells: list[tuple[str, list[Any]]] = []
     for kind, nodes in elements:

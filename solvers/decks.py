@@ -36,15 +36,10 @@ def render(
 ) -> str:
     """Return the deck that template `name` of `solver` makes of `context`.
 
-    Parameters
-    ----------
     folder : the user's own templates; `name` must be there, and may include or extend ours.
-    instead : files of the user's in place of templates that `name` includes.
-
-    Raises
-    ------
-    InputError : the template is missing or unreadable, asks for a variable that does not exist, or
-        has a mistake in its syntax or arithmetic; says in which line.
+    instead : files of the user's in place of templates that `name` includes. Raises InputError :
+    the template is missing or unreadable, asks for a variable that does not exist, or has a mistake
+    in its syntax or arithmetic; says in which line.
     """
     folders = [TEMPLATES / solver]
     if folder is not None:

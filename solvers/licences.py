@@ -131,9 +131,8 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
     First of the machine's, then of the cluster's where a scheduler counts too: in this order
     everywhere, so that there is no deadlock.
 
-    Raises
-    ------
-    InputError : nothing can be counted there. BubblefitError : the scheduler does not answer.
+    Raises InputError : nothing can be counted there. BubblefitError : the scheduler does not
+    answer.
     """
     if settings.licences is None:
         yield
@@ -169,9 +168,7 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
     Pauses double up to ten times the first one, each longer or shorter by chance, so that runs that
     were denied together do not try together again.
 
-    Raises
-    ------
-    SolverFailure : as `run`; a licence was denied until the time was over (`LicenceDenied`).
+    Raises SolverFailure : as `run`; a licence was denied until the time was over (`LicenceDenied`).
     """
     begun, pause, tries = time.monotonic(), settings.licence_retry, 1
     while True:
@@ -214,14 +211,8 @@ def locked(
 ) -> Iterator[int]:
     """Hold one of `count` licences of the program `name`; yield the number of the open file.
 
-    Parameters
-    ----------
-    folder : of the files, made where needed; one for the machine unless given.
-    waiting : called now and then while there is none.
-
-    Raises
-    ------
-    InputError : the files cannot be made or locked.
+    folder : of the files, made where needed; one for the machine unless given. waiting : called now
+    and then while there is none. Raises InputError : the files cannot be made or locked.
     """
     place = FOLDER if folder is None else folder
     pause = SOON_S
@@ -300,9 +291,7 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
 
     waiting : called now and then while there is none.
 
-    Raises
-    ------
-    InputError : another count is in use in this cluster, or Dask is not installed.
+    Raises InputError : another count is in use in this cluster, or Dask is not installed.
     BubblefitError : the scheduler does not answer.
     """
     distributed = dask()

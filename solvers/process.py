@@ -105,18 +105,10 @@ def run_process(
 ) -> Outcome:
     """Run `command` in `folder` to its end, its output (both streams) going to `log`.
 
-    Parameters
-    ----------
-    timeout : s; then the program is killed with all that it has started.
-    environment : added to ours.
-    watch : called about twenty times a second while it runs.
-
-    Raises
-    ------
-    InputError : the program cannot be started (not there, no permission, another machine's).
-    Unwanted : see `unless`.
-
-    An interruption (Ctrl-C, an error in `watch`) kills the program as well. Where this process is
+    timeout : s; then the program is killed with all that it has started. environment : added to
+    ours. watch : called about twenty times a second while it runs. Raises InputError : the program
+    cannot be started (not there, no permission, another machine's). Unwanted : see `unless`. An
+    interruption (Ctrl-C, an error in `watch`) kills the program as well. Where this process is
     killed outright, a shell that waits for it kills the program's process group; on a system
     without groups or /bin/sh the program runs to its end.
     """

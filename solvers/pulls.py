@@ -36,9 +36,7 @@ def grip_pulls(
 
     opened : runs the strip at given pulls and returns how far its gauge opened, (increments,) mm.
 
-    Raises
-    ------
-    SolverFailure : that run did not end well, or its gauge gets shorter.
+    Raises SolverFailure : that run did not end well, or its gauge gets shorter.
     """
     driven = direct(model)
     if driven is not None:
@@ -95,9 +93,7 @@ def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: s
     The increments of the run lie near the model's, so that it bridges next to nothing. opened :
     (increments of the run,) mm, elongation of the gauge.
 
-    Raises
-    ------
-    SolverFailure : the gauge does not reach its length, or gets shorter on the way.
+    Raises SolverFailure : the gauge does not reach its length, or gets shorter on the way.
     """
     levels, gauge = np.array(model.elongations), np.insert(opened, 0, 0.0)
     if len(opened) == len(levels) and (

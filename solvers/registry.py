@@ -53,9 +53,7 @@ class PlugIn(plugins.PlugIn):
     def make(self, **options: Any) -> Solver:
         """Return a new solver from the factory that the entry point names.
 
-        Raises
-        ------
-        SolverFailure : it cannot be imported, is no factory, fails, or returns no solver.
+        Raises SolverFailure : it cannot be imported, is no factory, fails, or returns no solver.
         InputError : an option that the factory does not take or rejects.
         """
         factory = self.factory()
@@ -121,14 +119,9 @@ def solver_sections() -> dict[str, type[SolverSettings]]:
 def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the options of each solver by name, of ours also without a table.
 
-    Parameters
-    ----------
-    path : the project's file; paths in its tables are relative to its folder.
-    tables : [solver] of the project. Of a plug-in's only keys of licences are checked here.
-
-    Raises
-    ------
-    InputError : an unknown key or solver, an impossible value.
+    path : the project's file; paths in its tables are relative to its folder. tables : [solver] of
+    the project. Of a plug-in's only keys of licences are checked here. Raises InputError : an
+    unknown key or solver, an impossible value.
     """
     found: dict[str, dict[str, Any]] = {}
     for name, section in solver_sections().items():
@@ -169,14 +162,9 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
 
     Options of licences apply to every external solver, which does not see them itself.
 
-    Parameters
-    ----------
-    cache : of the runs of other programs; None: everything is run.
-
-    Raises
-    ------
-    InputError : there is none of that name (lists them), or an option is wrong.
-    SolverFailure : a plug-in that does not work; names its distribution.
+    cache : of the runs of other programs; None: everything is run. Raises InputError : there is
+    none of that name (lists them), or an option is wrong. SolverFailure : a plug-in that does not
+    work; names its distribution.
     """
     make: Callable[..., Solver]
     if name in SOLVERS:  # a plug-in cannot take the place of one of ours
@@ -209,15 +197,9 @@ def usable_solver(
 ) -> Solver:
     """Return a new solver that is installed and carries the law; more of them by `solver_named`.
 
-    Parameters
-    ----------
     options : as from `solver_settings`. path, key : the project that names it, and where. cache :
-        as of `solver_named`.
-
-    Raises
-    ------
-    InputError : there is no such solver, or an option is wrong (says in which file).
-    SolverFailure : it is not installed, or does not carry the law.
+    as of `solver_named`. Raises InputError : there is no such solver, or an option is wrong (says
+    in which file). SolverFailure : it is not installed, or does not carry the law.
     """
     try:
         solver = solver_named(name, cache, **(options or {}))
@@ -240,10 +222,8 @@ def usable_solver(
 def checked(name: str, solver: Solver) -> SolverCheck:
     """Return the solver's `check`.
 
-    Raises
-    ------
-    SolverFailure : the check of a plug-in fails; names its distribution.
-    InputError : an option that the check rejects.
+    Raises SolverFailure : the check of a plug-in fails; names its distribution. InputError : an
+    option that the check rejects.
     """
     try:
         return solver.check()
@@ -279,16 +259,10 @@ def overridden(
 ) -> dict[str, Any]:
     """Return the options of the solver `name`, overridden by the command line.
 
-    Parameters
-    ----------
-    options : as from `solver_settings`.
-    given : by the name of an option of `command_line`; None: not given.
-    settings : each "KEY=VALUE", the value as in a project file (text needs no quotes); paths are
-        relative to the current folder.
-
-    Raises
-    ------
-    InputError : an option of another solver; an unknown setting.
+    options : as from `solver_settings`. given : by the name of an option of `command_line`; None:
+    not given. settings : each "KEY=VALUE", the value as in a project file (text needs no quotes);
+    paths are relative to the current folder. Raises InputError : an option of another solver; an
+    unknown setting.
     """
     mine = {option: value for option, value in given.items() if value is not None}
     for option in mine:

@@ -256,10 +256,8 @@ class Damaged(ValueError):
 def to_bytes(history: History, key: str, seconds: float) -> bytes:
     """Return the history with its key and its seconds, behind a checksum of all.
 
-    Raises
-    ------
-    ValueError, TypeError : a plug-in's own sort of history, objects in place of numbers, numbers
-        that are not finite.
+    Raises ValueError, TypeError : a plug-in's own sort of history, objects in place of numbers,
+    numbers that are not finite.
     """
     if type(history) is not History:
         raise TypeError(f"{type(history).__name__} is not a History")

@@ -63,9 +63,7 @@ def run_folder(
 
     logs : name of the log in the folder whose tail a failure carries, where it has none yet.
 
-    Raises
-    ------
-    SolverFailure : that of the run, with the folder and the log. OutputError : no folder.
+    Raises SolverFailure : that of the run, with the folder and the log. OutputError : no folder.
     """
     with _undisturbed():
         folder = fresh_folder(name, parent)

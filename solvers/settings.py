@@ -84,14 +84,9 @@ def check_programs(
     A bare name of a solver's own program (ccx_2.20, run_marc2023) is always permitted: it is looked
     up on the user's PATH.
 
-    Parameters
-    ----------
     path : of the project. table : [solver.NAME] as it is written. started : its keys that name
-        programs. advice : what else the user may do.
-
-    Raises
-    ------
-    InputError : such a key is there, and the file is in none of the folders of `PROGRAMS_FROM`.
+    programs. advice : what else the user may do. Raises InputError : such a key is there, and the
+    file is in none of the folders of `PROGRAMS_FROM`.
     """
 
     def known(value: Any) -> bool:
@@ -115,8 +110,8 @@ class LicenceSettings(Section):
 
     licences : simultaneous runs of all processes and users that lock the same files; not counted
     unless given. licence_folder : of these files, one for the machine unless given. licence_wait :
-    s of further tries after a licence was denied; 600 where they are counted, else 0. licence_retry
-    : s until the first further try; later pauses are longer, each a little by chance.
+    s of further tries after a licence was denied; 600 where they are counted, else 0.
+    licence_retry : s until the first further try; later pauses are longer, each a little by chance.
     licence_denied : words in the program's log that mean a denied licence, beside those that the
     solver itself knows.
     """

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from bubblefit import files
 
 #: Compiles one kernel that calls another file's functions, and prints what it computes.

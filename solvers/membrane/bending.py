@@ -246,10 +246,8 @@ def analyse_inflated(
 
     The membrane is fresh: no strain, no stress.
 
-    Raises
-    ------
-    InputError : derivatives or a guess was asked for.
-    SolverFailure : an increment of the pressure has no equilibrium.
+    Raises InputError : derivatives or a guess was asked for. SolverFailure : an increment of the
+    pressure has no equilibrium.
     """
     if asked.parameters or asked.guess is not None:
         raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")

@@ -92,9 +92,7 @@ def chosen_wall(
     wrinkle_stiffness, bending_stiffness : as `Wall` has them, None where they are not given. With
     one of them there is no band: the wall is a tension field if it has the first.
 
-    Raises
-    ------
-    InputError : as `Wall`; an unknown name, a stiff wall with wrinkles.
+    Raises InputError : as `Wall`; an unknown name, a stiff wall with wrinkles.
     """
     if name not in ("band", "tension field", "stiff"):
         problem = f"expected 'band', 'tension field' or 'stiff', got {name!r}"

@@ -95,8 +95,8 @@ class MembraneSolver:
     ) -> History:
         """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
-        guess : (increments, nodes, 3) displacements to start each increment from, mm. SolverFailure
-        : an increment has no equilibrium that Newton and cut-back can find.
+        guess : (increments, nodes, 3) displacements to start each increment from, mm.
+        SolverFailure : an increment has no equilibrium that Newton and cut-back can find.
         """
         return self._analyse(model, law, (), guess)[0]
 
