@@ -141,13 +141,19 @@ def _hold(given, folder, ready):
         pass
 
 
-def test_other_programs_and_folders_count_apart(tmp_path):
+def test_other_programs_folders_and_files_count_apart(tmp_path):
     with (
         locked("acme", 1, tmp_path / "a", pytest.fail),
         locked("b", 1, tmp_path / "a", pytest.fail),
     ):
         with locked("acme", 1, tmp_path / "b", pytest.fail):
             pass
+    # Whoever opened it before the other one was there may not run beside who locks that.
+    with locked("acme", 1, tmp_path, pytest.fail) as file:
+        (tmp_path / "acme-1.lock").unlink()
+        with locked("acme", 1, tmp_path, pytest.fail) as other:
+            assert not os.path.samestat(os.fstat(file), os.fstat(other))
+            assert licences._any(tmp_path, "acme", 1) is None
 
 
 def test_the_machines_own_folder_is_everybodys(tmp_path, monkeypatch):
@@ -160,15 +166,6 @@ def test_the_machines_own_folder_is_everybodys(tmp_path, monkeypatch):
         os.umask(old)
     assert stat.S_IMODE((tmp_path / "machine").stat().st_mode) == 0o1777
     assert stat.S_IMODE((tmp_path / "machine" / "acme-1.lock").stat().st_mode) == 0o666
-
-
-def test_a_file_that_was_tidied_away_is_no_lock(tmp_path):
-    """Whoever opened it before the other one was there may not run beside who locks that."""
-    with locked("acme", 1, tmp_path, pytest.fail) as file:
-        (tmp_path / "acme-1.lock").unlink()
-        with locked("acme", 1, tmp_path, pytest.fail) as other:
-            assert not os.path.samestat(os.fstat(file), os.fstat(other))
-            assert licences._any(tmp_path, "acme", 1) is None
 
 
 def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(tmp_path, monkeypatch):
@@ -271,10 +268,15 @@ def test_words_of_the_site_mean_a_denied_licence(tmp_path, pauses):
     assert len(tries) == 1 and "tries" not in caught.value.reason
 
 
-def test_how_long_is_waited_unless_said():
+def test_defaults_and_the_file_of_the_site(tmp_path):
     assert LicenceSettings().wait == 0
     assert LicenceSettings(licences=3).wait == 600
     assert LicenceSettings(licences=3, licence_wait=0.0).wait == 0
+    site = tmp_path / "site.toml"
+    site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
+    solver: Any = solver_named("marc", marc=site, licences=5)
+    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
+    assert solver.licences.licence_folder == str(tmp_path / "locks")
 
 
 # Which solvers have them
@@ -321,6 +323,13 @@ def test_a_solver_stays_what_it_is(tmp_path):
     assert not plain.keep and not isinstance(plain, ProgramSolver)
     assert type(able).__module__ == __name__
 
+    class Able(CountedSolver):
+        def run_with_sensitivity(self, *_):
+            return licences._any(tmp_path / "locks", "counted", 1)
+
+    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
+    assert able.run_with_sensitivity(3, LAW) is None
+
 
 def test_a_run_that_is_in_the_cache_needs_no_licence(packages, tmp_path):
     install(packages, "acme", ACME, group="bubblefit.solvers")
@@ -330,15 +339,6 @@ def test_a_run_that_is_in_the_cache_needs_no_licence(packages, tmp_path):
     )
     assert isinstance(solver, Once) and isinstance(solver.solver, LicensedSolver)
     assert solver.options == {}  # licences change no result
-
-
-def test_slopes_need_a_licence_too(tmp_path):
-    class Able(CountedSolver):
-        def run_with_sensitivity(self, *_):
-            return licences._any(tmp_path / "locks", "counted", 1)
-
-    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
-    assert able.run_with_sensitivity(3, LAW) is None
 
 
 def test_every_external_solver_has_the_keys(packages):
@@ -371,14 +371,6 @@ def test_no_project_names_a_scheduler(packages):
         assert said.startswith(f"{PROJECT}: solver.{name}.licence_scheduler: ")
 
 
-def test_the_sites_file_counts_licences_too(tmp_path):
-    site = tmp_path / "site.toml"
-    site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
-    solver: Any = solver_named("marc", marc=site, licences=5)
-    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
-    assert solver.licences.licence_folder == str(tmp_path / "locks")
-
-
 # What is said of it
 
 
@@ -393,7 +385,7 @@ def test_what_a_worker_announces_is_heard_here():
     assert records[-1] is None  # what the task gives; nothing else is a record
 
 
-def test_progress_says_who_waits(capsys):
+def test_progress_says_who_waits(capsys, monkeypatch):
     with StudyProgress(4, quiet=False) as progress:
         for who in "ab":
             announce("waiting for a licence of marc", who)
@@ -408,9 +400,6 @@ def test_progress_says_who_waits(capsys):
     with StudyProgress(4, quiet=True):
         announce("waiting for a licence of marc", "a")
     assert capsys.readouterr().err == ""
-
-
-def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch):
     with StudyProgress(4, quiet=False) as progress:
         announce("waiting for a licence of marc", "a")
         progress.said -= 100.0

@@ -65,9 +65,6 @@ def test_a_second_run_of_the_same_is_no_run(cache):
     other = Counting()
     third = with_cache(other, RunCache(cache.folder), {"element": 4}).run(MODEL, LAW)
     assert other.runs == 0 and third.load == 1.0
-
-
-def test_progress_reaches_the_solver(cache):
     solver = Counting()
     once = with_cache(solver, cache, {})
     once.progress = print
@@ -147,7 +144,13 @@ def test_the_code_of_a_plug_in_counts(packages):
     assert first != code_mark("acme_cached") and first != ours
 
 
-def test_a_run_that_fails_is_not_kept(cache):
+def test_runs_that_are_not_kept(cache):
+    solver = Counting()
+    once = with_cache(solver, cache, {})
+    strange = SimpleNamespace(mesh=mesh)
+    once.run(strange, LAW)
+    once.run(strange, LAW)
+    assert solver.runs == 2 and cache.entries() == []
     solver = Counting(fails=1)
     once = with_cache(solver, cache, {})
     with pytest.raises(SolverFailure, match="no licence"):
@@ -156,16 +159,7 @@ def test_a_run_that_fails_is_not_kept(cache):
     assert once.run(MODEL, LAW).load == 2.0 and once.run(MODEL, LAW).from_cache
 
 
-def test_a_model_of_which_it_is_not_known_what_it_holds_is_run_every_time(cache):
-    solver = Counting()
-    once = with_cache(solver, cache, {})
-    strange = SimpleNamespace(mesh=mesh)
-    once.run(strange, LAW)
-    once.run(strange, LAW)
-    assert solver.runs == 2 and cache.entries() == []
-
-
-def test_which_solvers_have_none(cache):
+def test_which_solvers_have_none_and_a_band_stays_one(cache):
     """Ours in this process, one that starts from a guess, one whose folders are to be kept."""
 
     class Sloped(Counting):
@@ -183,8 +177,6 @@ def test_which_solvers_have_none(cache):
     membrane = registry.solver_named("membrane", cache)
     assert isinstance(membrane, DifferentiatingSolver)
 
-
-def test_a_band_stays_one(cache):
     class Banded(Counting):
         def band(self, model):
             return (BandEnd("stiff", "", {}),)

@@ -71,25 +71,19 @@ def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_watcher_ends_with_the_run(tmp_path):
+def test_a_watcher_and_a_folder_end_with_the_run(tmp_path, monkeypatch):
     needs.linux("processes by their name")
     with run_folder("t", tmp_path, False, "t", "log") as folder:
         process.run_process(["/bin/sh", "-c", "true"], folder, folder / "log")
         children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
         names = [Path(f"/proc/{child}/cmdline").read_bytes() for child in children]
         assert not [name for name in names if b"bubblefit-watch" in name]
-
-
-def test_without_a_shell_the_run_is_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr(process, "WATCHER", (str(tmp_path / "no shell"),))
-    with run_folder("t", tmp_path, False, "t", "log") as folder:
-        assert process.run_process(["true"], folder, folder / "log").exit_code == 0
-
-
-def test_a_folder_under_way_is_this_processs(tmp_path):
     with run_folder("t", tmp_path, False, "t", "log") as folder:
         assert sweep([tmp_path]) == [] and folder.exists()
     assert not folder.exists()
+    monkeypatch.setattr(process, "WATCHER", (str(tmp_path / "no shell"),))
+    with run_folder("t", tmp_path, False, "t", "log") as folder:
+        assert process.run_process(["true"], folder, folder / "log").exit_code == 0
 
 
 def test_what_is_kept_is_never_swept(tmp_path, monkeypatch):

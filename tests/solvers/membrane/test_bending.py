@@ -123,23 +123,18 @@ def test_bodies_are_brought_to_touch():
         brought_to_touch(replace(POST, centre=(0.0, 0.0, 900.0)), points, -way, 0.02)
 
 
-def test_collar_and_supports_balance(bent):
+def test_balance_mass_penetration_and_frames_of_a_bending(bent):
     _, history = bent
     assert (np.diff(history.load) > 0).all()
     assert history.load[0] == 0.0
     total = history.reactions["collar"] + history.reactions["support"]
     assert total[1:] == pytest.approx(0.0, abs=1e-4 * history.load[1])
     assert history.load == pytest.approx(-history.reactions["collar"][:, 1])
-
-
-def test_gas_keeps_its_mass(bent):
     _, history = bent
     amount = (history.cavity_pressure + 0.101) * history.cavity_volume
     assert amount == pytest.approx(np.full(len(amount), amount[0]), rel=1e-12)
     assert history.cavity_pressure[-1] > history.cavity_pressure[0]
 
-
-def test_penetration_is_reported_and_shrinks_with_the_penalty(bent):
     def depth(history):
         (text,) = [r for r in history.remarks if "penetrate" in r]
         return float(text.split()[3])
@@ -147,10 +142,7 @@ def test_penetration_is_reported_and_shrinks_with_the_penalty(bent):
     stiff = bend(beam(penalty=50.0))[0]
     assert depth(stiff) < 0.2 * depth(bent[1])
     assert stiff.load[-1] == pytest.approx(bent[1].load[-1], rel=0.01)
-
-
-def test_the_start_of_each_frame_does_not_matter(bent):
-    """A linear law's strain path is short here: more frames on the way change little."""
+    # A linear law's strain path is short here: more frames on the way change little.
     finer = bend(beam((1.0, 2.0, 4.0, 6.0, 8.0, 10.0)))[0]
     assert finer.load[-1] == pytest.approx(bent[1].load[-1], rel=1e-3)
 
@@ -209,14 +201,6 @@ def test_a_wall_bends_with_all_of_its_stiffness_unless_told_otherwise():
     assert none.flexure is None
 
 
-def test_a_jump_between_frames_is_remarked(monkeypatch):
-    moves = (2.0, 4.0, 6.0, 8.0)
-    assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
-    monkeypatch.setattr(bending, "SNAP", 1e-6)
-    (remark,) = [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
-    assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
-
-
 def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch):
     """Three N mm in the quarter's every step: most of the load where the step is shortest."""
     monkeypatch.setattr(ClosedMembrane, "wrinkle_work", lambda *_: 3.0)
@@ -229,12 +213,17 @@ def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch):
     assert float(said[1]) == pytest.approx(100 * carried / history.load.max(), rel=0.05)
 
 
-def test_mistakes_in_the_plan():
+def test_mistakes_in_the_plan_and_jumps_between_frames(monkeypatch):
     model = beam()
     with pytest.raises(InputError, match=r"displacements: expected positive, increasing"):
         replace(model, bending=replace(model.bending, displacements=[4.0, 2.0]))
     with pytest.raises(InputError, match="no node set 'nowhere'"):
         replace(model, bending=replace(model.bending, released="nowhere"))
+    moves = (2.0, 4.0, 6.0, 8.0)
+    assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
+    monkeypatch.setattr(bending, "SNAP", 1e-6)
+    (remark,) = [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
+    assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
 
 
 # --- relaxation ---
@@ -352,14 +341,11 @@ def rolled(modulus):
     return 0.5 * stiffness / R**2 * np.pi * R * L
 
 
-def test_sheet_rolled_along_the_fill_has_its_bending_energy():
+def test_bending_energy_of_a_rolled_sheet():
     errors = [energy(*quarter(n)) / rolled(140.0) - 1.0 for n in (16, 32, 64)]
     assert abs(errors[2]) < 2e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.1)
-
-
-def test_sheet_rolled_along_the_warp():
-    """The same tube with its warp around: tangents of the facets turn, so given as one by one."""
+    # The same tube with its warp around: tangents of the facets turn, so given as one by one.
     mesh = half_tube(64, 4, R, L, caps=False)
     centre = mesh.points[mesh.quads].mean(axis=1)
     around = np.stack([-centre[:, 1], centre[:, 0], np.zeros(len(centre))], axis=1)
@@ -368,9 +354,6 @@ def test_sheet_rolled_along_the_warp():
     planes[mesh.node_sets["symmetry_z"], 2] = planes[mesh.node_sets["end"], 2] = True
     flexure = flexure_of(mesh.points, mesh.quads, around, THICKNESS, planes)
     assert energy(mesh.points, flexure) == pytest.approx(rolled(800.0), rel=3e-3)
-
-
-def test_energy_goes_with_the_cube_of_the_thickness():
     thin, thick = (energy(*quarter(16, thickness=t)) for t in (0.4, 0.8))
     assert thick == pytest.approx(8.0 * thin, rel=1e-12)
 
@@ -387,7 +370,7 @@ def test_rigid_motions_leave_forces_and_energy():
     assert force.sum(axis=0) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_mirrored_line_is_that_of_the_whole():
+def test_mirrored_lines_and_the_rim_of_a_cap():
     """Around, the curvature of the tube on top and bottom line; along, none in the end rings."""
     points, flexure = quarter(16)
     ends = flexure.nodes[:, 0] == flexure.nodes[:, 2]
@@ -396,9 +379,6 @@ def test_a_mirrored_line_is_that_of_the_whole():
     size = np.linalg.norm(curvature, axis=1)
     assert np.sort(size)[-10:] == pytest.approx(np.full(10, 1 / R), rel=5e-3)
     assert np.sort(size)[:-10] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_the_rim_of_a_flat_cap_carries_no_moment():
     points, flexure = quarter(16, caps=True)
     before, node, after = points[flexure.nodes].transpose(1, 0, 2)
     rim = (node[:, 2] > L - 1e-6) & (np.hypot(node[:, 0], node[:, 1]) > R - 1e-6)
@@ -420,13 +400,10 @@ def membrane_of(solver, model):
     return cylinder.prepare(model, WALL_LAW, 1e-8, solver.wall)
 
 
-def test_a_cylinder_is_predicted_as_a_tension_field(model):
+def test_the_band_goes_from_a_tension_field_to_a_stiff_wall(model):
     membrane = membrane_of(MembraneSolver(), model)
     assert membrane.wall == TENSION_FIELD == Wall(LEFT, 1.0)
     assert membrane.wrinkle_stiffness == LEFT and membrane.flexure is not None
-
-
-def test_the_band_goes_from_a_tension_field_to_a_stiff_wall(model):
     solver = MembraneSolver()
     assert isinstance(solver, BandedSolver)
     ends = solver.band(model)

@@ -127,7 +127,7 @@ def test_thickness_by_element():
 
 
 # Cavity and gas
-def test_volume_of_a_box_and_its_derivative():
+def test_volume_of_a_box_and_of_a_slice():
     model = tube(8, 3, 60.0, [0.01])
     mesh, fixed = model.mesh, model.fixed()
     cavity = closed_cavity(mesh.points, mesh.quads, fixed)
@@ -142,17 +142,11 @@ def test_volume_of_a_box_and_its_derivative():
         step[dof] = 1e-3
         up, down = (cavity.measure(bent + s * step.reshape(-1, 3))[0] for s in (1, -1))
         assert push[dof] == pytest.approx((up - down) / 2e-3, rel=1e-7, abs=1e-6)
-
-
-def test_slice_between_two_planes_has_the_same_volume():
     model = tube(8, 2, 40.0, [0.01], caps=False)
     cavity = closed_cavity(model.mesh.points, model.mesh.quads, model.fixed())
     volume = 0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 40.0
     assert cavity.measure(model.mesh.points)[0] == pytest.approx(volume, rel=1e-12)
     assert cavity.symmetric.tolist() == [True, False, True]
-
-
-def test_open_cavity_is_refused():
     model = tube(8, 2, 40.0, [0.01], caps=False)
     supports = {k: v for k, v in model.supports.items() if k != "end"}
     assert "the cavity is open between nodes" in complaint(run, replace(model, supports=supports))
@@ -263,10 +257,7 @@ def test_refusals():
     assert "no node set 'rim' in the mesh" in complaint(replace, model, supports={"rim": (0, 1, 2)})
     with pytest.raises(InputError, match="takes no parameters"):
         MembraneSolver().run_with_sensitivity(model, ISOTROPIC)
-
-
-def test_a_sphere_beyond_its_limit_pressure_is_a_failure():
-    """p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1."""
+    # p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1.
     limit = 2 * THICKNESS * E / ((1 - NU) * RADIUS * np.e)
     with pytest.raises(SolverFailure, match="no equilibrium at"):
         MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
@@ -311,7 +302,7 @@ def quarter():
     return model, bend(model)
 
 
-def test_frames_are_the_inflated_cylinder_and_what_is_to_be_reported(quarter):
+def test_frames_bodies_and_supports_as_said_by_hand(quarter):
     model, history = quarter
     assert history.displacement.shape == (3, *model.mesh.points.shape)
     assert history.path.shape == (5, *model.mesh.points.shape)
@@ -319,9 +310,6 @@ def test_frames_are_the_inflated_cylinder_and_what_is_to_be_reported(quarter):
     assert history.load[0] == 0.0 and (np.diff(history.load) > 0).all()
     assert history.cavity_pressure[0] == PRESSURE
     assert set(history.reactions) == {"supports", "collar"}  # as on CalculiX
-
-
-def test_bodies_and_what_is_held_as_said_by_hand(quarter):
     model, history = quarter
     by_hand = InflatedModel(
         model.mesh, model.thickness, model.mesh.warp, model.inflation,
@@ -361,7 +349,7 @@ def test_forces_balance_and_the_gas_keeps_its_mass(symmetry, quarter):
     assert history.cavity_pressure[-1] > PRESSURE
 
 
-def test_gas_and_bodies_of_the_model_are_taken(quarter):
+def test_gas_bodies_and_span_of_the_model_are_taken(quarter):
     model, before = quarter
     thin = bend(replace(model, gas=Gas(ambient=0.01)))
     energy = (thin.cavity_pressure + 0.01) * thin.cavity_volume
@@ -371,9 +359,6 @@ def test_gas_and_bodies_of_the_model_are_taken(quarter):
     assert 0 < rise[1] < 0.75 * rise[0]
     long = bend(replace(model, collar=Collar(240.0, 400.0)))
     assert long.load[-1] > 1.05 * before.load[-1]
-
-
-def test_a_shorter_span_is_stiffer(quarter):
     narrow = RigidSupports(span=1600.0)
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, supports=narrow, deflections=[4, 12.0])
     assert bend(model).load[-1] > 1.3 * quarter[1].load[-1]

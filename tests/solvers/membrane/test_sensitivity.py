@@ -132,12 +132,9 @@ def test_each_parameter_of_a_trilinear_law(name, thickness_change):
     assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_a_trilinear_law_has_no_derivative_by_what_it_does_not_have():
+def test_a_trilinear_bubble():
     _, slope = MembraneSolver().run_with_sensitivity(MODEL, TRILINEAR, ["beta_0", "beta_3"])
     assert not slope[..., 0].any() and slope[..., 1].any()
-
-
-def test_a_trilinear_bubble_hardly_depends_on_the_increments():
     few = MembraneSolver(TIGHT).run(MODEL, TRILINEAR)
     assert len(MODEL.increments) == 9
     levels = np.interp(np.linspace(0, 9, 73)[1:], range(10), [0, *MODEL.increments])
@@ -148,7 +145,7 @@ def test_a_trilinear_bubble_hardly_depends_on_the_increments():
     assert few.displacement[:, apex, 2] == pytest.approx(many.displacement[:, apex, 2], rel=1e-4)
 
 
-def test_all_at_once_equals_one_by_one():
+def test_derivatives_do_not_depend_on_how_they_are_computed():
     solver = MembraneSolver(TIGHT)
     assert isinstance(solver, DifferentiatingSolver)
     together = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS)[1]
@@ -156,16 +153,10 @@ def test_all_at_once_equals_one_by_one():
         alone = solver.run_with_sensitivity(MODEL, LAW, [name])[1]
         near = pytest.approx(together[..., j], rel=1e-9, abs=1e-9 * np.abs(alone).max())
         assert alone[..., 0] == near
-
-
-def test_a_warm_start_changes_no_derivative():
     solver = MembraneSolver(TIGHT)
     history, cold = solver.run_with_sensitivity(MODEL, LAW)
     _, warm = solver.run_with_sensitivity(MODEL, LAW, guess=history.path)
     assert warm == pytest.approx(cold, rel=1e-6, abs=1e-8 * np.abs(cold).max())
-
-
-def test_the_history_is_that_of_a_plain_run():
     history, slope = MembraneSolver().run_with_sensitivity(MODEL, LAW)
     plain = MembraneSolver().run(MODEL, LAW)
     assert history.displacement == pytest.approx(plain.displacement, abs=1e-9)
@@ -174,9 +165,6 @@ def test_the_history_is_that_of_a_plain_run():
     assert history.path_slope is not None
     assert (history.path_slope[MODEL.reported] == slope).all()
     assert (slope[:, MODEL.mesh.node_sets["rim"]] == 0).all()
-
-
-def test_fine_meshes_take_the_other_factorisation():
     solver = MembraneSolver(TIGHT)
     band = solver.run_with_sensitivity(MODEL, LAW)[1]
     with pytest.MonkeyPatch.context() as patch:
@@ -201,14 +189,11 @@ def test_each_parameter_of_a_spline(name):
     assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_every_value_of_a_spline_unless_named():
+def test_a_spline_through_a_cubic_is_that_cubic():
     _, slope = MembraneSolver().run_with_sensitivity(MODEL, SPLINE)
     assert slope.shape[-1] == 12
     assert "beta_12" in complaint(MembraneSolver().run_with_sensitivity, MODEL, SPLINE, ["beta_12"])
-
-
-def test_a_spline_through_a_cubic_is_that_cubic():
-    """Solution and derivatives: those by the values are those by the coefficients."""
+    # Solution and derivatives: those by the values are those by the coefficients.
     values = [LAW.modulus(n, KNOTS[1]) for n in ("G12", "E2", "E1")]
     form = Spline.at([KNOTS[1]] * 3)
     spline = HypoelasticLaw(np.ravel(values), 0.24, LAW.strain_range, form=form)
