@@ -23,8 +23,8 @@ from typing import Any
 import cloudpickle
 from threadpoolctl import threadpool_limits
 
-from .. import __version__
 from ..errors import BubblefitError, InputError
+from ..files import __version__
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import ANSWER_S, Unwanted, connected, unless

@@ -22,7 +22,7 @@ _INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
 _VALUE = re.compile(r"=\s*(?P<file>[^,]*)")
 _ELSEWHERE = re.compile(r"[/\\\0]|^\s*[\"']?\s*(\.\.|~)")
 #: Folders and suffixes of the files that determine a run of one of our own adapters.
-ROOMS = ("materials", "meshes", "models", "solvers", "templates")
+FOLDERS = ("materials", "meshes", "solvers", "templates")
 CODE = (".py", ".j2", ".c", ".f")
 file_mark = checksum  #: documented for plug-ins
 
@@ -181,11 +181,11 @@ def _program_mark(path: Path, *_: int) -> str:
 def code_mark(module: str) -> str:
     """Return the SHA-256 of the code that makes decks and reads results.
 
-    That is `ROOMS`, and of a plug-in every Python file of its package, or its module. module : of
+    That is `FOLDERS`, and of a plug-in every Python file of its package, or its module. module : of
     the solver's class.
     """
-    files = {path.relative_to(ROOT).as_posix(): path for room in ROOMS
-             for path in (ROOT / room).rglob("*")}  # fmt: skip
+    files = {path.relative_to(ROOT).as_posix(): path for name in FOLDERS
+             for path in (ROOT / name).rglob("*")}  # fmt: skip
     top = module.partition(".")[0]
     if top != __package__.partition(".")[0]:
         package = sys.modules.get(top)

@@ -175,7 +175,9 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
         try:
             return run()
         except SolverFailure as failure:
-            if not _denied(failure, settings):
+            log = f"{failure.reason}\n{failure.log_tail}".lower()
+            words = (one.lower() in log for one in settings.licence_denied)
+            if not (isinstance(failure, LicenceDenied) or any(words)):
                 raise
             left = begun + settings.wait - time.monotonic()
             if left <= 0:
@@ -192,14 +194,6 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
         announce(f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most")
         time.sleep(seconds)
         pause, tries = min(GROWTH * pause, MOST * settings.licence_retry), tries + 1
-
-
-def _denied(failure: SolverFailure, settings: LicenceSettings) -> bool:
-    """Return whether a licence was denied, by the kind of failure or by words of the site."""
-    if isinstance(failure, LicenceDenied):
-        return True
-    text = f"{failure.reason}\n{failure.log_tail}".lower()
-    return any(words.lower() in text for words in settings.licence_denied)
 
 
 # On one machine
