@@ -59,15 +59,10 @@ def difference(stresses: tuple[float, ...]) -> float:
 def bar_model(bar: Bar) -> UniaxialModel:
     """Return a strip of one element (half of its width), free to contract; thickness 1 mm."""
     return straight_strip(
-        "warp" if bar.direction == "warp" else "fill",
-        gauge_length=SIZE,
-        final_length=SIZE * (1.0 + bar.elongation),
-        thickness=1.0,
-        width=2.0 * SIZE,
-        increments=INCREMENTS,
-        across=1,
-        along=1,
-    )
+        "warp" if bar.direction == "warp" else "fill", gauge_length=SIZE,
+        final_length=SIZE * (1.0 + bar.elongation), thickness=1.0, width=2.0 * SIZE,
+        increments=INCREMENTS, across=1, along=1,
+    )  # fmt: skip
 
 
 def stress_of(model: UniaxialModel, history: History) -> float:

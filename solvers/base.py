@@ -165,12 +165,9 @@ class Solver(Protocol):
         ...
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Run the model; SolverFailure when it does not end well."""
         ...
 
@@ -203,23 +200,16 @@ class DifferentiatingSolver(Solver, Protocol):
     """A solver that also differentiates its displacements, and takes a start for its path."""
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
-        timeout: float | None = None,
-        guess: Array | None = None,
-    ) -> History:
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        timeout: float | None = None, guess: Array | None = None,
+    ) -> History:  # fmt: skip
         """Run from `guess` where given."""
         ...
 
     def run_with_sensitivity(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        parameters: Sequence[str] | None = None,
+        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
         guess: Array | None = None,
-    ) -> tuple[History, Array]:
+    ) -> tuple[History, Array]:  # fmt: skip
         """Run; return also d displacement / d parameters, (frames, nodes, 3, len(parameters)).
 
         parameters : some of `parameters_of`; every entry of the law's beta unless given.

@@ -28,12 +28,9 @@ file_mark = checksum  #: documented for plug-ins
 
 
 def render(
-    solver: str,
-    name: str,
-    context: Mapping[str, Any],
-    folder: Path | None = None,
+    solver: str, name: str, context: Mapping[str, Any], folder: Path | None = None,
     instead: Mapping[str, Path] | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """Return the deck that template `name` of `solver` makes of `context`.
 
     folder : the user's own templates; `name` must be there, and may include or extend ours.

@@ -91,13 +91,9 @@ class LicensedSolver(WrappedSolver):
         self.licences, self.scheduler = settings, scheduler
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
-        timeout: float | None = None,
-        **more: Any,
-    ) -> History:
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        timeout: float | None = None, **more: Any,
+    ) -> History:  # fmt: skip
         """Run the model with a licence; raises as the solver, and as `held`."""
         return self._with_one(lambda: self.solver.run(model, law, scratch, timeout, **more))
 

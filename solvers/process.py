@@ -96,13 +96,9 @@ def check_wanted() -> None:
 
 
 def run_process(
-    command: Sequence[str | Path],
-    folder: Path,
-    log: Path,
-    timeout: float | None = None,
-    environment: Mapping[str, str] | None = None,
-    watch: Callable[[], None] | None = None,
-) -> Outcome:
+    command: Sequence[str | Path], folder: Path, log: Path, timeout: float | None = None,
+    environment: Mapping[str, str] | None = None, watch: Callable[[], None] | None = None,
+) -> Outcome:  # fmt: skip
     """Run `command` in `folder` to its end, its output (both streams) going to `log`.
 
     timeout : s; then the program is killed with all that it has started. environment : added to
@@ -117,15 +113,10 @@ def run_process(
     with log.open("wb") as output, _watched() as watch_group:
         try:
             process = subprocess.Popen(
-                [str(part) for part in command],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env={**os.environ, **(environment or {})},
-                start_new_session=True,
-                **kept,
-            )
+                [str(part) for part in command], cwd=folder, stdin=subprocess.DEVNULL,
+                stdout=output, stderr=subprocess.STDOUT, env={**os.environ, **(environment or {})},
+                start_new_session=True, **kept,
+            )  # fmt: skip
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
             raise InputError(Path(command[0]), "", problem) from None

@@ -189,12 +189,9 @@ def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def usable_solver(
-    name: str,
-    options: Mapping[str, Any] | None = None,
-    path: Path | None = None,
-    key: str = "fit.solver",
-    cache: RunCache | None = None,
-) -> Solver:
+    name: str, options: Mapping[str, Any] | None = None, path: Path | None = None,
+    key: str = "fit.solver", cache: RunCache | None = None,
+) -> Solver:  # fmt: skip
     """Return a new solver that is installed and carries the law; more of them by `solver_named`.
 
     options : as from `solver_settings`. path, key : the project that names it, and where. cache :
@@ -252,11 +249,8 @@ def command_line() -> list[Override]:
 
 
 def overridden(
-    name: str,
-    options: Mapping[str, Any],
-    given: Mapping[str, Any],
-    settings: Sequence[str] = (),
-) -> dict[str, Any]:
+    name: str, options: Mapping[str, Any], given: Mapping[str, Any], settings: Sequence[str] = (),
+) -> dict[str, Any]:  # fmt: skip
     """Return the options of the solver `name`, overridden by the command line.
 
     options : as from `solver_settings`. given : by the name of an option of `command_line`; None:

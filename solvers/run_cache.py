@@ -311,15 +311,11 @@ def from_bytes(content: bytes, key: str) -> History:
             if name.startswith("reactions of ")
         }
         return History(
-            **there,
-            reactions=reactions,
-            iterations=int(words["iterations"]),
+            **there, reactions=reactions, iterations=int(words["iterations"]),
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
-            early=str(words["early"]),
-            seconds=float(words["seconds"]),
-            from_cache=True,
-        )
+            early=str(words["early"]), seconds=float(words["seconds"]), from_cache=True,
+        )  # fmt: skip
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         if isinstance(error, Damaged):
             raise
@@ -362,12 +358,9 @@ class Once(WrappedSolver):
         self.cache, self.options = cache, options
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Return the run from the cache (`History.from_cache`); else run and keep it."""
         key = self.key(model, law)
         history = None if key is None else self.cache.read(key)

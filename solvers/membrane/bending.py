@@ -81,14 +81,9 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
 
 
 def analyse(
-    membrane: ClosedMembrane,
-    model: InflatedModel,
-    inflated: Array,
-    pressure: float,
-    extremes: tuple[Array, Array],
-    sides: NDArray[np.bool_],
-    asked: Asked,
-) -> History:
+    membrane: ClosedMembrane, model: InflatedModel, inflated: Array, pressure: float,
+    extremes: tuple[Array, Array], sides: NDArray[np.bool_], asked: Asked,
+) -> History:  # fmt: skip
     """Return the frames of the bending: the inflated state and every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
@@ -165,19 +160,12 @@ def analyse(
     for i, body in enumerate((*posts, collar)):
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
     return History(
-        force[:, -1] @ way,
-        np.array(path)[frames],
-        low,
-        high,
-        reactions,
+        force[:, -1] @ way, np.array(path)[frames], low, high, reactions,
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
-        iterations=membrane.iterations,
-        path=np.array(path),
-        wrinkled=np.array(wrinkled)[frames],
-        remarks=tuple(remarks),
-        early=early,
-    )
+        iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
+        remarks=tuple(remarks), early=early,
+    )  # fmt: skip
 
 
 class Moving(Loading):
@@ -281,18 +269,10 @@ def analyse_inflated(
         sets = model.mesh.node_sets
         reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
         history = History(
-            levels,
-            record.path,
-            record.low,
-            record.high,
-            reactions,
-            cavity_pressure=levels,
-            cavity_volume=model.copies * volume,
-            iterations=membrane.iterations,
-            path=record.path,
-            wrinkled=wrinkled,
-            remarks=remarks,
-        )
+            levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
+            cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
+            wrinkled=wrinkled, remarks=remarks,
+        )  # fmt: skip
     return history, np.zeros((*history.displacement.shape, 0))
 
 
@@ -399,11 +379,6 @@ def closed_membrane_of(model: CylinderModel) -> InflatedModel:
         reported=model.reported.tolist(),
     )
     return InflatedModel(
-        model.mesh,
-        model.thickness,
-        np.asarray(model.mesh.warp),
-        model.inflation,
-        {**model.guides, "support_bottom": (1,)},
-        model.copies,
-        bending,
-    )
+        model.mesh, model.thickness, np.asarray(model.mesh.warp), model.inflation,
+        {**model.guides, "support_bottom": (1,)}, model.copies, bending,
+    )  # fmt: skip

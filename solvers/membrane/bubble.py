@@ -113,16 +113,10 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
-        points,
-        quads,
-        reference_elements(model.stress_free, quads),
-        model.thickness,
-        law,
-        free,
-        tangent_for(quads, points.size, free),
-        tolerance,
+        points, quads, reference_elements(model.stress_free, quads), model.thickness, law, free,
+        tangent_for(quads, points.size, free), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-    )
+    )  # fmt: skip
 
 
 def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[History, Array]:
@@ -152,16 +146,11 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     forces, sets = record.forces[keep], model.mesh.node_sets
     reactions = {n: forces[:, sets[n]].sum(axis=1) for n in model.supports if n in sets}
     history = History(
-        levels[keep],
-        record.path[keep],
-        record.low,
-        record.high,
-        reactions,
-        iterations=membrane.iterations,
-        path=record.path,
+        levels[keep], record.path[keep], record.low, record.high, reactions,
+        iterations=membrane.iterations, path=record.path,
         path_slope=rates if asked.parameters else None,
         unstable=named(1e3 * levels[unstable], "kPa"),
-    )
+    )  # fmt: skip
     return history, rates[keep]
 
 

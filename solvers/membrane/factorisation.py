@@ -113,13 +113,9 @@ class BandedTangent:
     """LAPACK gbtrf/gbtrs on a renumbered band."""
 
     def __init__(
-        self,
-        rank: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
-        width: int,
-    ) -> None:
+        self, rank: NDArray[np.int64], rows: NDArray[np.int64], columns: NDArray[np.int64],
+        inside: NDArray[np.bool_], width: int,
+    ) -> None:  # fmt: skip
         self.width, self.size = width, len(rank)
         self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.data = np.zeros(self.depth * self.size)
@@ -152,12 +148,9 @@ class SparseTangent:
     """SuperLU with a symmetric-pattern ordering."""
 
     def __init__(
-        self,
-        rows: NDArray[np.int64],
-        columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64], inside: NDArray[np.bool_],
         size: int,
-    ) -> None:
+    ) -> None:  # fmt: skip
         keys, position = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
         self.slot[inside] = position

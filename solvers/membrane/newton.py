@@ -244,12 +244,9 @@ class Loading:
 
 
 def march(
-    loading: Loading,
-    levels: Sequence[float] | Array,
-    asked: Asked,
-    begun: tuple[float, Array] | None = None,
-    done: int = 0,
-) -> Iterator[Array]:
+    loading: Loading, levels: Sequence[float] | Array, asked: Asked,
+    begun: tuple[float, Array] | None = None, done: int = 0,
+) -> Iterator[Array]:  # fmt: skip
     """Yield the displacement (nodes, 3) at each level; the caller accepts it before the next one.
 
     begun : level and displacement to start from; the unloaded membrane otherwise. done : earlier
@@ -411,12 +408,9 @@ class Derivatives:
     """
 
     def __init__(
-        self,
-        membrane: Membrane,
-        parameters: Sequence[str],
-        stress_free: Array | None = None,
+        self, membrane: Membrane, parameters: Sequence[str], stress_free: Array | None = None,
         sheet: SheetSlopes | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))

@@ -60,12 +60,9 @@ class MembraneSolver:
     load_ratios = True
 
     def __init__(
-        self,
-        tolerance: float = 1e-8,
-        wrinkle_stiffness: float | None = None,
-        bending_stiffness: float | None = None,
-        wall: Walls = "band",
-    ) -> None:
+        self, tolerance: float = 1e-8, wrinkle_stiffness: float | None = None,
+        bending_stiffness: float | None = None, wall: Walls = "band",
+    ) -> None:  # fmt: skip
         self.tolerance = tolerance
         self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
@@ -86,13 +83,9 @@ class MembraneSolver:
         return SolverCheck(self.name, True, __version__, True)
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
-        timeout: float | None = None,
-        guess: Array | None = None,
-    ) -> History:
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        timeout: float | None = None, guess: Array | None = None,
+    ) -> History:  # fmt: skip
         """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
         guess : (increments, nodes, 3) displacements to start each increment from, mm.
@@ -101,12 +94,9 @@ class MembraneSolver:
         return self._analyse(model, law, (), guess)[0]
 
     def run_with_sensitivity(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        parameters: Sequence[str] | None = None,
+        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
         guess: Array | None = None,
-    ) -> tuple[History, Array]:
+    ) -> tuple[History, Array]:  # fmt: skip
         """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
 
         The parameters are every entry of the law's beta unless given. Derivatives are per MPa, by

@@ -140,16 +140,10 @@ def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: W
     free = np.setdiff1d(np.arange(points.size), held)
     warp = np.broadcast_to(model.warp, (len(quads), 3))
     return Membrane(
-        points,
-        quads,
-        reference_elements(points, quads, warp),
-        model.thickness,
-        law,
-        free,
-        DrivenTangent(quads, points.size, free, model.driven),
-        tolerance,
+        points, quads, reference_elements(points, quads, warp), model.thickness, law, free,
+        DrivenTangent(quads, points.size, free, model.driven), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-    )
+    )  # fmt: skip
 
 
 def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[History, Array]:
@@ -192,17 +186,12 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
         record.accept(i, u)
     forces, sets = record.forces, model.mesh.node_sets
     history = History(
-        model.load_factor * (forces.reshape(len(levels), -1) @ direction),
-        record.path,
-        record.low,
-        record.high,
-        {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
-        iterations=membrane.iterations,
-        path=record.path,
-        path_slope=rates if parameters else None,
+        model.load_factor * (forces.reshape(len(levels), -1) @ direction), record.path, record.low,
+        record.high, {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
+        iterations=membrane.iterations, path=record.path, path_slope=rates if parameters else None,
         load_slope=model.load_factor * load_slope if parameters else None,
         unstable=named(levels[unstable], "mm of elongation"),
-    )
+    )  # fmt: skip
     return history, rates
 
 
@@ -292,11 +281,8 @@ def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[Histor
     if asked.tell is not None:
         asked.tell(Done(float(len(model.loads))))
     history = History(
-        model.loads.sum(axis=1),
-        moved,
-        np.concatenate([found.strain.min(axis=0), none]),
-        np.concatenate([found.strain.max(axis=0), none]),
-        iterations=patch.iterations,
+        model.loads.sum(axis=1), moved, np.concatenate([found.strain.min(axis=0), none]),
+        np.concatenate([found.strain.max(axis=0), none]), iterations=patch.iterations,
         unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
-    )
+    )  # fmt: skip
     return history, rates

@@ -35,16 +35,12 @@ def history(number=1.0, frames=3):
     random = np.random.default_rng(int(number))
     return History(
         load=number + random.standard_normal(frames),
-        displacement=random.standard_normal((frames, 5, 3)),
-        strain_min=-random.random(3),
+        displacement=random.standard_normal((frames, 5, 3)), strain_min=-random.random(3),
         strain_max=random.random(3),
         reactions={"top": random.standard_normal((frames, 3)), "a b/c": np.zeros((frames, 3))},
-        cavity_pressure=random.random(frames),
-        iterations=17,
-        unstable=("132 kPa",),
-        remarks=(Note(NoteKind.SNAP, "it snapped — once", "at 3 kPa"),),
-        early="no equilibrium",
-    )
+        cavity_pressure=random.random(frames), iterations=17, unstable=("132 kPa",),
+        remarks=(Note(NoteKind.SNAP, "it snapped — once", "at 3 kPa"),), early="no equilibrium",
+    )  # fmt: skip
 
 
 def same(one, other):
