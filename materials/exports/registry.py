@@ -1,6 +1,6 @@
 """The formats that need the card alone: one line each.
 
-A format that carries a solver's own files is with the solver: `solvers/exports.py` has them all.
+A format that carries a solver's own files is with the solver: `solvers/registry.py` has them all.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ def test_tests_near_a_module():
     found = near(ROOT, "experiments/strips/report.py")
     assert "tests/experiments/strips/test_objective.py" in found
     assert "tests/materials/test_law.py" not in found
-    assert "tests/test_ci.py" not in near(ROOT, "writing.py")
+    assert "tests/test_ci.py" not in near(ROOT, "files.py")
 
 
 @pytest.fixture
