@@ -1,11 +1,11 @@
-"""The errors that bubblefit raises on purpose. Each message says what to do next."""
+"""Errors that bubblefit raises on purpose. Each message says what to do next."""
 
 from __future__ import annotations
 
 import unicodedata
 from pathlib import Path
 
-#: Letters of a field that a message shows: a key may be as long as its file.
+#: Letters of a field and of a message that are shown: a key may be as long as its file.
 LONGEST, LONGEST_LINE = 200, 4000
 #: Kinds of characters that would break a line, or steer a terminal.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
@@ -18,16 +18,11 @@ class BubblefitError(Exception):
 
 
 class InputError(BubblefitError):
-    """A project, card, mesh or data file is not usable.
+    """A project, card, mesh or data file that is not usable.
 
-    Parameters
-    ----------
-    path : the file at fault, or None when the input did not come from a file.
-    field : the key, column or line at fault.
-    problem : what is wrong, what was expected and what to do.
+    path : the file at fault, or None when the input did not come from a file. field : the key,
+    column or line at fault. problem : what is wrong, what was expected and what to do.
     """
-
-    exit_code = 2
 
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
         self.path, self.field, self.problem = path, field, problem
@@ -36,38 +31,29 @@ class InputError(BubblefitError):
         super().__init__(one_line(f"{where}: {problem}" if where else problem)[:LONGEST_LINE])
 
     def __reduce__(self) -> tuple:
-        """As for SolverFailure: rebuilt from the fields on the other side of a process border."""
+        # Exceptions cross process borders: rebuild from the fields, not from the text.
         return type(self), (self.path, self.field, self.problem)
 
 
 class OutputError(BubblefitError):
-    """The output folder cannot be written (read-only, full, in use)."""
-
-    exit_code = 2
+    """An output folder that cannot be written (read-only, full, in use)."""
 
 
 class PlugInFailure(BubblefitError):
-    """What another distribution adds does not work; the message names the distribution."""
-
-    exit_code = 2
+    """A plug-in that does not work; the message names its distribution."""
 
 
 class NoFeasibleStart(BubblefitError):
-    """No random start inside the bounds satisfied the constraints."""
+    """A search in which no random start inside the bounds satisfied the constraints."""
 
     exit_code = 3
 
 
 class SolverFailure(BubblefitError):
-    """An analysis did not end well; there is no result.
+    """An analysis that did not end well; there is no result.
 
-    Parameters
-    ----------
-    reason : one line: what happened, at which load.
-    solver : name of the solver.
-    exit_number : the solver's own exit number, where it has one.
-    log_tail : last lines of the solver's log.
-    scratch : folder kept for inspection, or None for in-process solvers.
+    reason : one line: what happened, at which load. exit_number : the solver's own, where it has
+    one. log_tail : last lines of the solver's log. scratch : folder kept for inspection, or None.
     """
 
     exit_code = 4
@@ -93,21 +79,20 @@ class SolverFailure(BubblefitError):
 
     @property
     def line(self) -> str:
-        """The reason, and the folder where one is kept, without the log."""
+        """Return the reason and the folder that is kept, without the log."""
         return f"{self.reason}; scratch kept in {self.scratch}" if self.scratch else self.reason
 
     def __reduce__(self) -> tuple:
-        """Exceptions cross process borders: rebuild from the fields, not from the text."""
         fields = (self.reason, self.solver, self.exit_number, self.log_tail, self.scratch)
         return type(self), fields
 
 
 class LicenceDenied(SolverFailure):
-    """A program that never began, for want of a licence: another try may do."""
+    """A program that never began for want of a licence; another try may succeed."""
 
 
 def one_line(text: str) -> str:
-    """The text with escapes for what a name or a cell may hold and a terminal must not be sent."""
+    """Return the text with escapes in place of characters that break a line or steer a terminal."""
     if text.isprintable():
         return text
     return "".join(

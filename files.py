@@ -1,28 +1,224 @@
-"""Text from Jinja2 templates, all read in one way: what they ask for must be there.
+"""Files and what lies around them: reading, writing, templates, plug-ins, caches of compiled code.
 
-A template may be a user's own, or lie beside a project that somebody else wrote. All are rendered
-in a sandbox: they reach no further than the values they are given, and change none of them.
+Untrusted files are read only where they are regular, no larger than expected, and within a time
+limit. Files are written whole or not at all. Templates may be a user's own, or lie beside a project
+from somebody else: they are rendered in a sandbox, which gives them values and nothing to change.
+Plug-ins are looked up by name without importing anything; one that does not work gives one line
+that names its distribution, and breaks nothing else. Heavy libraries are imported where they are
+used, so that `import bubblefit` stays quick.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import hashlib
+import os
+import re
+import stat
+import sys
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .errors import PlugInFailure
+from .errors import InputError, OutputError, PlugInFailure
 
 if TYPE_CHECKING:
     import jinja2
 
 __version__ = "0.2.0"
-TEMPLATES = Path(__file__).resolve().parent / "templates"
+ROOT = Path(__file__).resolve().parent
+TEMPLATES = ROOT / "templates"
+#: Largest file in bytes: of data, which are read whole into memory, and of text that people write.
+LARGEST, LARGEST_WRITTEN = 2**30, 2**24
+PIECE = 2**22
+#: Opening a pipe does not wait for its writer; 0 on systems without the flag.
+NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+#: Parts of a dotted key.
+MOST_PARTS = 100
+#: Every file with compiled functions. An edit of one must reach the compiled code of all, while
+#: numba's own cache looks only at the file in which a function stands.
+KERNELS = (
+    "materials/point_law.py",
+    "materials/wrinkles.py",
+    "materials/law.py",
+    "materials/responses.py",
+    "meshes/mesh.py",
+    "solvers/membrane/kernel.py",
+)
+
+# Reading
+
+
+def content_of(path: Path | str, most: int = LARGEST) -> bytes:
+    """Read the whole of a regular file of at most `most` bytes; links are followed.
+
+    Raises InputError : a device, a pipe, a name with a NUL in it, a file that is too large.
+    OSError : no such file, no permission, a folder.
+    """
+    too_large = InputError(path, "", f"has more than {most // 2**20} MiB; is it the right file?")
+    check_regular(path)
+    # A pipe may have taken its place by now.
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | NO_WAIT)) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise too_large
+        # In pieces: the size that a file of /proc reports is 0.
+        pieces, size = [], 0
+        while piece := file.read(PIECE):
+            pieces.append(piece)
+            size += len(piece)
+            if size > most:
+                raise too_large
+    return b"".join(pieces)
+
+
+def toml_of(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises InputError : as `content_of`. OSError : it cannot be read. UnicodeDecodeError : it is not
+    in UTF-8. ValueError, RecursionError : it is not TOML.
+    """
+    text = content_of(path, LARGEST_WRITTEN).decode("utf-8")
+    # A key of n parts costs tomllib n squared, in time and memory.
+    plain = text.replace(" ", "").replace("\t", "")
+    if any(part.count(".") > MOST_PARTS for part in re.split(r"[^\w.\"'-]", plain)):
+        raise ValueError(f"a key, or a text, of more than {MOST_PARTS} parts with points between")
+    return tomllib.loads(text)
+
+
+def is_file(path: Path) -> bool:
+    """Return whether there is a regular file of this name, however odd or long the name is."""
+    return os.path.isfile(path)  # Path.is_file raises an OSError where the name is too long
+
+
+def check_regular(path: Path | str) -> None:
+    """Check that a path does not lead to a device or a pipe, which may never end.
+
+    Raises InputError : it does, or no file can have such a name. OSError : there is no such file.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except ValueError:
+        shown = str(path).replace("\0", "\\0")
+        raise InputError(shown, "", "no file can have such a name") from None
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise InputError(path, "", "is no regular file but a device or a pipe; copy it into a file")
+
+
+def checksum(path: Path | str) -> str:
+    """Return the SHA-256 of a file's content in hexadecimal digits; InputError if unreadable."""
+    try:
+        with open(path, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+
+
+def process_context() -> Any:
+    """Return the context of multiprocessing in which processes are started.
+
+    It is the one that the program has chosen (`multiprocessing.set_start_method`). Otherwise fork
+    on Linux, where compiled kernels and data are there already and no script needs a guard around
+    its main part, and spawn elsewhere.
+    """
+    import multiprocessing
+
+    forks = sys.platform == "linux" and hasattr(os, "fork")
+    chosen = multiprocessing.get_start_method(allow_none=True)
+    return multiprocessing.get_context(chosen or ("fork" if forks else "spawn"))
+
+
+def ends(call: Callable[[], object], seconds: float) -> bool:
+    """Return whether a call ends within `seconds`, in any way but a crash of its process.
+
+    It is tried in a process of its own; errors are left to the caller's own call. A daemonic
+    process (a worker of a cluster) may not start another, and nothing is tried there.
+
+    call : picklable where processes are spawned.
+    """
+    import multiprocessing
+
+    if multiprocessing.current_process().daemon:
+        return True
+    process = process_context().Process(target=_quietly, args=(call,), daemon=True)
+    process.start()
+    process.join(seconds)
+    if process.is_alive():
+        process.kill()
+    process.join()
+    return bool(process.exitcode == 0)
+
+
+def _quietly(call: Callable[[], object]) -> None:
+    with suppress(Exception, KeyboardInterrupt):
+        call()
+
+
+# Writing
+
+
+@contextmanager
+def output_errors(path: Path | str) -> Iterator[None]:
+    """Turn an OSError within the block into an OutputError about `path`."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        problem = f"cannot be written: {reason}; free space or choose another --out"
+        raise OutputError(f"{path}: {problem}") from error
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place when the block ends well.
+
+    The parent folder is made. A reader sees the old file or the new one, never half of one.
+
+    Raises OutputError : the folder cannot be written or the disk is full.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    with output_errors(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a file whole, in UTF-8, onto the disk; OutputError as of `replacing`."""
+    with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def remove_unfinished(folder: Path | str) -> None:
+    """Remove the temporary files of `replacing` that processes which are gone left in a folder."""
+    import psutil
+
+    for path in Path(folder).glob(".*"):
+        found = re.fullmatch(r"\..*\.(\d+)(\.[^.]*)?", path.name)
+        if found is None or not path.is_file():
+            continue
+        with suppress(OverflowError):  # no number of a process
+            if psutil.pid_exists(int(found[1])):
+                continue
+        with suppress(OSError):
+            path.unlink()
+
+
+# Templates
 
 
 def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environment:
-    """Where templates are found, and how they are read.
+    """Return a sandboxed environment in which a missing variable is an error.
 
     html : whether values are escaped.
     """
@@ -40,51 +236,33 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
 
 
 def render(template: str, /, **context: Any) -> str:
-    """Text of `template` (a path below templates/).
+    """Return the text of `template` (a path below templates/) with the values of `context`.
 
-    Raises
-    ------
-    jinja2.UndefinedError : the template asks for what the context does not have.
+    Raises jinja2.UndefinedError : the template asks for a variable that the context does not have.
     """
     import jinja2
 
     return environment(jinja2.FileSystemLoader(TEMPLATES)).get_template(template).render(context)
 
 
-# What other distributions add: laws, kinds of test, readers and solvers, by entry points.
-#
-# Names are looked up without importing anything; a plug-in is imported when its name is asked for.
-# One that does not work is one line that names the distribution, and breaks nothing else.
+# Plug-ins
 
 Group = Literal["bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers"]
 
 
 @dataclass(frozen=True)
 class PlugIn:
-    """One thing that another distribution offers.
-
-    Parameters
-    ----------
-    name : what a project file or an option calls it.
-    distribution : who offers it, "NAME VERSION".
-    entry : of the distribution's metadata; not imported yet.
-    """
+    """An entry point of another distribution, "NAME VERSION", that is not imported yet."""
 
     name: str
     distribution: str
     entry: EntryPoint
 
     def load(self, what: str = "", needs: Sequence[str] = ()) -> Any:
-        """Import what the entry point names.
+        """Import the object that the entry point names.
 
-        Parameters
-        ----------
-        what : what it should be, in a word, for the complaint: "form".
-        needs : attributes that it must have to be one.
-
-        Raises
-        ------
-        PlugInFailure : it cannot be imported, or lacks one of `needs`.
+        what : what it should be, in a word, for the complaint: "form". needs : attributes that it
+        must have. Raises PlugInFailure : it cannot be imported, or lacks one of `needs`.
         """
         try:
             thing = self.entry.load()
@@ -98,12 +276,10 @@ class PlugIn:
         return thing
 
     def failure(self, what: str, error: BaseException | None = None) -> PlugInFailure:
-        """The plug-in is at fault: one line that names the distribution.
+        """Return an error of one line that names the distribution.
 
-        Parameters
-        ----------
-        what : what it does, "fails its check".
-        error : what it raised; its class and the first line of its message are told.
+        what : what the plug-in does, "fails its check". error : what it raised; its class and the
+        first line of its message are shown.
         """
         cause = ""
         if error is not None:
@@ -114,7 +290,7 @@ class PlugIn:
 
 
 def plug_ins(group: Group) -> list[PlugIn]:
-    """Every plug-in of a group that is installed, by name; two of one name are both there."""
+    """Return the installed plug-ins of a group by name, both where two have one name."""
     offers = {}
     for entry in entry_points(group=group):
         # An editable install may be listed twice.
@@ -123,12 +299,7 @@ def plug_ins(group: Group) -> list[PlugIn]:
 
 
 def plug_in_named(group: Group, name: str) -> PlugIn | None:
-    """The plug-in of that name, or None.
-
-    Raises
-    ------
-    PlugInFailure : two distributions offer it.
-    """
+    """Return the plug-in of that name, or None; PlugInFailure where two distributions offer it."""
     offers = [plug_in for plug_in in plug_ins(group) if plug_in.name == name]
     if len(offers) > 1:
         both = " and ".join(offer.distribution for offer in offers)
@@ -137,20 +308,72 @@ def plug_in_named(group: Group, name: str) -> PlugIn | None:
 
 
 def names_with(group: Group, ours: Iterable[str]) -> tuple[str, ...]:
-    """Our own names in their order, then those that plug-ins add, sorted.
+    """Return our own names in their order, then those that plug-ins add, sorted.
 
-    A plug-in with one of our names adds none: it never takes the place of one of ours, so whoever
-    looks a name up asks for ours first.
+    A plug-in never takes the place of one of ours: look a name up among ours first.
     """
     ours = tuple(ours)
-    theirs = {plug_in.name for plug_in in plug_ins(group)} - {*ours}
-    return (*ours, *sorted(theirs))
+    return (*ours, *sorted({plug_in.name for plug_in in plug_ins(group)} - {*ours}))
 
 
 def _distribution(entry: EntryPoint) -> str:
     try:
         if entry.dist is not None:
             return f"{entry.dist.name} {entry.dist.version}"
-    except Exception:  # noqa: S110 - a damaged installation: what it is called is only for the message
+    except Exception:  # noqa: S110 - a damaged installation: the name is only for the message
         pass
     return f"an unknown distribution ({entry.value})"
+
+
+# Caches of compiled code: kernels here, material libraries and ccx in solvers/calculix
+
+
+def cache_folder() -> Path:
+    """Return $BUBBLEFIT_CACHE, else the user's cache folder of this system; it may not exist yet.
+
+    On Linux that is bubblefit/ in $XDG_CACHE_HOME or ~/.cache.
+    """
+    from platformdirs import user_cache_path
+
+    named = os.environ.get("BUBBLEFIT_CACHE")
+    return Path(named) if named else user_cache_path("bubblefit", appauthor=False)
+
+
+@cache
+def _kernel_folder() -> Path | None:
+    """Return the folder of the kernels compiled from exactly these sources; None if unwritable."""
+    digest = hashlib.sha256()
+    for name in KERNELS:
+        digest.update((ROOT / name).read_bytes())
+    folder = cache_folder() / f"kernels-{digest.hexdigest()[:12]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK | os.X_OK) else None
+
+
+def kernels_are_compiled() -> bool:
+    """Return whether compiled kernels of these sources are kept; else a run compiles first."""
+    folder = _kernel_folder()
+    return folder is not None and next(folder.rglob("*.nbc"), None) is not None
+
+
+def compiled(**options: Any) -> Callable[[Any], Any]:
+    """Return `numba.njit(**options)`, cached where a folder can be written."""
+    import numba
+
+    def decorate(function: Any) -> Any:
+        folder = _kernel_folder()
+        if folder is None:
+            return numba.njit(**options)(function)
+        # numba reads this setting once, here; other packages' functions keep their own.
+        settings: Any = numba.config
+        before = settings.CACHE_DIR
+        settings.CACHE_DIR = str(folder)
+        try:
+            return numba.njit(cache=True, **options)(function)
+        finally:
+            settings.CACHE_DIR = before
+
+    return decorate

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from pathlib import Path
 
-from .writing import replacing
+from .files import replacing
 
 #: The table of the notes in an output folder, and what a page says of it.
 NOTES = "notes.csv"

@@ -11,7 +11,7 @@ from ..errors import InputError, OutputError
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of, write_tables
 from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.kinds import Output
-from ..files import __version__
+from ..files import __version__, replacing
 from ..materials.card import read_card
 from ..materials.designers import Minimise, Options
 from ..materials.exports.base import Export, Option, options_of
@@ -20,8 +20,7 @@ from ..notes import rows, write_notes
 from ..project.project import read_project
 from ..readers.biaxial import plain_ratio
 from ..runs.folder import Store
-from ..solvers.exports import FORMATS
-from ..writing import replacing
+from ..solvers.registry import FORMATS
 from .options import (
     AS_JSON,
     DATA,

@@ -20,6 +20,7 @@ from ..experiments.strips.gauge import (
     loads_at_frames,
     virtual_strain_gauge,
 )
+from ..files import replacing
 from ..notes import lines as note_lines
 from ..project.project import read_project
 from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
@@ -29,7 +30,6 @@ from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save
 from ..runs.check import check
-from ..writing import replacing
 from .options import (
     DATA,
     PROJECT,

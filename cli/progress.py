@@ -18,7 +18,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from ..caching import kernels_are_compiled
+from ..files import kernels_are_compiled
 from ..runs.predictions import RunEvent
 from ..runs.simulation import Step
 from ..runs.starts import EvaluationRecord, Stage, StartRecord

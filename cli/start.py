@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError
+from ..files import write_text
 from ..project.new_project import writable_kinds, write_project
 from ..project.schema import schema_text
-from ..writing import write_text
 from .options import numbers
 from .terminal import FILE, command
 

@@ -21,8 +21,7 @@ from typing import IO, Any
 import click
 
 from ..errors import BubblefitError, OutputError
-from ..files import __version__
-from ..writing import telling
+from ..files import __version__, output_errors
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 FILE = click.Path(path_type=Path)
@@ -249,7 +248,7 @@ class Events:
         ------
         OutputError : it cannot be written.
         """
-        with telling(path):
+        with output_errors(path):
             # A device or a redirected stdout is appended to.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"
             self._file = open(path, mode, encoding="utf-8")

@@ -20,9 +20,8 @@ from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
+from ..files import replacing, toml_of
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
-from ..reading import toml_of
-from ..writing import replacing
 from .forms.base import (
     COMPONENTS,
     STRAIN_NAMES,

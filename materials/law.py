@@ -20,8 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..caching import compiled
 from ..errors import InputError
+from ..files import compiled
 from .forms.base import (
     COMPONENTS,
     EVEN,

@@ -16,7 +16,7 @@ not, and d(stress)/d(strain) is the modulus at the END of the increment.
 
 import math
 
-from ..caching import compiled
+from ..files import compiled
 from .forms.base import EVEN, Array
 
 #: An increment of strain across the end of a piece is not divided by where it is smaller.

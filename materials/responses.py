@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..caching import compiled
 from ..errors import InputError
+from ..files import compiled
 from .forms.base import COMPONENTS, UNLIMITED, Array
 from .law import HypoelasticLaw, law_slopes
 from .point_law import (

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from ..caching import compiled
+from ..files import compiled
 from .forms.base import Array
 from .point_law import increment_modulus, log_strain, referred_stress, stress_update
 

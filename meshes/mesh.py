@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..caching import compiled
+from ..files import compiled
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
-from ..files import TEMPLATES, __version__, render
+from ..files import TEMPLATES, __version__, render, write_text
 from ..inference.methods import method_names
 from ..materials.forms.base import form_names
-from ..writing import write_text
 from .project import read_project
 
 #: What a test is like unless something else is said; mm and kPa.

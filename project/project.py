@@ -13,6 +13,7 @@ import tomli_w
 from ..errors import InputError
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
+from ..files import content_of, is_file
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import form_settings
@@ -22,7 +23,6 @@ from ..readers.sections import (
     PRESSURE_UNITS,
     beside,
 )
-from ..reading import content_of, is_file
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from ..errors import InputError
 from ..experiments.registry import kind_named, kinds
-from ..files import plug_in_named, plug_ins
+from ..files import plug_in_named, plug_ins, toml_of
 from ..readers.sections import (
     LengthUnit,
     ModulusUnit,
@@ -25,7 +25,6 @@ from ..readers.sections import (
     StrainTriple,
     first_error,
 )
-from ..reading import toml_of
 from ..solvers.registry import solver_sections
 from .cards import CardSection
 

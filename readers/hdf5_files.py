@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reading import ends
+from ..files import ends
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Bytes of one array at most: a frame of a million points has 48 MB.

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..reading import content_of
+from ..files import content_of
 from .hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
 
 #: Bytes that one compressed variable may have when it is unpacked: at most, always, and by what it

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..reading import ends
+from ..files import ends
 from .columns import MOST_NAMES, split_unit
 from .machine_tables import Channel, in_unit
 from .tables import HOLES, read_lines

@@ -17,8 +17,7 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 from ..errors import BubblefitError, InputError, PlugInFailure
-from ..files import PlugIn, names_with, plug_in_named, plug_ins
-from ..reading import check_regular
+from ..files import PlugIn, check_regular, names_with, plug_in_named, plug_ins
 
 #: What a file holds, and what the `read` of its formats is called with and gives:
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..reading import content_of
+from ..files import content_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
-from ..files import __version__
+from ..files import __version__, write_text
 from ..runs.check import Check
-from ..writing import write_text
 from .content import Exhibit, Report, Section, Table
 from .html import write_report
 

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import InputError
-from ..writing import write_text
+from ..files import write_text
 from .charts import Chart, Charts, Series
 from .maps import Maps, Solid
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..experiments.kinds import by_strain
 from ..experiments.registry import report_of
-from ..files import __version__
+from ..files import __version__, replacing
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
@@ -23,7 +23,6 @@ from ..notes import NOTES, NOTES_ARE, write_notes
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Store
 from ..runs.record import Record
 from ..runs.result import STRAINS, answer_at, coefficients_of
-from ..writing import replacing
 from .charts import Charts
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report

@@ -17,9 +17,8 @@ from jinja2 import FileSystemLoader
 from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
-from ..files import TEMPLATES, environment
+from ..files import TEMPLATES, environment, replacing
 from ..notes import percent as percent
-from ..writing import replacing
 from . import maps, vega
 from .charts import Charts
 from .content import Report, as_written, write_page_data

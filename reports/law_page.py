@@ -12,10 +12,10 @@ import pandas as pd
 from ..errors import SolverFailure
 from ..experiments.kinds import CardRun, Output, Shown
 from ..experiments.registry import report_of
+from ..files import replacing
 from ..notes import NOTES, NOTES_ARE, write_notes
 from ..runs.compare import AS_GOOD, LawComparison, noise
 from ..runs.folder import RESULT, Store
-from ..writing import replacing
 from .content import Report, Section, Table, pictures
 from .html import write_report
 from .studies import LawRow, law_charts

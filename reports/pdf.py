@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from ..errors import OutputError
-from ..writing import replacing
+from ..files import replacing
 
 #: Programs that print pages, in the order in which they are looked for.
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome",

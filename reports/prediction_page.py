@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
+from ..files import replacing
 from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
 from ..runs.folder import RESULT, Store
-from ..writing import replacing
 from .content import Exhibit, Report, Section, Table
 from .fit_page import citation, record_tables
 from .html import percent, write_report

@@ -23,9 +23,8 @@ from zlib import crc32
 
 from markupsafe import Markup, escape
 
-from ..caching import cache_folder
 from ..errors import OutputError
-from ..writing import replacing
+from ..files import cache_folder, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
 
 Spec = dict[str, Any]

@@ -11,8 +11,8 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..files import replacing, write_text
 from ..meshes.mesh import Mesh
-from ..writing import replacing, write_text
 
 
 def write_vtu(

@@ -23,12 +23,11 @@ from typing import Any
 import cloudpickle
 from threadpoolctl import threadpool_limits
 
-from .. import __version__
 from ..errors import BubblefitError, InputError
+from ..files import __version__
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
-from ..solvers.process import Unwanted, unless
-from ..solvers.scheduler import ANSWER_S, connected
+from ..solvers.process import ANSWER_S, Unwanted, connected, unless
 from .executor import Task
 
 log = logging.getLogger(__name__)

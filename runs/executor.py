@@ -24,10 +24,10 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from ..errors import BubblefitError
+from ..files import process_context
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..project.project import Project
-from ..reading import process_context
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.scratch import remove_interrupted, sweep_left
 from .starts import EvaluationRecord, MeshName, StartRecord, run_start
@@ -72,7 +72,7 @@ class Executor:
         InputError : no scheduler answers, or Dask is not installed.
         """
         if self.scheduler is not None:
-            from ..solvers.scheduler import check
+            from ..solvers.process import check
 
             check(self.scheduler)
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..experiments.kinds import RunRecord
+from ..files import output_errors, remove_unfinished, replacing, write_text
 from ..notes import Note, NoteKind
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
-from ..writing import remove_cut, replacing, telling, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -165,8 +165,8 @@ class Store:
             raise InputError(self.path, "", problem)
         if resume:
             self._check(parts, facts or {})
-        remove_cut(self.path)
-        with telling(self.path):
+        remove_unfinished(self.path)
+        with output_errors(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
             for name in (*OUTDATED, *(() if resume else records)):
                 (self.path / name).unlink(missing_ok=True)
@@ -182,7 +182,7 @@ class Store:
         ------
         OutputError : it cannot be written.
         """
-        with telling(self.path):
+        with output_errors(self.path):
             for name in (RESULT, RUN):
                 (self.path / name).unlink(missing_ok=True)
 
@@ -349,13 +349,13 @@ class KeptAnalyses(RunCache):
         """As of `RunCache`; raises OutputError where what is there cannot be removed."""
         if not self._begun:
             self._begun = True
-            remove_cut(self.folder.parent)
-            with telling(self.folder):
+            remove_unfinished(self.folder.parent)
+            with output_errors(self.folder):
                 if self.folder.exists() and not self._resume:
                     shutil.rmtree(self.folder)
         return super().read(key)
 
     def not_kept(self, error: OSError) -> None:
         """Raises OutputError: the study's own tables would not be written either."""
-        with telling(self.folder):
+        with output_errors(self.folder):
             raise error

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..content import digest_of
 from ..errors import InputError, SolverFailure
 from ..experiments.kinds import (
     Predicted,
@@ -34,6 +33,7 @@ from ..project.cards import Cards
 from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
+from ..solvers.run_cache import digest_of
 from .executor import Task, executor_of
 from .folder import PROVENANCE, RunRecords
 from .presenters import failure_page, write_report

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..experiments.kinds import files_of
-from ..files import __version__
+from ..files import __version__, checksum, write_text
 from ..project.project import Project, plain, project_text, settings_of
 from ..solvers.base import Solver
-from ..writing import checksum, write_text
 from .folder import AS_RUN, PROVENANCE
 from .setup import UNCOUNTED, FitSetup
 

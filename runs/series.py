@@ -14,6 +14,7 @@ import pandas as pd
 from ..errors import InputError
 from ..experiments.kinds import Refined, Studied, Test, notes_of, other_thickness
 from ..experiments.registry import kinds
+from ..files import replacing, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, Note, write_notes
@@ -25,7 +26,6 @@ from ..reports.fit_page import citation
 from ..reports.html import write_report
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from ..writing import replacing, write_text
 from .folder import RESULT, Store
 from .simulation import Analyses, Progress
 

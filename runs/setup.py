@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..content import digest_of
 from ..errors import InputError
 from ..experiments.kinds import (
     STRAINS,
@@ -42,6 +41,7 @@ from ..project.schema import BoundsSection, UnknownSection
 from ..readers.sections import beside
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
+from ..solvers.run_cache import digest_of
 from .folder import PARTS, RUN
 from .starts import HEADER, HISTORY, StartRecord
 

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import SolverFailure
 from ..experiments.kinds import CardRun, Output, Simulation, Test, notes_of, other_thickness
 from ..experiments.registry import report_of
+from ..files import write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, rows, write_notes
@@ -19,7 +20,6 @@ from ..project.project import Project
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import Once, RunCache, run_cache
-from ..writing import write_text
 from .starts import timed
 
 

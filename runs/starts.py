@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.kinds import RunRecord, strains_of
+from ..files import output_errors
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..inference.search import feasible_start, fit_from
-from ..writing import telling
 from .folder import Store
 
 #: On which mesh something ran: on that of the project, or on the coarse one that leads to it.
@@ -235,7 +235,7 @@ class RunningFiles:
         lines = [json.dumps(record.to_json()) + "\n" for record in done]
         self.store.write(STARTS, "".join(lines))
         self.store.write(HISTORY, _table([[*HEADER, *self.columns], *rows]))
-        with telling(self.store.path):
+        with output_errors(self.store.path):
             # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
             self._starts = open(self.store.path / STARTS, "ab", buffering=0)
             self._rows = open(self.store.path / HISTORY, "ab", buffering=0)
@@ -249,7 +249,7 @@ class RunningFiles:
         OutputError : it cannot be written.
         """
         assert self._rows is not None and self._starts is not None
-        with telling(self.store.path):
+        with output_errors(self.store.path):
             if isinstance(record, StartRecord):
                 _append(self._starts, json.dumps(record.to_json()) + "\n")
                 os.fsync(self._starts.fileno())

@@ -24,7 +24,7 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import report_of
-from ..files import __version__
+from ..files import __version__, replacing
 from ..inference.comparison import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
@@ -32,7 +32,6 @@ from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, rows, write_notes
 from ..project.project import Project
-from ..writing import replacing
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of

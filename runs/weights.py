@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..files import __version__
+from ..files import __version__, replacing
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows, write_notes
 from ..project.project import Project
-from ..writing import replacing
 from .compare import errors
 from .fit import FitEvent
 from .result import Fit

@@ -1,4 +1,4 @@
-"""Four bars whose end stresses another program has published: does a solver carry the law?"""
+"""Four bars with published end stresses of another program: does a solver carry the law?"""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ SIZE = 10.0
 
 @dataclass(frozen=True)
 class Bar:
-    """A uniaxial test of Valmex 7318 computed with MSC Marc.
+    """A uniaxial test of Valmex 7318 computed with MSC Marc (Composite Structures, 2017).
 
     modulus: E of log strain, constant term first, GPa; elongation: engineering strain at the
-    end; stress: Marc's end stress, MPa. Source: the published models of the uniaxial tests
-    (Composite Structures, 2017).
+    end; stress: Marc's end stress, MPa.
     """
 
     model: str
@@ -46,43 +45,36 @@ BARS = (
 
 
 def bar_law(model: str) -> HypoelasticLaw:
-    """The law of a published model; the shear modulus (20 MPa) plays no part in a bar."""
+    """Return the law of a published model; the shear modulus (20 MPa) plays no part in a bar."""
     of = {bar.direction: bar.modulus for bar in BARS if bar.model == model}
     gigapascal = (0.0, 0.0, 0.0, 0.02, *of["fill"][::-1], *of["warp"][::-1])
     return HypoelasticLaw(1e3 * np.array(gigapascal))
 
 
 def difference(stresses: tuple[float, ...]) -> float:
-    """Largest relative difference of end stresses (MPa), in the order of BARS, from Marc's."""
+    """Return the largest relative difference of end stresses (MPa) of BARS from Marc's."""
     return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
 
 
 def bar_model(bar: Bar) -> UniaxialModel:
-    """A bar as a strip of one element (half of its width), free to contract; thickness 1 mm."""
+    """Return a strip of one element (half of its width), free to contract; thickness 1 mm."""
     return straight_strip(
-        "warp" if bar.direction == "warp" else "fill",
-        gauge_length=SIZE,
-        final_length=SIZE * (1.0 + bar.elongation),
-        thickness=1.0,
-        width=2.0 * SIZE,
-        increments=INCREMENTS,
-        across=1,
-        along=1,
-    )
+        "warp" if bar.direction == "warp" else "fill", gauge_length=SIZE,
+        final_length=SIZE * (1.0 + bar.elongation), thickness=1.0, width=2.0 * SIZE,
+        increments=INCREMENTS, across=1, along=1,
+    )  # fmt: skip
 
 
 def stress_of(model: UniaxialModel, history: History) -> float:
-    """Cauchy stress (MPa) at the end: load over the section there; the thickness is constant."""
+    """Return the Cauchy stress (MPa) at the end: load over section; the thickness is constant."""
     width = np.ptp(model.mesh.points[:, 0] + history.displacement[-1, :, 0])
     return float(history.load[-1] / (model.load_factor * width * model.thickness))
 
 
 def strip_stresses(solver: Solver) -> tuple[float, ...]:
-    """End stresses (MPa) of BARS by a solver's own uniaxial analysis.
+    """Return the end stresses (MPa) of BARS by a solver's own uniaxial analysis.
 
-    Raises
-    ------
-    SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
+    Raises SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
     """
     found = []
     for bar in BARS:
@@ -95,16 +87,13 @@ def strip_stresses(solver: Solver) -> tuple[float, ...]:
     return tuple(found)
 
 
-Stresses = tuple[float, ...] | None
-
-
 def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
-    """The embedded solver first, then our others as each says itself, then every plug-in.
+    """Diagnose the embedded solver, then our others, then every plug-in.
 
     programs : by the option that names a solver's program (`ccx`, `marc`), the one to look at.
     """
     ours = [make for make in SOLVERS.values() if isinstance(make, Offer)]
-    ours.sort(key=lambda offer: offer.program is not None)  # what needs no program is embedded
+    ours.sort(key=lambda offer: offer.program is not None)  # the embedded ones have no program
     found = []
     for offer in ours:
         found += offer.diagnose(programs.get(offer.program.name) if offer.program else None)
@@ -112,11 +101,11 @@ def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
 
 
 def _plug_in(plug_in: PlugIn) -> Diagnosis:
-    """Its own word, and the bars where it runs strips; whatever it does, the others are told."""
+    """Diagnose a plug-in, on the bars where it runs strips; never raises on its account."""
     origin = f"plug-in of {plug_in.distribution}"
 
     def found(
-        version: str, advice: str, usable: bool = False, stresses: Stresses = None
+        version: str, advice: str, usable: bool = False, stresses: tuple[float, ...] | None = None
     ) -> Diagnosis:
         off = None if stresses is None else difference(stresses)
         return Diagnosis(plug_in.name, version, None, origin, False, None, usable,

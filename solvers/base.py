@@ -1,4 +1,4 @@
-"""What every solver takes and gives."""
+"""The solver protocol, the results of an analysis, and what every adapter needs to produce them."""
 
 from __future__ import annotations
 
@@ -19,24 +19,22 @@ from ..meshes.mesh import Mesh, log_strain_of
 from ..notes import Note
 from .membrane.kernel import reference_elements
 
-Array = NDArray[np.float64]
+log = logging.getLogger(__name__)
 
+T = TypeVar("T")
+Array = NDArray[np.float64]
 #: Loads that are named one by one; of more, the first and the last.
 FEW = 3
 
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
-    """What a differentiating solver may be asked for: entries of beta, nu12, and the model's own.
-
-    A model's own are its `parameters`, which its `with_parameters` changes; not every model has
-    any.
-    """
+    """Return the parameters of derivatives: entries of beta, nu12, and the model's `parameters`."""
     own = getattr(model, "parameters", ())
     return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *own)
 
 
 def instability(unstable: Sequence[str] | None) -> str:
-    """That equilibria at these loads (in words) are unstable; "" where there are none."""
+    """Return a warning that equilibria at these loads (in words) are unstable, "" without any."""
     if not unstable:
         return ""
     places = ", ".join(unstable)
@@ -47,7 +45,7 @@ def instability(unstable: Sequence[str] | None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """What an analysis that ended well reports, frame by frame.
+    """Results of an analysis that ended well, frame by frame.
 
     load (frames,) pressure in MPa, or the force on a whole strip in N, and load_slope (frames,
     parameters) its derivatives where the solver has them; displacement (frames, nodes, 3) mm;
@@ -55,14 +53,13 @@ class History:
     gamma12) log strain; cavity pressure (MPa) and volume (mm^3), (frames,), where there is a
     cavity; path: displacement at every increment (increments, nodes, 3) and its derivatives
     path_slope (..., parameters), where the solver keeps them (a start for the next run); unstable:
-    at which of the reported loads the equilibrium is, in words ("132 kPa"), empty where all are
-    stable, None where the solver did not look; wrinkled: share of the reference surface that
-    carries no stress in one direction (frames,), None likewise; iterations: what the solver
-    counts as its work; remarks: what a reader of the result should know (plain words are notes of
-    the kind "of the solver"); early: the solver's own word for an end before the model's last
-    frame (it found no equilibrium further on), "" where there is none: fewer frames without it
-    are no result; seconds that the run itself took, where a cache keeps it, None where nobody does;
-    from_cache: whether it was made earlier and nothing ran now.
+    reported loads with an unstable equilibrium, in words ("132 kPa"), empty where all are stable,
+    None where the solver did not look; wrinkled: share of the reference surface that carries no
+    stress in one direction (frames,), None likewise; iterations: the solver's count of its work;
+    remarks: notes for the reader (plain words are of the kind "of the solver"); early: the solver's
+    reason for an end before the model's last frame (no equilibrium further on), "" where there is
+    none: fewer frames without it are no result; seconds of the run itself, where a cache keeps
+    them; from_cache: whether it was made earlier and nothing ran now.
     """
 
     load: Array
@@ -85,17 +82,16 @@ class History:
 
     @property
     def stable(self) -> bool | None:
-        """Whether every equilibrium that is reported is; None where the solver did not look."""
+        """Return whether every reported equilibrium is stable; None where nobody looked."""
         return None if self.unstable is None else not self.unstable
 
 
 @dataclass(frozen=True)
 class BandEnd:
-    """One of the walls between which a solver's answer to a model lies.
+    """One of the two walls between which a solver's answer to a model lies.
 
-    name : in tables and figures. meaning : what the wall does, for who reads them. options : what
-    the solver is made with to take this wall, beside its own. predicted : whether it is what the
-    solver predicts, or only the other end of the band.
+    name : in tables and figures. meaning : what the wall does. options : of the solver that takes
+    this wall, beside its own. predicted : whether it is the prediction or only the other end.
     """
 
     name: str
@@ -106,7 +102,7 @@ class BandEnd:
 
 @dataclass(frozen=True)
 class SolverCheck:
-    """Whether a solver is there and carries the law: what `check` found."""
+    """Result of `Solver.check`: whether it is installed and carries the law."""
 
     name: str
     available: bool
@@ -117,13 +113,13 @@ class SolverCheck:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """One solver on this machine: what it is, where, and what published bars showed.
+    """One solver on this machine, with the result of the published bars.
 
-    external_materials: whether it can load material libraries (None: embedded, a plug-in, or not
-    to be seen). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference:
-    the largest relative one from Marc's; None where the bars did not run. expected: somebody chose
-    this solver, so that it has to work. advice: one line, what to do or what was not tried.
-    remark: what else it says of itself, in a few words.
+    external_materials: whether it can load material libraries (None: embedded, a plug-in, or
+    unknown). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference: the
+    largest relative one from Marc's; None where the bars did not run. expected: somebody chose this
+    solver, so it has to work. advice: one line, what to do or what was not tried. remark: a few
+    more words.
     """
 
     name: str
@@ -140,84 +136,143 @@ class Diagnosis:
 
 
 class Progress(Protocol):
-    """How far a run is."""
+    """Progress of a run."""
 
     @property
     def time(self) -> float:
-        """Increments of the model that are done, parts of one included."""
+        """Return how many increments of the model are done, parts of one included."""
 
 
 @runtime_checkable
 class Solver(Protocol):
     """A way to run a model; picked by name in `registry`.
 
-    name : what a project file or --solver calls it. external : whether it runs in a process of its
-    own; then it is checked before anything is run with it.
+    name : in project files and of --solver. external : whether it runs in a process of its own and
+    is checked before anything is run with it. progress : called with every increment that is done.
     """
 
     name: str
     external: bool
-    #: Called with every increment that is done while a run is under way, where it is set.
     progress: Callable[[Any], None] | None
 
     @property
     def identity(self) -> str:
-        """What a result depends on beside model and law: name, version, settings that matter.
+        """Return what a result depends on beside model and law: name, version, settings.
 
-        Files (templates, blocks of a site) count by what is in them, not by where they lie. A
-        result is taken up again only where this is the same.
+        Files (templates, blocks of a site) count by content. A result is resumed only where this is
+        the same.
         """
         ...
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Run the model; SolverFailure when it does not end well."""
         ...
 
     def check(self) -> SolverCheck:
-        """Is it installed, which version, does it carry the law?"""
+        """Check the installation: version, and whether it carries the law."""
         ...
 
 
 @runtime_checkable
 class ProgramSolver(Solver, Protocol):
-    """A solver that says which files run, so that a run of another program is another run."""
+    """A solver that names the files which run: a run of another program is another run."""
 
     @property
     def programs(self) -> Sequence[Path]:
-        """Programs and libraries; they count by content. SolverFailure where one is not there."""
+        """Return programs and libraries, which count by content; SolverFailure if one is absent."""
         ...
 
 
 @runtime_checkable
 class BandedSolver(Solver, Protocol):
-    """A solver whose answer to some models is a band."""
+    """A solver that answers some models by a band."""
 
     def band(self, model: Any) -> Sequence[BandEnd]:
-        """Its ends, first what is predicted; none where the model has one answer."""
+        """Return the ends, the prediction first; none where the model has one answer."""
         ...
 
 
-def carries_load_ratios(solver: Solver) -> bool:
-    """Whether a solver takes laws whose moduli depend on the ratio of the loads.
+@runtime_checkable
+class DifferentiatingSolver(Solver, Protocol):
+    """A solver that also differentiates its displacements, and takes a start for its path."""
 
-    It says so by an attribute `load_ratios` that is true.
-    """
+    def run(
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        timeout: float | None = None, guess: Array | None = None,
+    ) -> History:  # fmt: skip
+        """Run from `guess` where given."""
+        ...
+
+    def run_with_sensitivity(
+        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
+        guess: Array | None = None,
+    ) -> tuple[History, Array]:  # fmt: skip
+        """Run; return also d displacement / d parameters, (frames, nodes, 3, len(parameters)).
+
+        parameters : some of `parameters_of`; every entry of the law's beta unless given.
+        """
+        ...
+
+
+class WrappedSolver:
+    """All of the protocol `Solver` but `run`, forwarded to the solver within."""
+
+    def __init__(self, solver: Any) -> None:
+        self.solver = solver
+        self.name: str = solver.name
+        self.external: bool = solver.external
+
+    @property
+    def progress(self) -> Callable[[Any], None] | None:
+        """Return the listener of a run on its way."""
+        listener: Callable[[Any], None] | None = self.solver.progress
+        return listener
+
+    @progress.setter
+    def progress(self, listener: Callable[[Any], None] | None) -> None:
+        self.solver.progress = listener
+
+    @property
+    def identity(self) -> str:
+        """Return the identity of the solver within."""
+        return str(self.solver.identity)
+
+    @property
+    def keep(self) -> bool:
+        """Return whether folders of runs are kept."""
+        return bool(getattr(self.solver, "keep", False))
+
+    @property
+    def load_ratios(self) -> bool:
+        """Return whether it runs laws that depend on the load ratio."""
+        return carries_load_ratios(self.solver)
+
+    def check(self) -> SolverCheck:
+        """Check the solver within."""
+        found: SolverCheck = self.solver.check()
+        return found
+
+
+class WrappedBand:
+    """The band of the solver within, for a `WrappedSolver` around a `BandedSolver`."""
+
+    solver: Any
+
+    def band(self, model: Any) -> list[BandEnd]:
+        """Return the ends of the band; nothing is run."""
+        return list(self.solver.band(model))
+
+
+def carries_load_ratios(solver: Solver) -> bool:
+    """Return whether a solver takes laws of the load ratio: its attribute `load_ratios`."""
     return bool(getattr(solver, "load_ratios", False))
 
 
 def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
-    """Refuse a law whose moduli depend on the load ratio where the solver knows strain alone.
-
-    Raises
-    ------
-    InputError : it does.
-    """
+    """Raise InputError for a law of the load ratio where the solver takes moduli of strain."""
     if law.of_load_ratio and not carries_load_ratios(solver):
         problem = (
             f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
@@ -226,45 +281,8 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
         raise InputError(None, "form", problem)
 
 
-@runtime_checkable
-class DifferentiatingSolver(Solver, Protocol):
-    """A solver that also differentiates its displacements, and takes a start for its path."""
-
-    def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
-        timeout: float | None = None,
-        guess: Array | None = None,
-    ) -> History:
-        """Run from `guess` where given."""
-        ...
-
-    def run_with_sensitivity(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        parameters: Sequence[str] | None = None,
-        guess: Array | None = None,
-    ) -> tuple[History, Array]:
-        """History and d displacement / d parameters, (frames, nodes, 3, len(parameters)).
-
-        The parameters are every entry of the law's beta unless given; those of `parameters_of`.
-        """
-        ...
-
-
-T = TypeVar("T")
-
-
 def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
-    """The entry for a model's class, or for the nearest class that it is made from.
-
-    Raises
-    ------
-    SolverFailure : there is none; says what the solver runs.
-    """
+    """Return the entry for a model's class or its nearest base; SolverFailure without one."""
     for kind in type(model).__mro__:
         if kind in analyses:
             return analyses[kind]
@@ -272,20 +290,15 @@ def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
     raise SolverFailure(f"cannot run a {type(model).__name__}, only: {known}", solver)
 
 
-# What is said while something runs, to whoever hears it: that a run waits, that a worker is gone.
-#
-# Where nobody listens it goes to the log, as a warning. A process that works for another has a
-# listener that passes it on.
-
-log = logging.getLogger(__name__)
+# Announcements: messages while something runs. Without a listener they are logged as warnings; a
+# process that works for another has a listener that passes them on.
 
 
 @dataclass(frozen=True)
 class Announcement:
     """One line, or a state that begins or is over.
 
-    words : the line. of : who is in this state, until one comes with no words; "" : it is said
-    once, and is no state.
+    of : what is in this state, until an announcement of it without words; "" : no state.
     """
 
     words: str
@@ -305,7 +318,7 @@ _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
 
 @contextmanager
 def hearing(listener: Listener) -> Iterator[None]:
-    """Whatever is announced within goes to `listener`."""
+    """Pass everything that is announced within the block to `listener`."""
     before = _listener.set(listener)
     try:
         yield
@@ -314,12 +327,12 @@ def hearing(listener: Listener) -> Iterator[None]:
 
 
 def announce(words: str, of: str = "") -> None:
-    """Say it to whoever listens."""
-    _listener.get()(Announcement(words, of))
+    """Send an announcement to the listener."""
+    pass_on(Announcement(words, of))
 
 
 def pass_on(said: Announcement) -> None:
-    """Say what another process has announced."""
+    """Send the announcement of another process to the listener."""
     _listener.get()(said)
 
 
@@ -329,24 +342,18 @@ def cell_blocks(
     elements: Iterable[tuple[int, NDArray[np.int64]]],
     names: Mapping[int, tuple[str, tuple[int, ...] | None]],
 ) -> list[tuple[str, NDArray[Any]]]:
-    """Runs of elements of one type, their nodes counted from 0.
+    """Return meshio's blocks of elements of one type, their nodes counted from 0.
 
-    Parameters
-    ----------
-    numbers : (n,) of the nodes in the file, increasing.
-    names : by the file's type: meshio's name, and its order of the nodes where it differs.
-
-    Raises
-    ------
-    InputError : a type that `names` does not have, a node that is not there.
+    numbers : (n,) of the nodes in the file, increasing. names : by the file's type: meshio's name,
+    and its order of the nodes where it differs. Raises InputError : a type that `names` does not
+    have, a node that is not there.
     """
     cells: list[tuple[str, list[Any]]] = []
     for kind, nodes in elements:
         if kind not in names:
             raise InputError(path, "elements", f"of type {kind} are not known here")
         name, order = names[kind]
-        place = np.searchsorted(numbers, nodes)
-        place = np.minimum(place, len(numbers) - 1)
+        place = np.minimum(np.searchsorted(numbers, nodes), len(numbers) - 1)
         if (numbers[place] != nodes).any():
             raise InputError(path, "elements", "refer to a node that is not there")
         if not cells or cells[-1][0] != name:
@@ -356,7 +363,7 @@ def cell_blocks(
 
 
 def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> Array:
-    """(frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
+    """Return (frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
 
     displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; x unless given.
     """
@@ -371,6 +378,6 @@ def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> A
 
 
 def extremes(strain: Array) -> tuple[Array, Array]:
-    """Least and largest of each of the last axis' components, the unstrained start included."""
+    """Return minimum and maximum of each of the last axis' components, the start included."""
     flat = strain.reshape(-1, strain.shape[-1])
     return np.minimum(flat.min(axis=0), 0.0), np.maximum(flat.max(axis=0), 0.0)

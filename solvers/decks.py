@@ -1,4 +1,4 @@
-"""Input decks from Jinja2 templates, ours or the user's."""
+"""Input decks from Jinja2 templates, ours or the user's, and digests of all that shapes a run."""
 
 from __future__ import annotations
 
@@ -14,31 +14,29 @@ from typing import Any
 import jinja2
 import jinja2.meta
 
-from ..caching import ROOT
 from ..errors import InputError
-from ..files import TEMPLATES, environment
-from ..reading import LARGEST_WRITTEN, content_of, is_file
-from ..writing import checksum
+from ..files import LARGEST_WRITTEN, ROOT, TEMPLATES, checksum, content_of, environment, is_file
+
+#: Names of another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
+_INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
+_VALUE = re.compile(r"=\s*(?P<file>[^,]*)")
+_ELSEWHERE = re.compile(r"[/\\\0]|^\s*[\"']?\s*(\.\.|~)")
+#: Folders and suffixes of the files that determine a run of one of our own adapters.
+FOLDERS = ("materials", "meshes", "solvers", "templates")
+CODE = (".py", ".j2", ".c", ".f")
+file_mark = checksum  #: documented for plug-ins
 
 
 def render(
-    solver: str,
-    name: str,
-    context: Mapping[str, Any],
-    folder: Path | None = None,
+    solver: str, name: str, context: Mapping[str, Any], folder: Path | None = None,
     instead: Mapping[str, Path] | None = None,
-) -> str:
-    """The deck that template `name` of `solver` makes of `context`.
+) -> str:  # fmt: skip
+    """Return the deck that template `name` of `solver` makes of `context`.
 
-    Parameters
-    ----------
     folder : the user's own templates; `name` must be there, and may include or extend ours.
-    instead : files of the user's that stand in for templates which `name` includes.
-
-    Raises
-    ------
-    InputError : the template is not there or not readable; a variable that it asks for does not
-        exist, a mistake in its syntax or its arithmetic: template, line and what is wrong.
+    instead : files of the user's in place of templates that `name` includes. Raises InputError :
+    the template is missing or unreadable, asks for a variable that does not exist, or has a mistake
+    in its syntax or arithmetic; says in which line.
     """
     folders = [TEMPLATES / solver]
     if folder is not None:
@@ -74,25 +72,14 @@ def render(
     return text
 
 
-#: What names another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
-_INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
-_VALUE = re.compile(r"=\s*(?P<file>[^,]*)")
-_ELSEWHERE = re.compile(r"[/\\\0]|^\s*[\"']?\s*(\.\.|~)")
-
-
 def _check_inside(text: str, template: Path) -> None:
-    """That no line of a deck names a file outside of the run's own folder.
-
-    Raises
-    ------
-    InputError : one does.
-    """
+    """Raise InputError where a line of a deck names a file outside the run's own folder."""
     keyword = False
     for number, plain in enumerate(text.splitlines(), start=1):
         line = plain.strip()
         if line.startswith("**"):
             continue
-        # A keyword's line that ends with a comma goes on in the next one.
+        # A keyword's line that ends with a comma is continued in the next one.
         keyword = line.startswith("*") or keyword
         included = _INCLUDE.match(line)
         found = [included] if included else list(_VALUE.finditer(line)) if keyword else []
@@ -107,15 +94,13 @@ def _check_inside(text: str, template: Path) -> None:
 
 
 def _number(value: float) -> str:
-    """Shortest decimal of 13 digits: 0.81, not 0.8100000000000001.
-
-    At most 20 characters: CalculiX reads no more, and would lose the end of an exponent.
-    """
+    """Return the shortest decimal of 13 digits: 0.81, not 0.8100000000000001."""
+    # At most 20 characters: CalculiX reads no more, and would lose the end of an exponent.
     return f"{value:.13g}"
 
 
 def _i10(values: int | Sequence[int]) -> str:
-    """Whole numbers, 10 columns each (Marc's extended format)."""
+    """Return whole numbers, 10 columns each (Marc's extended format)."""
     numbers = [values] if isinstance(values, int) else values
     fields = [f"{number:10d}" for number in numbers]
     if any(len(field) > 10 for field in fields):
@@ -124,13 +109,13 @@ def _i10(values: int | Sequence[int]) -> str:
 
 
 def _e20(values: float | Sequence[float]) -> str:
-    """Numbers, 20 columns and 13 digits each."""
+    """Return numbers, 20 columns and 13 digits each."""
     numbers = [values] if isinstance(values, int | float) else values
     return "".join(f"{number:20.12E}" for number in numbers)
 
 
 def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | None:
-    """What Jinja2 asks a loader for; None where no file stands in."""
+    """Return text, name and None as Jinja2 asks a loader; None where no file is given."""
     if wanted not in files:
         return None
     path = files[wanted]
@@ -143,43 +128,24 @@ def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | 
 
 
 def _place(error: BaseException, default: Path, files: Sequence[str] = ()) -> tuple[Path, int]:
-    """Template file and line where an error arose: Jinja2 puts them into the traceback."""
+    """Return template file and line of an error; Jinja2 puts them into the traceback."""
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         if frame.filename.endswith(".j2") or frame.filename in files:
             return Path(frame.filename), frame.lineno or 0
     return default, 0
 
 
-#: Rooms whose files make a run of one of our own adapters what it is.
-ROOMS = ("materials", "meshes", "models", "solvers", "templates")
-CODE = (".py", ".j2", ".c", ".f")
-
-
 def in_words(name: str, version: str, **settings: object) -> str:
-    """A solver, its version and the settings that matter, in one line."""
+    """Return a solver, its version and the settings that matter, in one line."""
     said = [f"{name} {version}".rstrip(), *(f"{key}={value}" for key, value in settings.items())]
     return "; ".join(said)
 
 
-def file_mark(path: Path) -> str:
-    """SHA-256 of a file's content.
-
-    Raises
-    ------
-    InputError : it cannot be read.
-    """
-    return checksum(path)
-
-
 def templates_mark(folder: Path | None) -> str:
-    """SHA-256 of the templates in a folder and of the files there that they include.
+    """Return the SHA-256 of the templates in a folder and of the files there that they include.
 
-    Names below the folder and contents count, not where the folder is; what else lies in it
-    does not (it may be the project's own, with all its results). "" without a folder.
-
-    Raises
-    ------
-    InputError : a template cannot be read.
+    Names below the folder and contents count, not the folder's place or its other files (it may be
+    the project's own). "" without a folder; InputError where a template cannot be read.
     """
     if folder is None:
         return ""
@@ -188,18 +154,13 @@ def templates_mark(folder: Path | None) -> str:
     while waiting:
         name = waiting.pop()
         if name.as_posix() not in marks:
-            marks[name.as_posix()] = file_mark(folder / name)
+            marks[name.as_posix()] = checksum(folder / name)
             waiting += [other for other in _included(folder / name) if (folder / other).is_file()]
     return hashlib.sha256(repr(sorted(marks.items())).encode()).hexdigest()
 
 
 def program_mark(path: Path) -> str:
-    """SHA-256 of a program's content; of a script, of its own text and not of what it calls.
-
-    Raises
-    ------
-    InputError : it cannot be read.
-    """
+    """Return the SHA-256 of a program's content, of a script's own text; InputError if unread."""
     try:
         about = path.stat()
     except OSError as error:
@@ -209,20 +170,19 @@ def program_mark(path: Path) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _program_mark(path: Path, *_: int) -> str:
-    # Some megabytes: read again only where the file is another.
-    return file_mark(path)
+    # Some megabytes: read again only where the file has changed.
+    return checksum(path)
 
 
 @functools.cache
 def code_mark(module: str) -> str:
-    """SHA-256 of the code that makes decks and reads results.
+    """Return the SHA-256 of the code that makes decks and reads results.
 
-    That is our own rooms, and of a plug-in every Python file of its package, or its module.
-
-    module : of the solver's class.
+    That is `FOLDERS`, and of a plug-in every Python file of its package, or its module. module : of
+    the solver's class.
     """
-    files = {path.relative_to(ROOT).as_posix(): path for room in ROOMS
-             for path in (ROOT / room).rglob("*")}  # fmt: skip
+    files = {path.relative_to(ROOT).as_posix(): path for name in FOLDERS
+             for path in (ROOT / name).rglob("*")}  # fmt: skip
     top = module.partition(".")[0]
     if top != __package__.partition(".")[0]:
         package = sys.modules.get(top)
@@ -230,22 +190,17 @@ def code_mark(module: str) -> str:
             files |= {f"{top}/{p.relative_to(folder).as_posix()}": p for p in folder.rglob("*.py")}
         if not hasattr(package, "__path__") and getattr(package, "__file__", None):
             files[f"{top}.py"] = Path(str(getattr(package, "__file__")))  # noqa: B009
-    marks = {name: file_mark(path) for name, path in files.items() if path.suffix in CODE}
+    marks = {name: checksum(path) for name, path in files.items() if path.suffix in CODE}
     return hashlib.sha256(repr(sorted(marks.items())).encode()).hexdigest()
 
 
 def _included(template: Path) -> list[Path]:
-    """Files that a template names in full; what a run is to find wrong with it is left to it."""
+    """Return the files that a template names in full; its mistakes are left to the run."""
     try:
-        tree = environment(jinja2.BaseLoader()).parse(_content(template).decode("utf-8"))
+        tree = environment(jinja2.BaseLoader()).parse(template.read_bytes().decode("utf-8"))
     except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
+    except OSError as error:
+        raise InputError(template, "", f"cannot be read: {error.strerror}") from None
     found = jinja2.meta.find_referenced_templates(tree)
     return [Path(name) for name in found if name is not None]
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None

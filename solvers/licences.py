@@ -1,11 +1,11 @@
-"""Licences of an external program: counted while it runs, asked for again where one is denied.
+"""Licences of an external program: counted while it runs, requested again where one is denied.
 
-On one machine there are as many files as there are licences, each locked by whoever has one. The
-locks are the kernel's: whoever ends, in whatever way, has given its lock back. The program that
-runs inherits the open file (not on Windows), so that a licence is not free before it has ended,
-too. Users share the files: these hold nothing, and are never removed.
+On one machine there are as many files as licences, each locked by a run that holds one. The locks
+are the kernel's: however a process ends, its lock is released. The program inherits the open file
+(not on Windows), so that a licence is not free before the program has ended, too. Users share the
+files, which are empty and never removed.
 
-In a whole cluster a Dask scheduler leases licences (not Dask's resources of workers, which are each
+In a cluster a Dask scheduler leases licences (not Dask's resources of workers, which are each
 worker's own). A lease that is not renewed, because its holder died, is free again after
 `distributed.scheduler.locks.lease-timeout`, 30 s unless the cluster says otherwise: a dead worker's
 program has ended by then.
@@ -30,12 +30,18 @@ from filelock import lock_descriptor
 
 from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
 from ..materials.law import HypoelasticLaw
-from .base import BandedSolver, DifferentiatingSolver, History, Solver, announce
-from .process import check_wanted, kept_open
-from .scheduler import CONNECT_S, dask
+from .base import (
+    BandedSolver,
+    DifferentiatingSolver,
+    History,
+    Solver,
+    WrappedBand,
+    WrappedSolver,
+    announce,
+)  # fmt: skip
+from .process import CONNECT_S, check_wanted, dask, kept_open
 from .scratch import remove
 from .settings import SCHEDULER, LicenceSettings, licence_settings
-from .wrapped import WrappedBand, WrappedSolver
 
 T = TypeVar("T")
 #: Pauses between tries grow by GROWTH, up to MOST times the first one.
@@ -44,7 +50,7 @@ GROWTH, MOST = 2.0, 10.0
 FOLDER = Path("/tmp/bubblefit-licences")  # noqa: S108 (its files hold nothing)
 if os.name == "nt":
     FOLDER = Path(os.environ.get("PROGRAMDATA", tempfile.gettempdir())) / "bubblefit-licences"
-#: s between two looks at the locks: at first, and at most; and at the scheduler.
+#: s between two tries of the locks: at first, and at most; and of the scheduler.
 SOON_S, LATER_S, LOOK_S = 0.02, 1.0, 1.0
 _clients: dict[tuple[str, int], Any] = {}
 
@@ -52,25 +58,20 @@ _clients: dict[tuple[str, int], Any] = {}
 def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
     """Return the solver with a licence for every run; itself where licences do not matter.
 
-    Parameters
-    ----------
-    name : by which its licences are counted. given : what options say of licences.
-
-    Raises
-    ------
-    InputError : a value that cannot be meant.
+    name : by which its licences are counted. given : options of licences; InputError for an
+    impossible value.
     """
     plain = {key: value for key, value in given.items() if key != SCHEDULER}
     settings = licence_settings(name, plain)
     if not solver.external or (settings.licences is None and settings.wait <= 0):
         return solver
-    # What it can do beside running a model must be asked of it as before.
+    # The wrapper has the further methods of the solver within, and no others.
     protocols = ((_Slopes, DifferentiatingSolver), (WrappedBand, BandedSolver))
     more: list[type] = [part for part, protocol in protocols if isinstance(solver, protocol)]
-    # Not by asking for them: where there is no program that is an error, of whoever runs it.
+    # Not by a call: where there is no program that is an error, of the run.
     if inspect.getattr_static(solver, "programs", None) is not None:
         more.append(_Program)
-    # A cache of runs asks which module a solver's code is in.
+    # A cache of runs needs the module of the solver's code.
     own = {"__module__": type(solver).__module__}
     kind: Any = type("LicensedSolver", (LicensedSolver, *more), own)
     made: Solver = kind(solver, settings, given.get(SCHEDULER))
@@ -78,13 +79,9 @@ def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
 
 
 class LicensedSolver(WrappedSolver):
-    """A solver that runs only while it has a licence.
+    """A solver that runs only while it has a licence, one for all programs of a run.
 
-    Parameters
-    ----------
-    solver : what runs; a run of it may start its program more than once, all with one licence.
-    settings : how many there are, and what is done where one is denied. scheduler : address of the
-    Dask scheduler that counts them too.
+    scheduler : address of the Dask scheduler that counts licences too.
     """
 
     def __init__(
@@ -94,13 +91,9 @@ class LicensedSolver(WrappedSolver):
         self.licences, self.scheduler = settings, scheduler
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
-        timeout: float | None = None,
-        **more: Any,
-    ) -> History:
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        timeout: float | None = None, **more: Any,
+    ) -> History:  # fmt: skip
         """Run the model with a licence; raises as the solver, and as `held`."""
         return self._with_one(lambda: self.solver.run(model, law, scratch, timeout, **more))
 
@@ -110,7 +103,7 @@ class LicensedSolver(WrappedSolver):
 
 
 class _Slopes:
-    """Of a solver that differentiates."""
+    """A mixin for a solver that differentiates."""
 
     def run_with_sensitivity(self: Any, *given: Any, **named: Any) -> Any:
         """Run as the solver does, with a licence."""
@@ -118,25 +111,24 @@ class _Slopes:
 
 
 class _Program:
-    """Of a solver that names the programs it runs."""
+    """A mixin for a solver that names its programs."""
 
     @property
     def programs(self: Any) -> tuple[Path, ...]:
-        """Return the solver's own."""
+        """Return the programs of the solver within."""
         found: tuple[Path, ...] = self.solver.programs
         return found
 
 
 @contextmanager
 def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> Iterator[None]:
-    """Hold a licence of the program `name`, when one is free; nothing where they are not counted.
+    """Hold a licence of the program `name` from when one is free; none where they are not counted.
 
     First of the machine's, then of the cluster's where a scheduler counts too: in this order
-    everywhere, so that nobody waits for one who waits for him.
+    everywhere, so that there is no deadlock.
 
-    Raises
-    ------
-    InputError : nothing can be counted there. BubblefitError : the scheduler does not answer.
+    Raises InputError : nothing can be counted there. BubblefitError : the scheduler does not
+    answer.
     """
     if settings.licences is None:
         yield
@@ -167,21 +159,21 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
 
 
 def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
-    """Run; where the program was denied a licence, again, until the time for that is over.
+    """Run; where the program was denied a licence, try again until the time for that is over.
 
-    Pauses double up to ten times the first one, each longer or shorter by chance, so that those
-    who were denied together do not ask together again.
+    Pauses double up to ten times the first one, each longer or shorter by chance, so that runs that
+    were denied together do not try together again.
 
-    Raises
-    ------
-    SolverFailure : as `run`; a licence was denied until the time was over (`LicenceDenied`).
+    Raises SolverFailure : as `run`; a licence was denied until the time was over (`LicenceDenied`).
     """
     begun, pause, tries = time.monotonic(), settings.licence_retry, 1
     while True:
         try:
             return run()
         except SolverFailure as failure:
-            if not _denied(failure, settings):
+            log = f"{failure.reason}\n{failure.log_tail}".lower()
+            words = (one.lower() in log for one in settings.licence_denied)
+            if not (isinstance(failure, LicenceDenied) or any(words)):
                 raise
             left = begun + settings.wait - time.monotonic()
             if left <= 0:
@@ -193,19 +185,11 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
                 ) from None
             said, scratch = failure.reason, failure.scratch
         if scratch is not None:
-            remove(scratch)  # of the last try only there is something to look into
+            remove(scratch)  # only that of the last try is kept
         seconds = min(pause * random.uniform(0.5, 1.5), left)  # noqa: S311 (no secret)
         announce(f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most")
         time.sleep(seconds)
         pause, tries = min(GROWTH * pause, MOST * settings.licence_retry), tries + 1
-
-
-def _denied(failure: SolverFailure, settings: LicenceSettings) -> bool:
-    """Return whether a licence was denied, by the kind of failure or by words of the site."""
-    if isinstance(failure, LicenceDenied):
-        return True
-    text = f"{failure.reason}\n{failure.log_tail}".lower()
-    return any(words.lower() in text for words in settings.licence_denied)
 
 
 # On one machine
@@ -215,22 +199,20 @@ def _denied(failure: SolverFailure, settings: LicenceSettings) -> bool:
 def locked(
     name: str, count: int, folder: Path | None, waiting: Callable[[], None]
 ) -> Iterator[int]:
-    """Hold one of `count` licences of the program `name`; the number of the open file.
+    """Hold one of `count` licences of the program `name`; yield the number of the open file.
 
-    Parameters
-    ----------
-    folder : of the files, made where it is not there; one for the machine unless given.
-    waiting : called while there is none, now and then.
-
-    Raises
-    ------
-    InputError : the files cannot be made or locked.
+    folder : of the files, made where needed; one for the machine unless given. waiting : called now
+    and then while there is none. Raises InputError : the files cannot be made or locked.
     """
     place = FOLDER if folder is None else folder
     pause = SOON_S
     while True:
         try:
-            _make(place)
+            if not place.is_dir():
+                with suppress(FileExistsError):
+                    place.mkdir(parents=True)
+                    if place == FOLDER:  # the machine's own is for all users
+                        place.chmod(0o1777)
             file = _any(place, name, count)
         except OSError as error:
             problem = f"no licence can be counted here: {error.strerror}; name another folder"
@@ -246,22 +228,13 @@ def locked(
         os.close(file)
 
 
-def _make(place: Path) -> None:
-    """Make the folder, for all users where it is the machine's own."""
-    if not place.is_dir():
-        with suppress(FileExistsError):
-            place.mkdir(parents=True)
-            if place == FOLDER:
-                place.chmod(0o1777)
-
-
 def _any(place: Path, name: str, count: int) -> int | None:
     """Lock one of the files; return it, None where all are locked."""
     for number in random.sample(range(1, count + 1), count):
         path = place / f"{name}-{number}.lock"
         file = _opened(path)
         try:
-            # A file that was tidied away meanwhile is another than the one of that name now.
+            # A file that was tidied away meanwhile is not the one of that name now.
             if lock_descriptor(file, blocking=False) and os.path.samestat(
                 os.fstat(file), os.lstat(path)
             ):
@@ -278,10 +251,9 @@ def _any(place: Path, name: str, count: int) -> int | None:
 
 
 def _opened(path: Path) -> int:
-    """Open the file, which is made where it is not there.
+    """Open the file, and make it where it is not there.
 
-    Not made and opened at once: of a file of another user in a folder of everybody's the kernel
-    refuses that.
+    Not both at once: the kernel refuses that for another user's file in a folder of all users.
     """
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
     while True:
@@ -307,18 +279,15 @@ def _opened(path: Path) -> int:
 def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> Iterator[None]:
     """Hold one of `count` licences of the program `name` in the cluster of a scheduler.
 
-    Parameters
-    ----------
-    waiting : called while there is none, now and then.
+    waiting : called now and then while there is none.
 
-    Raises
-    ------
-    InputError : another count is in use in this cluster, or Dask is not installed.
+    Raises InputError : another count is in use in this cluster, or Dask is not installed.
     BubblefitError : the scheduler does not answer.
     """
-    place = _place(address)
+    distributed = dask()
     try:
-        semaphore = dask().Semaphore(count, f"bubblefit licences of {name}", *place())
+        connection = _connection(distributed, address)
+        semaphore = distributed.Semaphore(count, f"bubblefit licences of {name}", *connection)
         semaphore.register()
         while not semaphore.acquire(LOOK_S):
             waiting()
@@ -338,25 +307,18 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
             semaphore.refresh_callback.stop()
 
 
-def _place(address: str) -> Callable[[], tuple[Any, Any]]:
-    """Gives connections to the scheduler, and the loop that serves them: a worker's, or a client's.
+def _connection(distributed: Any, address: str) -> tuple[Any, Any]:
+    """Return a connection to the scheduler and its event loop: a worker's, or a client's.
 
-    The client raises OSError where nobody answers.
+    The client raises OSError where nothing answers.
     """
-    distributed = dask()
-
-    def place() -> tuple[Any, Any]:
-        try:
-            worker = distributed.get_worker()
-            return worker.scheduler, worker.loop
-        except ValueError:
-            pass
-        # A copy of a process (fork) has no use of the connections of the original.
-        key = address, os.getpid()
-        client = _clients.get(key)
-        if client is None or client.status != "running":
-            client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-            _clients[key] = client
-        return client.scheduler, client.loop
-
-    return place
+    with suppress(ValueError):  # this is no worker
+        worker = distributed.get_worker()
+        return worker.scheduler, worker.loop
+    # A copy of a process (fork) has no use of the connections of the original.
+    key = address, os.getpid()
+    client = _clients.get(key)
+    if client is None or client.status != "running":
+        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        _clients[key] = client
+    return client.scheduler, client.loop

@@ -1,12 +1,14 @@
-"""A solver as a subprocess: its own process group, a log, a time limit, no orphans."""
+"""Other processes: programs in a group of their own, with a log and no orphans, and Dask's."""
 
 from __future__ import annotations
 
+import logging
 import os
+import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -23,22 +25,30 @@ _kept_open: ContextVar[tuple[int, ...]] = ContextVar("kept_open", default=())
 _unwanted: ContextVar[Callable[[], bool]] = ContextVar("unwanted", default=lambda: False)
 
 POLL_S = 0.05
-#: Whether what a program starts is in one group with it, which one signal reaches.
+#: Whether a program and all that it starts form one group, which one signal reaches.
 GROUPS = hasattr(os, "killpg")
 #: Lines of the log that an error carries.
 TAIL = 25
-#: What a shell adds to the number of the signal that killed its program, and the signals that are
+#: Added by a shell to the number of the signal that killed its program, and the signals that are
 #: looked for in its exit code: other numbers are the program's own.
 SHELL = 128
 _NAMES = ("KILL", "TERM", "SEGV", "ABRT", "BUS", "FPE", "ILL", "XFSZ", "XCPU")
 KILLS = {getattr(signal, f"SIG{name}", None) for name in _NAMES} - {None}
 #: Reads the number of a process group, and kills it when nobody holds the other end of the pipe.
 WATCHER = ("/bin/sh", "-c", 'read -r group; read -r end; kill -9 "-$group"', "bubblefit-watch")
+#: Free space (bytes) at which a run that ended badly is said to have filled the disk.
+FULL = 1024**2
+#: Messages of programs that cannot write, in any case of letters.
+WORDS = ("No space left on device", "File too large", "Disk quota exceeded")
+#: s, for a Dask scheduler to answer at all; and once connected.
+CONNECT_S, ANSWER_S = 5.0, 4.0
+#: Of Dask; some have a level of their own.
+LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a subprocess ended: exit_code as in `subprocess` (-n: signal n), wall time s."""
+    """End of a subprocess: exit_code as in `subprocess` (-n: signal n), wall time s."""
 
     exit_code: int
     timed_out: bool
@@ -46,10 +56,7 @@ class Outcome:
 
     @property
     def signal_name(self) -> str:
-        """Return the name of the signal that killed it, or empty.
-
-        A shell that was in between says 128 and the signal's number.
-        """
+        """Return the name of the signal that killed it (also behind a shell), or ""."""
         number = -self.exit_code if self.exit_code < 0 else self.exit_code - SHELL
         if self.exit_code >= 0 and number not in KILLS:
             return ""
@@ -59,12 +66,12 @@ class Outcome:
 
 
 class Unwanted(Exception):
-    """Nobody waits for the result any more: the task was cancelled while its program ran."""
+    """A task that was cancelled while its program ran."""
 
 
 @contextmanager
 def kept_open(file: int) -> Iterator[None]:
-    """Programs that are run within inherit the open file: its lock is held until they end, too."""
+    """Let programs that are run within inherit the open file: they hold its lock, too."""
     before = _kept_open.set((*_kept_open.get(), file))
     try:
         yield
@@ -74,7 +81,7 @@ def kept_open(file: int) -> Iterator[None]:
 
 @contextmanager
 def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
-    """Kill a program that is run within, and raise `Unwanted`, once `unwanted` says so."""
+    """Kill a program that is run within, and raise `Unwanted`, once `unwanted` returns true."""
     before = _unwanted.set(unwanted)
     try:
         yield
@@ -83,49 +90,33 @@ def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
 
 
 def check_wanted() -> None:
-    """Raise `Unwanted` where nobody waits for the result any more."""
+    """Raise `Unwanted` where the task was cancelled."""
     if _unwanted.get()():
         raise Unwanted
 
 
 def run_process(
-    command: Sequence[str | Path],
-    folder: Path,
-    log: Path,
-    timeout: float | None = None,
-    environment: Mapping[str, str] | None = None,
-    watch: Callable[[], None] | None = None,
-) -> Outcome:
+    command: Sequence[str | Path], folder: Path, log: Path, timeout: float | None = None,
+    environment: Mapping[str, str] | None = None, watch: Callable[[], None] | None = None,
+) -> Outcome:  # fmt: skip
     """Run `command` in `folder` to its end, its output (both streams) going to `log`.
 
-    Parameters
-    ----------
-    timeout : s; then the program is killed with all that it has started.
-    environment : added to ours.
-    watch : called about twenty times a second while it runs.
-
-    Raises
-    ------
-    InputError : the program cannot be started (not there, no permission, another machine's).
-    Unwanted : see `unless`.
-    Whatever interrupts us (Ctrl-C, an error in `watch`) is passed on after that, too, is
-    killed. Where this process is killed outright, a shell that waits for it kills the program's
-    process group; on a system without groups or /bin/sh it runs to its end.
+    timeout : s; then the program is killed with all that it has started. environment : added to
+    ours. watch : called about twenty times a second while it runs. Raises InputError : the program
+    cannot be started (not there, no permission, another machine's). Unwanted : see `unless`. An
+    interruption (Ctrl-C, an error in `watch`) kills the program as well. Where this process is
+    killed outright, a shell that waits for it kills the program's process group; on a system
+    without groups or /bin/sh the program runs to its end.
     """
     begun, timed_out = time.monotonic(), False
     kept: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
     with log.open("wb") as output, _watched() as watch_group:
         try:
             process = subprocess.Popen(
-                [str(part) for part in command],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env={**os.environ, **(environment or {})},
-                start_new_session=True,
-                **kept,
-            )
+                [str(part) for part in command], cwd=folder, stdin=subprocess.DEVNULL,
+                stdout=output, stderr=subprocess.STDOUT, env={**os.environ, **(environment or {})},
+                start_new_session=True, **kept,
+            )  # fmt: skip
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
             raise InputError(Path(command[0]), "", problem) from None
@@ -152,21 +143,21 @@ def run_process(
 
 
 class Watch(Generic[T]):
-    """Tells of every increment once, as it appears: `look` finds all there are so far."""
+    """Reporter of every increment once, as it appears: `look` finds all there are so far."""
 
-    def __init__(self, look: Callable[[], list[T]], tell: Callable[[T], None]) -> None:
-        self.look, self.tell, self.told = look, tell, 0
+    def __init__(self, look: Callable[[], list[T]], report: Callable[[T], None]) -> None:
+        self.look, self.report, self.reported = look, report, 0
 
     def __call__(self) -> None:
         """Look once."""
-        fresh = self.look()[self.told :]
-        self.told += len(fresh)
+        fresh = self.look()[self.reported :]
+        self.reported += len(fresh)
         for increment in fresh:
-            self.tell(increment)
+            self.report(increment)
 
 
 def log_tail(log: Path, lines: int = TAIL) -> str:
-    """Last lines of a log of any size and encoding; empty when there is none."""
+    """Return the last lines of a log of any size and encoding; "" when there is none."""
     try:
         with log.open("rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - 400 * lines))
@@ -176,8 +167,26 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
 
 
+def disk_full(folder: Path, lines: Iterable[str], outcome: Outcome) -> str:
+    """Return the sign that the disk of a run was full, "" without one.
+
+    lines : printed by the program.
+    """
+    if outcome.signal_name == "SIGXFSZ":
+        return "a file would be larger than allowed"
+    for line in lines:
+        for words in WORDS:
+            if words.lower() in line.lower():
+                return words
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return ""
+    return f"{free} bytes left for {folder}" if free < FULL else ""
+
+
 def _kill(process: subprocess.Popen[bytes], tree: set[psutil.Process]) -> None:
-    """Kill a program with its process group; where there are none, with all it is seen to start."""
+    """Kill a program with its process group; without groups, with all that it was seen to start."""
     if GROUPS:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
@@ -199,12 +208,17 @@ def _started_by(number: int) -> set[psutil.Process]:
 
 @contextmanager
 def _watched() -> Iterator[Callable[[int], None]]:
-    """Return what has a process group killed where this process is killed outright.
+    """Yield a function that has a process group killed where this process is killed outright.
 
-    It is a shell that waits for the end of a pipe whose other end only this process holds.
+    A shell waits for the end of a pipe that only this process holds open.
     """
     read, held = os.pipe()
     watcher = None
+
+    def watch(group: int) -> None:
+        with suppress(OSError):  # there is no watcher
+            os.write(held, f"{group}\n".encode())
+
     try:
         with suppress(OSError):  # no such shell
             null = subprocess.DEVNULL
@@ -212,15 +226,56 @@ def _watched() -> Iterator[Callable[[int], None]]:
                 WATCHER, stdin=read, stdout=null, stderr=null, start_new_session=True
             )
         os.close(read)
-        yield lambda group: _tell(held, group)
+        yield watch
     finally:
-        # Before the pipe is closed: the number of the group may be somebody else's by now.
+        # Before the pipe is closed: the number of the group may be in use again by now.
         if watcher is not None:
             watcher.kill()
             watcher.wait()
         os.close(held)
 
 
-def _tell(held: int, group: int) -> None:
-    with suppress(OSError):  # there is no watcher
-        os.write(held, f"{group}\n".encode())
+# Dask
+
+
+def check(address: str) -> None:
+    """Raise InputError unless a scheduler answers at this address."""
+    with connected(address):
+        pass
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """Yield a client of the scheduler; InputError where none answers or Dask is not installed.
+
+    Dask logs every lost connection, with tracebacks; meanwhile it is silenced.
+    """
+    distributed = dask()
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        try:
+            client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            problem = f"no Dask scheduler answers at {address} ({error or type(error).__name__})"
+            advice = "start one (dask scheduler), or give the address that it prints"
+            raise InputError(None, "--scheduler", f"{problem}; {advice}") from None
+        try:
+            yield client
+        finally:
+            client.close(timeout=ANSWER_S)
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+def dask() -> Any:
+    """Import the module `distributed`, which is an extra; InputError where it is not installed."""
+    try:
+        import distributed
+    except ImportError:
+        problem = "Dask is not installed; pip install 'bubblefit[cluster]'"
+        raise InputError(None, "--scheduler", problem) from None
+    return distributed

@@ -1,9 +1,9 @@
-"""How far the grips of a strip are pulled, for solvers that cannot drive its gauge.
+"""Pulls of a strip's grips, for solvers that cannot drive its gauge.
 
 An equation for the gauge would put the force at its nodes. Grips that are the gauge are driven as
-the model has it. Others follow the path on which the membrane opens the gauge under the same law
-(without one: an even stretch, run once to correct it). The solver's own gauge then differs a
-little, and its results are interpolated to the model's elongations.
+in the model. Others follow the path on which the membrane opens the gauge under the same law (or an
+even stretch, run once to correct it). The solver's own gauge then differs a little, and its results
+are interpolated to the model's elongations.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ AS_WANTED = 1e-9
 def grip_pulls(
     model: UniaxialModel, law: HypoelasticLaw, opened: Callable[[Array], Array], solver: str
 ) -> tuple[Array, bool]:
-    """Pulls (increments,) mm at which the solver's grips stand, and whether they are the gauge.
+    """Return pulls (increments,) mm of the solver's grips, and whether they are the gauge.
 
-    opened : runs the strip at given pulls and tells how far its gauge opened, (increments,) mm.
+    opened : runs the strip at given pulls and returns how far its gauge opened, (increments,) mm.
 
-    Raises
-    ------
-    SolverFailure : that run did not end well, or its gauge gets shorter.
+    Raises SolverFailure : that run did not end well, or its gauge gets shorter.
     """
     driven = direct(model)
     if driven is not None:
         return driven, True
     pulls = as_the_membrane(model, law)
     if pulls is None:
-        even = evenly(model)
+        # As if the whole strip stretched as the gauge does.
+        length = float(np.ptp(model.mesh.points[:, 1]))
+        even = np.array(model.elongations) * length / model.gauge_length
         pulls = corrected(model, even, opened(even), solver)
     return pulls, False
 
 
 def direct(model: UniaxialModel) -> Array | None:
-    """The pulls when the gauge lies between the grips themselves, along the pull."""
+    """Return the pulls when the gauge lies between the grips themselves, along the pull."""
     lower, upper = (3 * node + np.arange(3) for node in model.mesh.node_sets["gauge"])
     held = np.isin(np.concatenate([lower[[0, 2]], upper]), model.fixed).all()
     ends = model.mesh.points[model.mesh.node_sets["gauge"]]
@@ -62,7 +62,7 @@ def direct(model: UniaxialModel) -> Array | None:
 
 
 def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
-    """Pulls (increments + 1,) on which the membrane opens the gauge; None where it fails."""
+    """Return pulls (increments + 1,) on which the membrane opens the gauge; None where it fails."""
     try:
         history = MembraneSolver().run(model, law)
     except SolverFailure as failure:
@@ -71,20 +71,11 @@ def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
     return _onward(-history.displacement[:, model.mesh.node_sets[model.pulled][0], 1])
 
 
-def evenly(model: UniaxialModel) -> Array:
-    """As if the whole strip stretched as the gauge does."""
-    length = float(np.ptp(model.mesh.points[:, 1]))
-    return np.array(model.elongations) * length / model.gauge_length
-
-
 def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) -> Array:
-    """Pulls (increments + 1,) at which the gauge of a first run was as wanted.
+    """Return pulls (increments + 1,) at which the gauge of a first run was as it should be.
 
-    Beyond the end of the first run as steeply as at its end.
-
-    Parameters
-    ----------
-    pulls, opened : (increments,) mm, of the first run and of its gauge.
+    They go on beyond its end as steeply as there. pulls, opened : (increments,) mm, of the first
+    run and of its gauge.
     """
     gauge, pull = np.insert(opened, 0, 0.0), np.insert(pulls, 0, 0.0)
     if not (np.diff(gauge) > 0).all():
@@ -97,17 +88,12 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
 
 
 def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:
-    """`values` (increments of the run, ...) at the model's elongations, by a cubic spline.
+    """Return `values` (increments of the run, ...) at the model's elongations, by a cubic spline.
 
-    The increments of the run lie near the model's, so that it bridges next to nothing.
+    The increments of the run lie near the model's, so that it bridges next to nothing. opened :
+    (increments of the run,) mm, elongation of the gauge.
 
-    Parameters
-    ----------
-    opened : (increments of the run,) mm, elongation of the gauge.
-
-    Raises
-    ------
-    SolverFailure : the gauge does not reach its length, or gets shorter on the way.
+    Raises SolverFailure : the gauge does not reach its length, or gets shorter on the way.
     """
     levels, gauge = np.array(model.elongations), np.insert(opened, 0, 0.0)
     if len(opened) == len(levels) and (

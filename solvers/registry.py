@@ -14,8 +14,11 @@ from pydantic import ValidationError
 
 from .. import files as plugins
 from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
+from ..materials.exports import curves, designers, subroutines
+from ..materials.exports.base import CSV, Format
 from ..readers.sections import first_error
 from .base import Solver, SolverCheck
+from .calculix.library import FORMAT
 from .calculix.settings import OFFER as CALCULIX
 from .licences import licensed
 from .marc.settings import OFFER as MARC
@@ -30,23 +33,34 @@ from .settings import (
     check_programs,
     licence_settings,
     split,
-)
+)  # fmt: skip
 
-#: What makes a thing a solver.
+#: What makes each of our own solvers from its options.
+SOLVERS: dict[str, Callable[..., Solver]] = {
+    "calculix": CALCULIX, "marc": MARC, "membrane": MEMBRANE
+}  # fmt: skip
+#: Every format in which a card can be exported.
+FORMATS: Mapping[str, Format] = {
+    each.name: each
+    for each in (
+        subroutines.NLELAST, subroutines.HYPELA2, subroutines.UMAT, curves.FABRIC, curves.MAT34,
+        curves.LAW58, *designers.FORMATS, CSV, FORMAT,
+    )
+}  # fmt: skip
+#: Attributes of a solver.
 NEEDED = ("name", "external", "progress", "identity", "run", "check")
+#: Option for any setting of any solver, those of plug-ins among them, as KEY=VALUE.
+ANY = "solver-option"
 
 
 class PlugIn(plugins.PlugIn):
-    """One solver that another distribution offers; what is wrong with it is a `SolverFailure`."""
+    """A solver of another distribution, named in every `SolverFailure` on its account."""
 
     def make(self, **options: Any) -> Solver:
-        """A new solver from the factory that the entry point names.
+        """Return a new solver from the factory that the entry point names.
 
-        Raises
-        ------
-        SolverFailure : it cannot be imported, is no factory, fails, or gives no solver; the
-            distribution is named.
-        InputError : an option that the factory does not take, or does not like.
+        Raises SolverFailure : it cannot be imported, is no factory, fails, or returns no solver.
+        InputError : an option that the factory does not take or rejects.
         """
         factory = self.factory()
         try:
@@ -54,7 +68,7 @@ class PlugIn(plugins.PlugIn):
         except TypeError as error:
             problem = f"{error} (of {self.distribution}); see its documentation"
             raise InputError(None, f"solver.{self.name}", problem) from None
-        except ValueError:  # compiled code tells no signature
+        except ValueError:  # compiled code has no signature
             pass
         try:
             solver = factory(**options)
@@ -69,16 +83,11 @@ class PlugIn(plugins.PlugIn):
         return solver
 
     def solver_failure(self, what: str, error: BaseException | None = None) -> SolverFailure:
-        """As `failure`, for those who run analyses."""
+        """Return `failure` as an error of an analysis."""
         return SolverFailure(str(self.failure(what, error)), self.name)
 
     def factory(self) -> Callable[..., Any]:
-        """What the entry point names.
-
-        Raises
-        ------
-        SolverFailure : it cannot be imported, or called.
-        """
+        """Import the factory; SolverFailure where it cannot be imported or called."""
         try:
             factory = self.load()
         except PlugInFailure as error:
@@ -89,18 +98,13 @@ class PlugIn(plugins.PlugIn):
 
 
 def plug_ins() -> list[PlugIn]:
-    """Every solver that is installed as a plug-in, by name; two of one name are both there."""
+    """Return every installed solver plug-in by name, both where two have one name."""
     offers = plugins.plug_ins("bubblefit.solvers")
     return [PlugIn(one.name, one.distribution, one.entry) for one in offers]
 
 
 def plug_in_named(name: str) -> PlugIn | None:
-    """The plug-in of that name, or None.
-
-    Raises
-    ------
-    SolverFailure : two distributions offer it.
-    """
+    """Return the plug-in of that name, or None; SolverFailure where two distributions offer it."""
     try:
         one = plugins.plug_in_named("bubblefit.solvers", name)
     except PlugInFailure as error:
@@ -108,36 +112,22 @@ def plug_in_named(name: str) -> PlugIn | None:
     return None if one is None else PlugIn(one.name, one.distribution, one.entry)
 
 
-#: What makes each of our own solvers from its options.
-SOLVERS: dict[str, Callable[..., Solver]] = {
-    "calculix": CALCULIX,
-    "marc": MARC,
-    "membrane": MEMBRANE,
-}
-
-
 def solver_names() -> list[str]:
-    """Every solver that can be asked for, ours and those of plug-ins."""
+    """Return the names of all solvers, ours and those of plug-ins."""
     return sorted({*SOLVERS, *(plug_in.name for plug_in in plug_ins())})
 
 
 def solver_sections() -> dict[str, type[SolverSettings]]:
-    """What the table [solver.NAME] of a project may say, by name of a solver of ours."""
+    """Return the schemas of the tables [solver.NAME] of our solvers."""
     return {name: make.settings for name, make in SOLVERS.items() if isinstance(make, Offer)}
 
 
 def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """By name of a solver, what it is made with; ours are there without a table, too.
+    """Return the options of each solver by name, of ours also without a table.
 
-    Parameters
-    ----------
-    path : the project's file; paths in its tables are beside it.
-    tables : [solver] of the project. A plug-in's is as it is written, but for licences: the plug-in
-        checks it.
-
-    Raises
-    ------
-    InputError : a key that there is not, a value that cannot be meant; no solver of that name.
+    path : the project's file; paths in its tables are relative to its folder. tables : [solver] of
+    the project. Of a plug-in's only keys of licences are checked here. Raises InputError : an
+    unknown key or solver, an impossible value.
     """
     found: dict[str, dict[str, Any]] = {}
     for name, section in solver_sections().items():
@@ -159,16 +149,14 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
         licences, own = split(tables[name])
         if SCHEDULER in licences:  # who answers there can run code here: only the user may name it
             raise InputError(path, f"solver.{name}.{SCHEDULER}", "say --scheduler instead")
-        found[name] = {
-            **own,
-            **licence_settings(name, licences, path).model_dump(exclude_unset=True),
-        }
+        counts = licence_settings(name, licences, path)
+        found[name] = own | counts.model_dump(exclude_unset=True)
     return found
 
 
 def _started(name: str) -> tuple[str, ...]:
-    """Options of a plug-in that say what is run: what its factory has as `started`."""
-    with suppress(SolverFailure):  # whoever makes the solver says what is wrong with it
+    """Return a plug-in's options that name a program: attribute `started` of its factory."""
+    with suppress(SolverFailure):  # reported when the solver is made
         plug_in = plug_in_named(name)
         if plug_in is not None:
             return tuple(getattr(plug_in.factory(), "started", ()))
@@ -176,22 +164,16 @@ def _started(name: str) -> tuple[str, ...]:
 
 
 def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) -> Solver:
-    """A new solver with its constructor's `options`: ours, else that of a plug-in.
+    """Return a new solver made with `options`: ours, else that of a plug-in.
 
-    What options say of licences is not the solver's matter: every external one is held to it.
+    Options of licences apply to every external solver, which does not see them itself.
 
-    Parameters
-    ----------
-    cache : where runs of another program are kept; every run is made where it is None.
-
-    Raises
-    ------
-    InputError : there is none of that name (says which there are), or an option is wrong.
-    SolverFailure : a plug-in that does not work; names its distribution.
+    cache : of the runs of other programs; None: everything is run. Raises InputError : there is
+    none of that name (lists them), or an option is wrong. SolverFailure : a plug-in that does not
+    work; names its distribution.
     """
-    # A plug-in cannot take the place of one of ours.
     make: Callable[..., Solver]
-    if name in SOLVERS:
+    if name in SOLVERS:  # a plug-in cannot take the place of one of ours
         make = SOLVERS[name]
     else:
         plug_in = plug_in_named(name)
@@ -200,48 +182,34 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
         make = plug_in.make
     licences, own = split(options)
     made = make(**own)
-    # The project's words count more than the site's.
+    # The project's settings override the site's.
     solver = licensed(made, name, {**getattr(made, "site_licences", {}), **licences})
-    if cache is None:
-        return solver
-    return with_cache(solver, cache, counted(name, own))
+    return solver if cache is None else with_cache(solver, cache, counted(name, own))
 
 
 def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Of what the solver `name` is made with, what may change a result; of a plug-in all."""
-    _, own = split(options)  # a licence changes no result
+    """Return the options of a solver that may change a result; of a plug-in all but licences."""
+    _, own = split(options)
     section = solver_sections().get(name)
     return dict(own) if section is None else section.counted(own)
 
 
 def usable_solver(
-    name: str,
-    options: Mapping[str, Any] | None = None,
-    path: Path | None = None,
-    key: str = "fit.solver",
-    cache: RunCache | None = None,
-) -> Solver:
-    """A new solver that is there and carries the law: one line now, not in every analysis.
+    name: str, options: Mapping[str, Any] | None = None, path: Path | None = None,
+    key: str = "fit.solver", cache: RunCache | None = None,
+) -> Solver:  # fmt: skip
+    """Return a new solver that is installed and carries the law; more of them by `solver_named`.
 
-    More of them, each with what it prepares for a model of its own, are then had by
-    `solver_named`.
-
-    Parameters
-    ----------
-    options : what it is made with, as `solver_settings` has it.
-    path, key : the project that names it, and where. cache : as of `solver_named`.
-
-    Raises
-    ------
-    InputError : there is no such solver, or an option is wrong (says in which file).
-    SolverFailure : it is not installed, or does not carry the law.
+    options : as from `solver_settings`. path, key : the project that names it, and where. cache :
+    as of `solver_named`. Raises InputError : there is no such solver, or an option is wrong (says
+    in which file). SolverFailure : it is not installed, or does not carry the law.
     """
     try:
         solver = solver_named(name, cache, **(options or {}))
     except InputError as error:
         if error.field == "solver":
             raise InputError(path, f"{key} (or --solver)", error.problem) from None
-        # Ours may also have their options from the command line.
+        # Options of ours may also come from the command line.
         if name not in SOLVERS and error.path is None and error.field.startswith(f"solver.{name}"):
             raise InputError(path, error.field, error.problem) from None
         raise
@@ -255,12 +223,10 @@ def usable_solver(
 
 
 def checked(name: str, solver: Solver) -> SolverCheck:
-    """What `check` finds of the solver `name`.
+    """Return the solver's `check`.
 
-    Raises
-    ------
-    SolverFailure : the check of a plug-in fails; names its distribution.
-    InputError : an option that the check does not like.
+    Raises SolverFailure : the check of a plug-in fails; names its distribution. InputError : an
+    option that the check rejects.
     """
     try:
         return solver.check()
@@ -273,12 +239,8 @@ def checked(name: str, solver: Solver) -> SolverCheck:
         raise plug_in.solver_failure("fails its check", error) from error
 
 
-#: Any setting of any solver, those of plug-ins among them, as KEY=VALUE.
-ANY = "solver-option"
-
-
 def command_line() -> list[Override]:
-    """The options there are, each once; its values say which are whose."""
+    """Return every solver's options, each once, with the values of each solver in its help."""
     found: dict[str, Override] = {}
     values: dict[str, list[str]] = {}
     for name, section in solver_sections().items():
@@ -293,50 +255,34 @@ def command_line() -> list[Override]:
 
 
 def overridden(
-    name: str,
-    options: Mapping[str, Any],
-    given: Mapping[str, Any],
-    settings: Sequence[str] = (),
-) -> dict[str, Any]:
-    """The options of the solver `name` with what the command line says.
+    name: str, options: Mapping[str, Any], given: Mapping[str, Any], settings: Sequence[str] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """Return the options of the solver `name`, overridden by the command line.
 
-    Parameters
-    ----------
-    options : as `registry.solver_settings` has them.
-    given : by the name of an option of `command_line`; None: not given.
-    settings : each "KEY=VALUE", the value as in a project file (text needs no quotes); paths are
-        from where we are.
-
-    Raises
-    ------
-    InputError : an option of another solver; a setting that there is not.
+    options : as from `solver_settings`. given : by the name of an option of `command_line`; None:
+    not given. settings : each "KEY=VALUE", the value as in a project file (text needs no quotes);
+    paths are relative to the current folder. Raises InputError : an option of another solver; an
+    unknown setting.
     """
     mine = {option: value for option, value in given.items() if value is not None}
     for option in mine:
         if option not in options:
             raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
+    section = solver_sections().get(name)
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not (key and equals):
             raise InputError(None, f"--{ANY}", f"expected KEY=VALUE, got {setting!r}")
-        mine[key.strip()] = _checked(name, key.strip(), _value(text))
+        key = key.strip()
+        try:
+            mine[key] = tomllib.loads(f"value = {text}")["value"]
+        except (ValueError, RecursionError):  # beside its own, tomllib lets these through
+            mine[key] = text
+        if section is None:
+            continue
+        try:
+            mine[key] = section.model_validate({key: mine[key]}).given(Path.cwd())[key]
+        except ValidationError as error:
+            found = first_error(None, error, section)
+            raise InputError(None, f"--{ANY} {found.field}", found.problem) from None
     return {**options, **mine}
-
-
-def _value(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):  # beside its own, tomllib lets these through
-        return text
-
-
-def _checked(name: str, key: str, value: Any) -> Any:
-    """A value of a solver of ours as its settings take it; that of a plug-in as it is."""
-    section = solver_sections().get(name)
-    if section is None:
-        return value
-    try:
-        return section.model_validate({key: value}).given(Path.cwd())[key]
-    except ValidationError as error:
-        found = first_error(None, error, section)
-        raise InputError(None, f"--{ANY} {found.field}", found.problem) from None

@@ -13,7 +13,7 @@ from ..meshes.cylinder_model import Collar, RigidSupports
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
-#: mm that a body reaches over a plane of symmetry, and that it is thick.
+#: mm: length beyond a plane of symmetry, and thickness of a body.
 OVER, THICK = 20.0, 10.0
 #: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
 #: top; elements around and across of a support, around and along a collar, and along its fillet:
@@ -26,22 +26,21 @@ FILLET_TURN = 75.0
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """points (n, 3) mm; elements (m, 8), numbered from 0: the last four nodes are the face that
-    meets the cylinder (S2)."""
+    """A body of elements (m, 8) over points (n, 3) mm; the last four nodes (S2) are in contact."""
 
     points: Array
     elements: Numbers
 
     @property
     def faces(self) -> Array:
-        """(m, 4, 3) mm: corners of the faces that meet the cylinder, as seen from there."""
+        """Return (m, 4, 3) mm corners of the faces in contact, as seen from the cylinder."""
         return np.asarray(self.points[self.elements[:, 4:]], dtype=float)
 
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
-    """The upper part of the support at z = span / 2, its crest at height `top` (mm).
+    """Return the upper part of the support at z = span / 2 under a cylinder of `radius` (mm).
 
-    radius : mm, of the cylinder that lies on it.
+    top : mm, height of its crest.
     """
     r = 0.5 * supports.diameter
 
@@ -56,13 +55,11 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
 
 
 def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
-    """The upper part of the collar on the side x, z >= 0, `above` (mm) the inflated cylinder.
+    """Return the upper part of the collar on the side x, z >= 0, `above` (mm) the cylinder.
 
     It goes down that far until one of its faces meets the cylinder. They are flat, chords of the
     ring, and meet it earlier than the ring would at the same height.
 
-    Parameters
-    ----------
     cylinder : (n, 3) mm, points of the inflated cylinder.
     """
     body = _ring(collar)
@@ -71,10 +68,8 @@ def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
 
 
 def way_down(faces: Array, points: Array) -> float:
-    """How far (mm) a ring of flat faces around the z axis goes down until it meets a point.
+    """Return how far (mm) a ring of flat faces around the z axis goes down to meet a point.
 
-    Parameters
-    ----------
     faces : (n, 4, 3) mm, corners counter-clockwise seen from inside. points : (m, 3) mm, inside.
     """
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
@@ -82,14 +77,14 @@ def way_down(faces: Array, points: Array) -> float:
     least = np.inf
     for face, n in zip(faces, normal, strict=True):
         beside = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
-        # Across its axis the ring is convex: who passes no face's plane is inside.
+        # Across its axis the ring is convex: a point beyond no face's plane is inside.
         if n[1] < 0.0 and beside.any():
             least = min(least, float(((points[beside] - face.mean(axis=0)) @ n).min() / -n[1]))
     return least
 
 
 def _ring(collar: Collar) -> RigidBody:
-    """The collar with its axis at height 0."""
+    """Return the collar with its axis at height 0."""
     radius, half = 0.5 * collar.inner_diameter, 0.5 * collar.length
     straight = np.linspace(-OVER, half - collar.fillet, COLLAR_COUNTS[1] + 1)
     turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
@@ -110,7 +105,7 @@ def _ring(collar: Collar) -> RigidBody:
 
 
 def _body(u: Array, v: Array, place: Callable[[Array, Array, int], Array]) -> RigidBody:
-    """One layer of solids over a grid; `place(u, v, face)`: 0 behind, 1 the face in contact."""
+    """Return one layer of solids over a grid; `place(u, v, face)`: 0 behind, 1 in contact."""
     grid = np.meshgrid(u, v, indexing="ij")
     points = np.concatenate([place(*grid, face).reshape(-1, 3) for face in (0, 1)])
     nodes = np.arange(len(u) * len(v)).reshape(len(u), len(v))

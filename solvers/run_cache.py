@@ -1,10 +1,9 @@
-"""Runs of external solvers that ended well, kept under what they depend on: one folder for all.
+"""Cached runs of external solvers that ended well, under a digest of what they depend on.
 
 A file a run, named by its key, in folders by the key's first two digits. A file appears whole
-under its name (it is written beside and renamed), so that any number of processes and machines may
-write and read the same folder, a network file system's among them: there is no lock and no
-database, which many of those do not carry: so it is neither diskcache, whose SQLite writes ahead
-into a file that cannot be shared over a network, nor joblib, which unpickles what it finds there
+under its name, so that any number of processes and machines may share the folder, also on a network
+file system: there is no lock and no database. It is neither diskcache, whose SQLite writes ahead
+into a file that cannot be shared over a network, nor joblib, which unpickles what it finds
 (tests/solvers/test_run_cache.py).
 """
 
@@ -19,44 +18,88 @@ import os
 import tempfile
 import time
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..caching import cache_folder
-from ..content import digest_of
 from ..errors import BubblefitError, OutputError
+from ..files import __version__, cache_folder, write_text
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note
-from ..writing import write_text
-from .base import BandedSolver, DifferentiatingSolver, History, ProgramSolver, Solver, announce
+from .base import (
+    BandedSolver,
+    DifferentiatingSolver,
+    History,
+    ProgramSolver,
+    Solver,
+    WrappedBand,
+    WrappedSolver,
+    announce,
+)  # fmt: skip
 from .decks import code_mark, program_mark
-from .wrapped import WrappedBand, WrappedSolver
 
 log = logging.getLogger(__name__)
 
-#: "off", or the folder, instead of what a project says.
+#: "off", or the folder, before the project's setting.
 VARIABLE = "BUBBLEFIT_RUNS"
 OFF = "off"
 SUFFIX, CUT = ".run", ".part"
-#: Bytes beyond which the runs that were not used for longest go, and the file that says another.
+#: Bytes beyond which the runs that were not used for longest go, and the file with another limit;
+#: they go down to a share of it, so that not every run has to make room.
 LIMIT, LIMIT_FILE = 2 * 1000**3, "limit"
-#: Down to this share of the limit, so that not every run has to make room.
 ROOM = 0.9
-#: Runs written by this process after which it looks again how full others have made the folder.
+#: Runs written by this process until it measures the folder again, which others fill as well.
 LOOK = 50
-#: s; what was begun earlier and has no name yet was cut off.
+#: s; a file that was begun earlier and has no name yet was cut off.
 OLD = 86400.0
-#: First bytes of every file: what it is, and of which layout.
+#: First bytes of every file, with the number of its layout.
 TITLE = b"bubblefit run 1\n"
-#: Fields that are no arrays, and are words instead.
-WORDS = ("iterations", "unstable", "remarks", "early")
-#: Not of the run itself.
-NOT_WRITTEN = ("seconds", "from_cache")
+#: Fields that are no arrays, and fields that are not of the run itself.
+WORDS, NOT_WRITTEN = ("iterations", "unstable", "remarks", "early"), ("seconds", "from_cache")
+
+
+def digest_of(*things: object) -> str:
+    """Return the SHA-256 of this version of bubblefit and of things, by content.
+
+    Numbers, words, None, arrays, and mappings (in any order), sequences and dataclasses of such;
+    TypeError for anything else.
+    """
+    digest = hashlib.sha256(__version__.encode())
+    for part in _parts(things):
+        # Lengths in front: "ab", "c" is not "a", "bc".
+        digest.update(f"{len(part)}:".encode())
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _parts(thing: object) -> Iterator[bytes]:
+    if thing is None or isinstance(thing, (bool, int, float, str, bytes)):
+        yield f"{type(thing).__name__} {thing!r}".encode()
+    elif isinstance(thing, np.ndarray):
+        yield f"array {thing.dtype.str} {thing.shape}".encode()
+        yield np.ascontiguousarray(thing).tobytes()
+    elif isinstance(thing, np.generic):
+        yield from _parts(thing.item())
+    elif is_dataclass(thing):
+        yield f"of {type(thing).__name__}".encode()
+        for field in fields(thing):
+            yield field.name.encode()
+            yield from _parts(getattr(thing, field.name))
+    elif isinstance(thing, Mapping):
+        yield f"mapping {len(thing)}".encode()
+        for key in sorted(thing, key=repr):
+            yield from _parts(key)
+            yield from _parts(thing[key])
+    elif isinstance(thing, Sequence):
+        yield f"sequence {len(thing)}".encode()
+        for item in thing:
+            yield from _parts(item)
+    else:
+        raise TypeError(f"{type(thing).__name__}: what it holds is not known")
 
 
 @dataclass(frozen=True)
@@ -74,25 +117,22 @@ class RunCache:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._held: int | None = None
-        self._written, self._told = 0, False
+        self._written, self._warned = 0, False
 
     @property
     def limit(self) -> int:
-        """Return the bytes beyond which runs go: what the folder says, else `LIMIT`."""
+        """Return the bytes beyond which runs go: the folder's own limit, else `LIMIT`."""
         with suppress(OSError, ValueError):
             return max(0, int((self.folder / LIMIT_FILE).read_text(encoding="ascii")))
         return LIMIT
 
     def set_limit(self, limit: int) -> None:
-        """Say it in the folder, for all who use it, and make room; raises OutputError."""
+        """Write the limit into the folder, for all users, and make room; raises OutputError."""
         write_text(self.folder / LIMIT_FILE, f"{limit}\n")
         self.prune(limit)
 
     def read(self, key: str) -> History | None:
-        """Return the run under this key; None where there is none.
-
-        A damaged one is dropped, and said so.
-        """
+        """Return the run under this key, or None; drop a damaged one with an announcement."""
         path = self._file(key)
         try:
             history = from_bytes(path.read_bytes(), key)
@@ -104,12 +144,12 @@ class RunCache:
             with suppress(OSError):
                 path.unlink()
             return None
-        with suppress(OSError):  # of somebody else, or on a file system that may only be read
+        with suppress(OSError):  # another user's, or on a read-only file system
             os.utime(path)
         return history
 
     def write(self, key: str, history: History, seconds: float) -> None:
-        """Keep a run that took so long; where that cannot be, it is said once."""
+        """Keep a run that took so many seconds; warn once where that cannot be."""
         try:
             content = to_bytes(history, key, seconds)
         except (ValueError, TypeError) as error:
@@ -129,16 +169,12 @@ class RunCache:
                     os.unlink(name)
             self._bound(len(content))
         except OSError as error:
-            self.not_kept(error)
-
-    def not_kept(self, error: OSError) -> None:
-        """Told once: a run that is not kept is as good."""
-        level = logging.INFO if self._told else logging.WARNING
-        log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
-        self._told = True
+            level = logging.INFO if self._warned else logging.WARNING
+            log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
+            self._warned = True
 
     def entries(self) -> list[Entry]:
-        """Every run that is there, that of the longest ago first."""
+        """Return every run that is there, the least recently used first."""
         found = []
         for path in self._files(SUFFIX):
             with suppress(OSError):  # gone meanwhile
@@ -147,13 +183,9 @@ class RunCache:
         return sorted(found, key=lambda entry: (entry.used, entry.path))
 
     def prune(self, size: int | None = None, older: float | None = None) -> list[Entry]:
-        """Drop what was used longest ago until `size` bytes are left; what, of all.
+        """Drop and return the least recently used runs until `size` bytes are left.
 
-        older : s; drop also what was not used for so long.
-
-        Raises
-        ------
-        OutputError : a file cannot be removed.
+        older : s; drop also what was not used for so long. OutputError : one cannot be removed.
         """
         entries, now = self.entries(), time.time()
         left, gone = sum(entry.size for entry in entries), []
@@ -176,7 +208,7 @@ class RunCache:
         return gone
 
     def _bound(self, more: int) -> None:
-        """Make room where what is there, `more` bytes of it just written, is beyond the limit."""
+        """Make room where the runs, `more` bytes of them just written, are beyond the limit."""
         self._written += 1
         if self._held is None or self._written % LOOK == 0:
             self._held = sum(entry.size for entry in self.entries())
@@ -191,7 +223,7 @@ class RunCache:
         return self.folder / key[:2] / f"{key}{SUFFIX}"
 
     def _files(self, suffix: str) -> Iterator[Path]:
-        # Hidden files are those that are being written.
+        # Files that are being written are hidden.
         wanted = f"[0-9a-f][0-9a-f]/{'.' if suffix == CUT else '[0-9a-f]'}*{suffix}"
         return self.folder.glob(wanted)
 
@@ -199,7 +231,7 @@ class RunCache:
 def run_cache(said: bool | str | Path = True) -> RunCache | None:
     """Return the cache in use; None where the project or the environment turns it off.
 
-    said : by the project: whether there is one, or its folder; the environment's counts before.
+    said : by the project: whether there is one, or its folder; the environment overrides it.
     """
     named = os.environ.get(VARIABLE, "")
     if said is False or named.lower() == OFF:
@@ -210,7 +242,7 @@ def run_cache(said: bool | str | Path = True) -> RunCache | None:
 
 @functools.cache
 def _cache_in(folder: Path) -> RunCache:
-    """One a folder: how full it is, is known to all solvers of a process."""
+    """Return the one cache of a folder: all solvers of a process share its size."""
     return RunCache(folder)
 
 
@@ -218,16 +250,14 @@ def _cache_in(folder: Path) -> RunCache:
 
 
 class Damaged(ValueError):
-    """Bytes that are not what was written."""
+    """Bytes that are not those that were written."""
 
 
 def to_bytes(history: History, key: str, seconds: float) -> bytes:
-    """Return the history with its key and the seconds it took, behind a checksum of all.
+    """Return the history with its key and its seconds, behind a checksum of all.
 
-    Raises
-    ------
-    ValueError, TypeError : it holds what is no result of numbers: a plug-in's own sort of history,
-        objects in place of numbers, numbers that are not finite.
+    Raises ValueError, TypeError : a plug-in's own sort of history, objects in place of numbers,
+    numbers that are not finite.
     """
     if type(history) is not History:
         raise TypeError(f"{type(history).__name__} is not a History")
@@ -259,8 +289,6 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
 def from_bytes(content: bytes, key: str) -> History:
     """Return the history that `to_bytes` wrote under this key, every number as it was.
 
-    Raises
-    ------
     Damaged : cut off, changed, of another layout, or of another key; says which.
     """
     start = len(TITLE) + hashlib.sha256().digest_size
@@ -268,7 +296,7 @@ def from_bytes(content: bytes, key: str) -> History:
         raise Damaged("it is not a run that was kept, or of another version")
     if hashlib.sha256(content[start:]).digest() != content[len(TITLE) : start]:
         raise Damaged("its checksum is wrong")
-    # The checksum is no proof against somebody who writes one: nothing is ever unpickled.
+    # The checksum is no proof against forgery: nothing is ever unpickled.
     try:
         with np.load(io.BytesIO(content[start:]), allow_pickle=False) as arrays:
             words = json.loads(str(arrays["words"]))
@@ -283,15 +311,11 @@ def from_bytes(content: bytes, key: str) -> History:
             if name.startswith("reactions of ")
         }
         return History(
-            **there,
-            reactions=reactions,
-            iterations=int(words["iterations"]),
+            **there, reactions=reactions, iterations=int(words["iterations"]),
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
-            early=str(words["early"]),
-            seconds=float(words["seconds"]),
-            from_cache=True,
-        )
+            early=str(words["early"]), seconds=float(words["seconds"]), from_cache=True,
+        )  # fmt: skip
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         if isinstance(error, Damaged):
             raise
@@ -312,25 +336,21 @@ def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> S
     """Return the solver with a cache before it, or as it is where that is of no use.
 
     That is one that runs in this process, one that starts from a guess of its own path (it
-    differentiates), and one that is asked to keep the folders of its runs.
-
-    Parameters
-    ----------
-    options : what it was made with, as far as that changes a result.
+    differentiates), and one that has to keep the folders of its runs. options : those of the
+    solver that change a result.
     """
-    if not solver.external or isinstance(solver, DifferentiatingSolver):
-        return solver
-    if getattr(solver, "keep", False):
+    embedded = not solver.external or isinstance(solver, DifferentiatingSolver)
+    if embedded or getattr(solver, "keep", False):
         return solver
     kind = BandedOnce if isinstance(solver, BandedSolver) else Once
     return kind(solver, cache, options)
 
 
 class Once(WrappedSolver):
-    """A solver of the protocol `Solver`, whoever runs it, that looks into a cache before it runs.
+    """A solver that looks into a cache before it runs.
 
-    A run that fails is not kept: what made it fail (a licence, memory, a full disk) may be gone the
-    next time, and its folder is there to look into.
+    A run that fails is not cached: the cause (a licence, memory, a full disk) may be gone the next
+    time, and its folder is kept for inspection.
     """
 
     def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
@@ -338,12 +358,9 @@ class Once(WrappedSolver):
         self.cache, self.options = cache, options
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Return the run from the cache (`History.from_cache`); else run and keep it."""
         key = self.key(model, law)
         history = None if key is None else self.cache.read(key)
@@ -367,10 +384,10 @@ class Once(WrappedSolver):
             code = code_mark(type(self.solver).__module__)
             own = (self.name, self.solver.identity, dict(self.options), program, code)
             return digest_of("run", own, model, law)
-        except (TypeError, BubblefitError) as error:  # whoever runs it is told of the latter
+        except (TypeError, BubblefitError) as error:  # the run raises the latter again
             log.info("runs of %s are not kept: %s", self.name, error)
             return None
 
 
 class BandedOnce(WrappedBand, Once):
-    """Look into a cache before a solver whose answer to some models is a band."""
+    """A solver with bands that looks into a cache before it runs."""

@@ -1,8 +1,8 @@
 """Scratch folders of external solvers: fresh for every run, in memory where there is room.
 
 A folder of a run under way holds a file that names the machine, its boot and the process, and that
-this process has locked for as long as it lives: what a killed process has left is found by that,
-and removed. A folder without that file is a run that is kept to be looked into.
+this process has locked for as long as it lives: so the folders of killed processes are found and
+removed. A folder without that file is a run that is kept for inspection.
 """
 
 from __future__ import annotations
@@ -38,20 +38,14 @@ OWNER, PATTERN = ".owner", "bubblefit-*-*"
 YOUNG = 60.0
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
 _INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM)
-#: Folders of runs under way. An interruption can fall between any two lines, also within the
-#: removal of a folder: what it leaves is removed at the end of the process.
-#: Each with the lock that says whose it is; a process that is killed outright leaves both, and the
-#: next one sweeps.
+#: Folders of runs under way with their locks. An interruption can fall between any two lines, also
+#: within the removal of a folder: the rest is removed at the end of the process, and after a kill
+#: by the next one's sweep.
 _under_way: dict[Path, int | None] = {}
 
 
 def fresh_folder(name: str, parent: Path | None = None) -> Path:
-    """Make an empty folder `bubblefit-NAME-...` below `parent` (default: memory, else disk).
-
-    Raises
-    ------
-    OutputError : it cannot be made.
-    """
+    """Make an empty folder `bubblefit-NAME-...` below `parent` (default: memory, else disk)."""
     place = default_parent() if parent is None else parent
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -67,14 +61,9 @@ def run_folder(
 ) -> Iterator[Path]:
     """Make the folder of one run: removed after a good end unless `keep`, kept after a failure.
 
-    Parameters
-    ----------
     logs : name of the log in the folder whose tail a failure carries, where it has none yet.
 
-    Raises
-    ------
-    SolverFailure : the one that the run raised, with the folder and the log. OutputError : as
-        `fresh_folder`.
+    Raises SolverFailure : that of the run, with the folder and the log. OutputError : no folder.
     """
     with _undisturbed():
         folder = fresh_folder(name, parent)
@@ -89,7 +78,7 @@ def run_folder(
         kind = type(failure)
         raise kind(failure.reason, solver, failure.exit_number, tail, kept) from None
     except BaseException:
-        remove(folder)  # interrupted, or never begun: there is nothing to look into
+        remove(folder)  # interrupted, or never begun: there is nothing to inspect
         raise
     if keep:
         release(folder, _under_way.pop(folder, None))
@@ -99,40 +88,35 @@ def run_folder(
 
 
 def default_parent() -> Path:
-    """Memory when it has room, else the system's temporary folder."""
-    try:
+    """Return memory when it has room, else the system's temporary folder."""
+    with suppress(OSError):
         if os.access(MEMORY, os.W_OK | os.X_OK) and shutil.disk_usage(MEMORY).free > ROOM:
             return MEMORY
-    except OSError:
-        pass
     return Path(tempfile.gettempdir())
 
 
 def put_aside(folder: Path) -> Path:
     """Move a failed run out of memory onto the disk, unless that is full; return its place."""
-    lock = _under_way.pop(folder, None)
-    if folder.parent != MEMORY:
-        release(folder, lock)
-        return folder
-    target = Path(tempfile.gettempdir()) / folder.name
-    own = None
-    try:
-        target.mkdir(mode=0o700)
-        own = claim(target)  # a copy that is cut off is somebody's to sweep
-        shutil.copytree(folder, target, ignore=shutil.ignore_patterns(OWNER), dirs_exist_ok=True)
-    except (OSError, shutil.Error):
-        clear(target)
+    lock, own, kept = _under_way.pop(folder, None), None, folder
+    if folder.parent == MEMORY:
+        target = Path(tempfile.gettempdir()) / folder.name
+        try:
+            target.mkdir(mode=0o700)
+            own = claim(target)  # a copy that is cut off can be swept
+            leave = shutil.ignore_patterns(OWNER)
+            shutil.copytree(folder, target, ignore=leave, dirs_exist_ok=True)
+            kept = target
+        except (OSError, shutil.Error):
+            clear(target)
         release(target, own)
-        release(folder, lock)
-        return folder
-    release(target, own)
-    clear(folder)
+        if kept is target:
+            clear(folder)
     release(folder, lock)
-    return target
+    return kept
 
 
 def remove(folder: Path) -> None:
-    """Remove a scratch folder with what is in it."""
+    """Remove a scratch folder with its content."""
     clear(folder)
     release(folder, _under_way.pop(folder, None))
 
@@ -145,13 +129,13 @@ def sweep_left(place: Path | None = None) -> None:
 
 @atexit.register
 def remove_interrupted() -> None:
-    """Remove the folders of runs that were under way; for a process that ends without its exit."""
+    """Remove the folders of runs under way; for a process that ends without its exit."""
     for folder in tuple(_under_way):
         remove(folder)
 
 
-def _those_of_the_parent() -> None:
-    # A copy of its lock would hold it where the parent is killed.
+def _forget_parent() -> None:
+    # A copy of the parent's lock would hold it where the parent is killed.
     for lock in _under_way.values():
         if lock is not None:
             os.close(lock)
@@ -159,12 +143,12 @@ def _those_of_the_parent() -> None:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_those_of_the_parent)
+    os.register_at_fork(after_in_child=_forget_parent)
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Holds interruptions off by handlers that wait; only the main thread is interrupted.
+    """Delay interruptions, which reach only the main thread, to the end of the block.
 
     A mask of signals would not do: another thread of the process then takes them.
     """
@@ -184,7 +168,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def claim(folder: Path) -> int | None:
-    """Lock a folder for this process; return the lock, to be closed in the end. None: no room."""
+    """Lock a folder for this process; return the lock, to be closed later. None: no room."""
     number = None
     try:
         number = os.open(folder / OWNER, os.O_RDWR | os.O_CREAT, 0o600)
@@ -197,7 +181,7 @@ def claim(folder: Path) -> int | None:
 
 
 def release(folder: Path, lock: int | None) -> None:
-    """Give a folder up that is kept."""
+    """Remove the owner of a folder that is kept."""
     with suppress(OSError):
         (folder / OWNER).unlink(missing_ok=True)
     if lock is not None:
@@ -205,7 +189,7 @@ def release(folder: Path, lock: int | None) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove a folder with what is in it, its owner last: what is cut off is still somebody's."""
+    """Remove a folder with its content, the owner last: a removal that is cut off can be swept."""
     with suppress(OSError):
         for path in folder.iterdir():
             if path.name == OWNER:
@@ -218,10 +202,9 @@ def clear(folder: Path) -> None:
 
 
 def sweep(places: Iterable[Path]) -> list[Path]:
-    """Remove what processes that are gone have left in these places; return the folders.
+    """Remove and return the folders that dead processes have left in these places.
 
-    Never a folder whose process lives, or that another machine may use, or of another user; nor
-    one that is kept.
+    Never that of a living process, of another user, or of another machine, nor one that is kept.
     """
     gone = []
     for place in dict.fromkeys(places):
@@ -239,12 +222,13 @@ def _left(folder: Path) -> bool:
     """Return whether the process of a folder is gone."""
     try:
         about = folder.lstat()
-        if folder.is_symlink() or not folder.is_dir() or not _ours(about):
+        ours = not hasattr(os, "getuid") or about.st_uid == os.getuid()
+        if folder.is_symlink() or not folder.is_dir() or not ours:
             return False
         old = time.time() - about.st_mtime > YOUNG
         number = os.open(folder / OWNER, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
     except FileNotFoundError:
-        # Killed before it was anybody's, or at the very end of its removal.
+        # Killed before it had an owner, or at the very end of its removal.
         return old and folder.is_dir() and not any(folder.iterdir())
     except OSError:
         return False
@@ -268,10 +252,6 @@ def _self() -> tuple[str, str, str, str]:
     return platform.node(), _boot(), str(os.getpid()), _started(os.getpid())
 
 
-def _ours(about: os.stat_result) -> bool:
-    return not hasattr(os, "getuid") or about.st_uid == os.getuid()
-
-
 @functools.cache
 def _boot() -> str:
     try:
@@ -281,10 +261,9 @@ def _boot() -> str:
 
 
 def _started(process: int) -> str:
-    """Return what tells a process from a later one of the same number; "gone" without one."""
+    """Return a mark of a process, not of a later one of the same number; "gone" without one."""
     with suppress(OSError, IndexError):
-        # Ticks since the boot, which no clock that is set changes, after the program's name, which
-        # may hold anything.
+        # Ticks since the boot, after the program's name, which may hold anything.
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[19]
     try:
         return str(psutil.Process(process).create_time())

@@ -1,11 +1,11 @@
-"""What the settings of every solver have in common: `[solver.NAME]` of a project file."""
+"""Settings that every solver has in common: `[solver.NAME]` of a project file."""
 
 from __future__ import annotations
 
 import importlib
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -16,24 +16,24 @@ from ..errors import InputError
 from ..readers.sections import Section, beside, first_error
 from .base import Diagnosis, Solver
 
-#: Folders, as in PATH, below which a project may say what is run.
+#: Folders, as in PATH, whose projects may name programs to run.
 PROGRAMS_FROM = "BUBBLEFIT_PROGRAMS_FROM"
 #: Names of solvers' own programs, which are looked up on the user's PATH.
 _KNOWN = re.compile(r"(ccx|run_marc)[\w.-]*")
+#: s, for which a denied licence is requested again where licences are counted.
+WAIT_S = 600.0
+#: Option of a solver, never in a project: address of the Dask scheduler that counts licences for
+#: its whole cluster as well.
+SCHEDULER = "licence_scheduler"
 
 
 @dataclass(frozen=True)
 class Override:
-    """An option of the command line that takes the place of one of a solver's settings.
+    """An option of the command line for one of a solver's settings.
 
-    Parameters
-    ----------
-    name : of the setting, and of the option without its dashes.
-    what : for the help; solvers that share an option share this. values : which there are.
-    metavar : what stands for the value in the help.
-    path : whether it is a file or folder, which the command line gives as such.
-    look : for an option that names the solver's program: what it is for when solvers are looked
-        at.
+    name : of the setting, and of the option without its dashes. what : for the help; solvers that
+    share an option share this. values : possible ones. metavar : in the help. path : whether it is
+    a file or folder. look : of an option that names the solver's program: its help in `doctor`.
     """
 
     name: str
@@ -47,10 +47,10 @@ class Override:
 class SolverSettings(Section):
     """A table [solver.NAME] of a project file.
 
-    paths : keys whose values are files or folders beside the project file. programs : likewise,
-    but a bare name is a program on the PATH. started : keys that say what is run, and how: see
-    `check_programs`. overrides : what the command line may say instead. uncounted : keys that
-    change no result; nor do where files lie, which count by what is in them.
+    paths : keys of files or folders beside the project file. programs : likewise, but a bare name
+    is a program on the PATH. started : keys that name a program to run, and how: see
+    `check_programs`. overrides : options of the command line. uncounted : keys that change no
+    result, nor do places of files, which count by content.
     """
 
     paths: ClassVar[tuple[str, ...]] = ()
@@ -61,17 +61,13 @@ class SolverSettings(Section):
 
     @classmethod
     def counted(cls, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Of what a solver is made with, what may change a result and is no file."""
-        others = {
-            *cls.uncounted,
-            *cls.paths,
-            *cls.programs,
-            *(o.name for o in cls.overrides if o.look),
-        }
+        """Return the options that may change a result and are no files."""
+        looks = (one.name for one in cls.overrides if one.look)
+        others = {*cls.uncounted, *cls.paths, *cls.programs, *looks}
         return {key: value for key, value in options.items() if key not in others}
 
     def given(self, folder: Path) -> dict[str, Any]:
-        """What the solver is made with; paths from `folder`, that of the file with the table."""
+        """Return the solver's options; paths are relative to `folder`, that of the project."""
         values = self.model_dump()
         for name in (*self.paths, *self.programs):
             value = values[name]
@@ -83,22 +79,24 @@ class SolverSettings(Section):
 def check_programs(
     path: Path, solver: str, table: Mapping[str, Any], started: Iterable[str], advice: str = ""
 ) -> None:
-    """That a project says what is run only where its user lets it.
+    """Check that a project names programs to run only where its user permits that.
 
-    A bare name of a solver's own program (ccx_2.20, run_marc2023) may always be said: it is looked
+    A bare name of a solver's own program (ccx_2.20, run_marc2023) is always permitted: it is looked
     up on the user's PATH.
 
-    Parameters
-    ----------
-    path : of the project. table : [solver.NAME] as it is written. started : its keys that say what
-    is run, and how. advice : what else the user may do.
-
-    Raises
-    ------
-    InputError : such a key is there, and the file is in none of the folders of `PROGRAMS_FROM`.
+    path : of the project. table : [solver.NAME] as it is written. started : its keys that name
+    programs. advice : what else the user may do. Raises InputError : such a key is there, and the
+    file is in none of the folders of `PROGRAMS_FROM`.
     """
-    said = [key for key in started if key in table and not _is_known(table[key])]
-    if not said or _below_allowed(path):
+
+    def known(value: Any) -> bool:
+        return isinstance(value, str) and bool(_KNOWN.fullmatch(value))
+
+    said = [key for key in started if key in table and not known(table[key])]
+    allowed = [
+        Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f
+    ]
+    if not said or any(path.resolve().is_relative_to(folder.resolve()) for folder in allowed):
         return
     problem = (
         "says what is run, and a project may come from somebody else; "
@@ -107,30 +105,15 @@ def check_programs(
     raise InputError(path, f"solver.{solver}.{said[0]}", problem)
 
 
-def _is_known(value: Any) -> bool:
-    return isinstance(value, str) and bool(_KNOWN.fullmatch(value))
-
-
-def _below_allowed(path: Path) -> bool:
-    folders = [
-        Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f
-    ]
-    return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
-
-
-#: s, that a denied licence is asked for again where licences are counted.
-WAIT_S = 600.0
-
-
 class LicenceSettings(Section):
-    """How many runs there may be at once, and what is done where one gets no licence.
+    """Number of simultaneous runs, and what is done where one gets no licence.
 
-    licences : runs at once, of all processes and users that lock the same files; not counted unless
-    given. licence_folder : of these files, one for the machine unless given. licence_wait : s to go
-    on trying after a licence was denied; 600 where they are counted, else 0. licence_retry : s
-    until the first further try; later pauses are longer, each a little by chance.
-    licence_denied : words in the program's log that mean a denied licence, beside what the solver
-    itself knows.
+    licences : simultaneous runs of all processes and users that lock the same files; not counted
+    unless given. licence_folder : of these files, one for the machine unless given. licence_wait :
+    s of further tries after a licence was denied; 600 where they are counted, else 0.
+    licence_retry : s until the first further try; later pauses are longer, each a little by chance.
+    licence_denied : words in the program's log that mean a denied licence, beside those that the
+    solver itself knows.
     """
 
     licences: Annotated[int, Field(ge=1, le=100_000)] | None = None
@@ -141,24 +124,21 @@ class LicenceSettings(Section):
 
     @property
     def wait(self) -> float:
-        """s, that a denied licence is asked for again."""
+        """Return for how long (s) a denied licence is requested again."""
         if self.licence_wait is not None:
             return self.licence_wait
         return 0.0 if self.licences is None else WAIT_S
 
 
 KEYS = tuple(LicenceSettings.model_fields)
-#: Among the options of a solver, never in a project: address of the Dask scheduler that counts
-#: licences for its whole cluster as well.
-SCHEDULER = "licence_scheduler"
 
 
 class ExternalSettings(SolverSettings, LicenceSettings):
-    """What every program of its own has in its table [solver.NAME]."""
+    """Settings of every external program in its table [solver.NAME]."""
 
 
 def split(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What options say of licences (None: not given), and the others."""
+    """Return the options of licences (None: not given), and the others."""
     known = (*KEYS, SCHEDULER)
     own = {key: options[key] for key in known if options.get(key) is not None}
     return own, {key: value for key, value in options.items() if key not in known}
@@ -167,11 +147,9 @@ def split(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 def licence_settings(
     name: str, given: Mapping[str, Any], path: Path | None = None
 ) -> LicenceSettings:
-    """Checked settings of the solver `name`; paths are beside the project file `path`.
+    """Return the checked settings of the solver `name`; InputError for an impossible value.
 
-    Raises
-    ------
-    InputError : a value that cannot be meant.
+    path : of the project; the folder of licences is relative to its folder.
     """
     plain = {key: str(v) if isinstance(v, Path) else v for key, v in given.items()}
     try:
@@ -189,14 +167,10 @@ def licence_settings(
 class Offer:
     """A solver by name, made when it is called with its options.
 
-    Parameters
-    ----------
-    name : what a project file or --solver calls it.
-    package : its folder, as a package: the class of the solver is in the module `solver`, and the
-        module `diagnosis` has `diagnose(named)`, a list of `Diagnosis` of what there is of it on
-        this machine (`named`: a program to look at, or None).
-    solver : name of the class.
-    settings : what its table in a project may say.
+    name : in project files and of --solver. package : its folder, as a package: the class of the
+    solver is in the module `solver`, and the module `diagnosis` has `diagnose(named)`, a list of
+    `Diagnosis` (`named`: a program to look at, or None). solver : name of the class. settings :
+    schema of its table in a project.
     """
 
     name: str
@@ -205,18 +179,18 @@ class Offer:
     settings: type[SolverSettings]
 
     def __call__(self, **options: Any) -> Solver:
-        """A new solver."""
+        """Return a new solver."""
         module = importlib.import_module(f"{self.package}.solver")
         solver: Solver = getattr(module, self.solver)(**options)
         return solver
 
     @property
     def program(self) -> Override | None:
-        """The option that names its program, where it has one."""
+        """Return the option that names its program, where it has one."""
         return next((one for one in self.settings.overrides if one.look), None)
 
     def diagnose(self, named: Path | str | None = None) -> list[Diagnosis]:
-        """What there is of it on this machine, each tried on bars."""
+        """Diagnose every installation of it on this machine, each on the bars."""
         module = importlib.import_module(f"{self.package}.diagnosis")
-        diagnose: Callable[[Path | str | None], list[Diagnosis]] = module.diagnose
-        return diagnose(named)
+        found: list[Diagnosis] = module.diagnose(named)
+        return found

@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 import pytest
 from bubblefit.errors import InputError, one_line
+from bubblefit.files import check_regular, content_of
 from bubblefit.materials.card import read_card
 from bubblefit.project.project import read_project
 from bubblefit.readers.columns import LOAD_UNITS
@@ -33,7 +34,6 @@ from bubblefit.readers.sections import (
     first_error,
 )
 from bubblefit.readers.tables import read_lines
-from bubblefit.reading import check_regular, content_of
 from bubblefit.solvers.marc.settings import site_settings
 from pydantic import Field, TypeAdapter, ValidationError
 

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import replacing
 from ...materials.designers import (
     POINTS,
     USUAL,
@@ -29,7 +30,6 @@ from ...notes import Note, NoteKind, rows
 from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
-from ...writing import replacing
 from .objective import PERCENT
 from .test import BiaxialData, BiaxialTest
 

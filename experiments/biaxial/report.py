@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
@@ -19,7 +20,6 @@ from ...readers.biaxial import BiaxialPath
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
-from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
 from .objective import PERCENT
 from .prepared import FittedPath, PreparedBiaxial

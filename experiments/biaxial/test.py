@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import InputError
+from ...files import is_file
 from ...meshes.strip_models import PatchModel
 from ...readers.biaxial import (
     BiaxialPath,
@@ -21,7 +22,6 @@ from ...readers.biaxial import (
     read_biaxial_table,
 )
 from ...readers.sections import beside
-from ...reading import is_file
 from ..keys import named_format
 from ..kinds import Place, Reach, Refined
 from .section import BiaxialSection, TablesSection

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import is_file
 from ...readers.columns import PRESSURE_UNITS, TIME_UNITS
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
@@ -28,7 +29,6 @@ from ...readers.pressure_log import (
     read_pressure_log,
 )
 from ...readers.sections import LENGTH_UNITS
-from ...reading import is_file
 from ..keys import channel_of, named_format
 from ..kinds import Place
 from .registration import RegistrationOptions

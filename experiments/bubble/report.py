@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...files import replacing
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
@@ -35,7 +36,6 @@ from ...reports.maps import Maps, Shade, Solid, maps_of, pack
 from ...reports.vega import save
 from ...reports.vtu import write_pvd, write_vtu
 from ...solvers.base import History
-from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .findings import (
     clock_words,

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...files import replacing
 from ...materials.card import BAND, LEVEL, MaterialCard
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
@@ -30,7 +31,6 @@ from ...reports.cylinders import (
 )
 from ...reports.vega import save
 from ...reports.vtu import write_vtu
-from ...writing import replacing
 from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
 from .predicted import (
     BendingRun,

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ...errors import InputError
+from ...files import is_file
 from ...meshes.cylinder_model import (
     DEFLECTION,
     FRAMES,
@@ -27,7 +28,6 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve, read_bending_curves
 from ...readers.frames import FrameSource
-from ...reading import is_file
 from ..keys import channel_of, named_format
 from ..kinds import DataFile, Place, Reach, Refined, joined
 from .section import CylinderSection, MeasuredSection

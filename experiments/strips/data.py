@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import is_file
 from ...inference.comparison import NoiseIs
 from ...meshes.strip_models import WIDTH
 from ...readers.curves import DIRECTIONS, LoadCurve, read_load_curves, split_at_restarts
@@ -24,7 +25,6 @@ from ...readers.polynomials import (
 )
 from ...readers.registry import format_of
 from ...readers.sections import beside
-from ...reading import is_file
 from ..keys import named_format
 from ..kinds import DataFile, Place
 from .polynomials import strain_regions

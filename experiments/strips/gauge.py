@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
+from ...files import replacing
 from ...notes import Note, NoteKind, as_note, rows
 from ...readers.curves import LoadCurve, direction_named
 from ...readers.frames import Frame
 from ...readers.machine_tables import read_machine_loads, read_times
-from ...writing import replacing
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
+from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
@@ -30,7 +31,6 @@ from ...reports.strips import (
 from ...reports.vega import save
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
-from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .data import Strip
 from .doubts import curves_of

@@ -10,10 +10,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...caching import cache_folder
 from ...errors import InputError, SolverFailure
-from ..disk import disk_full
-from ..process import Outcome, log_tail
+from ...files import cache_folder
+from ..process import Outcome, disk_full, log_tail
 
 VARIABLE = "BUBBLEFIT_CCX"
 #: Origins of a ccx that somebody chose: there has to be nothing wrong with these.

@@ -11,9 +11,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from ...caching import cache_folder
 from ...errors import InputError, OutputError, SolverFailure
-from ...files import render
+from ...files import cache_folder, render
 from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw

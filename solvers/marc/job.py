@@ -16,8 +16,7 @@ from typing import TypeVar
 
 from ...errors import InputError, LicenceDenied, SolverFailure
 from ..base import Progress
-from ..disk import WORDS, disk_full
-from ..process import Outcome, Watch, log_tail, run_process
+from ..process import WORDS, Outcome, Watch, disk_full, log_tail, run_process
 from ..scratch import run_folder
 from .deck import JOB, Reader
 from .settings import VARIABLE, MarcSettings

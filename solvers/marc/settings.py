@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from ...errors import InputError
+from ...files import is_file, toml_of
 from ...readers.sections import first_error
-from ...reading import is_file, toml_of
 from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_MARC"

@@ -29,21 +29,30 @@ from .newton import (
 
 Array = NDArray[np.float64]
 
-#: Viscosity of the first step over pressure over the size of a facet: so much that it hardly
-#: moves. Factor down after a step that was found, up after one that was not; the most of both.
+#: Viscosity over pressure over the size of a facet: in the first step, which hardly moves; factors
+#: after a step that was found, and one that was not; the most steps of both kinds.
 FIRST, DOWN, UP, MOST_STEPS = 20.0, 0.3, 8.0, 60
-#: Likewise: the least; above the most, given up; at or below the third, rest is looked for
+#: Likewise: the least; the most, then failure; at or below the third, equilibrium is searched
 #: where a step moved no node by more than this share of a facet's size.
 LEAST, MOST, LITTLE, NEAR = 1e-3, 1e5, 10.0, 0.05
+#: A node further from the extrapolation than this many times the collar's way has snapped.
+SNAP = 4.0
+#: mm that the supports bite into the inflated membrane, which then hangs free on them.
+BITE = 0.02
+#: A gas at this many times the pressure nearly prescribes the volume that it fills.
+OVERPRESSURE = 50.0
+#: Share of the volume for one step, the smallest tried, and how far all of them may lead.
+STEP, LEAST_STEP, MOST_GROWTH = 0.01, 1e-4, 2.0
+#: An increment in which the volume grows by a larger share is passed by volume.
+MOST_GROWTH_INFLATED = 0.1
 
 
 def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
-    """Equilibrium (n, 3) that the membrane moves to from `start`, nothing else moving; or None.
+    """Return the equilibrium (n, 3) to which the membrane alone moves from `start`, or None.
 
     Backward Euler steps of a viscous motion, residual(u) + viscosity area (u - u_before) = 0, each
-    an equilibrium of a membrane that cannot jump. The viscosity is taken away as the motion dies
-    down and the answer has none of it: what is returned is in equilibrium without it. The fabric's
-    law sees the way there as one increment.
+    an equilibrium of a membrane that cannot jump. The viscosity vanishes as the motion dies down:
+    the result is in equilibrium without it. The law sees the way there as one increment.
     """
     facet = float(np.sqrt(np.median(membrane.elements.area.sum(axis=1))))
     unit = membrane.pressure / facet
@@ -71,30 +80,15 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
         membrane.drag(0.0, start)
 
 
-#: A node further from where the last increments led to than this many times the collar's way.
-SNAP = 4.0
-#: mm that the supports bite into the inflated membrane, which hangs free on them from then on.
-BITE = 0.02
-
-
 def analyse(
-    membrane: ClosedMembrane,
-    model: InflatedModel,
-    inflated: Array,
-    pressure: float,
-    extremes: tuple[Array, Array],
-    sides: NDArray[np.bool_],
-    asked: Asked,
-) -> History:
-    """Frames of the bending: first the inflated state, then one for every reported displacement.
+    membrane: ClosedMembrane, model: InflatedModel, inflated: Array, pressure: float,
+    extremes: tuple[Array, Array], sides: NDArray[np.bool_], asked: Asked,
+) -> History:  # fmt: skip
+    """Return the frames of the bending: the inflated state and every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
     all bodies on it, `wrinkled` a share of `sides` (elements,). Where no equilibrium is found on
-    the way, the history ends with the last good frame and says so.
-
-    Raises
-    ------
-    SolverFailure : there is not even the first reported displacement.
+    the way, the history ends early with the last good frame; SolverFailure without any.
     """
     plan = model.bending
     assert plan is not None
@@ -120,7 +114,7 @@ def analyse(
     early = ""
     wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
     moving = Moving(membrane, bodies)
-    # What has no equilibrium on the way ends the history, and is no failure.
+    # A displacement without equilibrium ends the history, and is no failure.
     try:
         steps = march(moving, plan.displacements, asked, (0.0, inflated), len(model.pressures))
         for wanted, found in zip(plan.displacements, steps, strict=True):
@@ -144,16 +138,13 @@ def analyse(
     except NoEquilibrium as failure:
         early = f"the run stopped early: {failure.reason}"
         remarks.append(Note(NoteKind.EARLY, early))
-    frames = [0]
-    for i in range(len(plan.displacements)) if plan.reported is None else plan.reported:
-        if i + 1 < len(path):
-            frames.append(i + 1)
+    reported = range(len(plan.displacements)) if plan.reported is None else plan.reported
+    frames = [0, *(i + 1 for i in reported if i + 1 < len(path))]
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
     if snaps:
         where = ", ".join(f"{d:.4g}" for d in snaps)
-        words = f"snaps, or nearly, before {where} mm of deflection"
-        remarks.append(Note(NoteKind.SNAP, words))
+        remarks.append(Note(NoteKind.SNAP, f"snaps, or nearly, before {where} mm of deflection"))
     words = f"rigid bodies penetrate {deepest:.3g} mm at most"
     remarks.append(Note(NoteKind.PENETRATION, words))
     most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
@@ -163,32 +154,22 @@ def analyse(
             f"fabric's) carries {100 * of_wrinkles / most:.2g} % of the largest load"
         )
         remarks.append(Note(NoteKind.WRINKLES, words))
-    # What is normal to a symmetry plane is taken up by the other half.
+    # The other half takes up forces normal to a symmetry plane.
     force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
     reactions: dict[str, Array] = {}
     for i, body in enumerate((*posts, collar)):
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
     return History(
-        force[:, -1] @ way,
-        np.array(path)[frames],
-        low,
-        high,
-        reactions,
+        force[:, -1] @ way, np.array(path)[frames], low, high, reactions,
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
-        iterations=membrane.iterations,
-        path=np.array(path),
-        wrinkled=np.array(wrinkled)[frames],
-        remarks=tuple(remarks),
-        early=early,
-    )
+        iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
+        remarks=tuple(remarks), early=early,
+    )  # fmt: skip
 
 
 class Moving(Loading):
-    """A membrane that a collar is moved into, by its way (mm).
-
-    expected : where the last increments led to.
-    """
+    """A membrane that a collar moves into, by its way (mm); expected : the extrapolated state."""
 
     most_cuts = 3
 
@@ -201,7 +182,7 @@ class Moving(Loading):
     def equilibrium(self, start: Array, level: float) -> Array | None:
         self.membrane.bodies = self.bodies(level)
         found = self.membrane.equilibrium(start, self.membrane.pressure)
-        # Wrinkles that come and go leave Newton's iteration nowhere to go; so does a limit load.
+        # Newton's iteration fails where wrinkles come and go, and at a limit load.
         return found if found is not None else settled(self.membrane, start)
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
@@ -213,17 +194,11 @@ class Moving(Loading):
         return f"no equilibrium between {before:.4g} and {level:.4g} mm of deflection"
 
 
-#: A gas at this many times the pressure nearly prescribes the volume that it fills.
-OVERPRESSURE = 50.0
-#: Share of the volume for one step, the smallest tried, and how far all of them may lead.
-STEP, LEAST_STEP, MOST_GROWTH = 0.01, 1e-4, 2.0
-
-
 def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float) -> Array | None:
-    """Equilibrium at `level` beyond a limit pressure, from that at `before` (MPa); None if not.
+    """Return the equilibrium at `level` beyond a limit pressure, from that at `before` (MPa).
 
-    Under pressure alone the membrane would jump. The law needs the strain path in between, so
-    that every step of the volume is an increment of it and is accepted.
+    Under pressure alone the membrane would jump. The law needs the strain path in between, so every
+    step of the volume is an increment of it and is accepted.
     """
     outside = OVERPRESSURE * level
     first, _ = membrane.cavity.measure(membrane.reference + u)
@@ -252,21 +227,15 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
         membrane.gas = None
 
 
-#: An increment in which the volume grows by a larger share is gone through by volume.
-MOST_GROWTH_INFLATED = 0.1
-
-
 def analyse_inflated(
     membrane: ClosedMembrane, model: InflatedModel, asked: Asked
 ) -> tuple[History, Array]:
-    """History of the inflation, or of the bending where the model has one; no derivatives yet.
+    """Return the history of the inflation, or of the bending; derivatives are empty.
 
     The membrane is fresh: no strain, no stress.
 
-    Raises
-    ------
-    InputError : derivatives or a guess was asked for.
-    SolverFailure : an increment of the pressure has no equilibrium.
+    Raises InputError : derivatives or a guess was asked for. SolverFailure : an increment of the
+    pressure has no equilibrium.
     """
     if asked.parameters or asked.guess is not None:
         raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
@@ -287,10 +256,8 @@ def analyse_inflated(
         for before, level in filling.snaps
     )
     if model.bending is not None:
-        bent = closed_membrane(
-            model, membrane.law, membrane.tolerance, model.fixed(bent=True),
-            membrane.wall,
-        )  # fmt: skip
+        fixed = model.fixed(bent=True)
+        bent = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
         bent.iterations = membrane.iterations
@@ -299,38 +266,25 @@ def analyse_inflated(
         history = analyse(bent, model, *start, extremes, sides, asked)
         history = replace(history, remarks=(*remarks, *history.remarks))
     else:
-        reactions = {
-            name: record.forces[:, model.mesh.node_sets[name]].sum(axis=1)
-            for name in model.supports
-        }
+        sets = model.mesh.node_sets
+        reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
         history = History(
-            levels,
-            record.path,
-            record.low,
-            record.high,
-            reactions,
-            cavity_pressure=levels,
-            cavity_volume=model.copies * volume,
-            iterations=membrane.iterations,
-            path=record.path,
-            wrinkled=wrinkled,
-            remarks=remarks,
-        )
+            levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
+            cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
+            wrinkled=wrinkled, remarks=remarks,
+        )  # fmt: skip
     return history, np.zeros((*history.displacement.shape, 0))
 
 
 def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
-    """(elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
+    """Return (elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
     sides = np.ones(len(model.mesh.quads), dtype=bool)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     return sides
 
 
 class Filling(Loading):
-    """A closed membrane under a pressure (MPa).
-
-    snaps : the pressures between which it snaps, as they are met.
-    """
+    """A closed membrane under a pressure (MPa); snaps : pairs of pressures around each snap."""
 
     most_cuts = 8
 
@@ -356,7 +310,7 @@ class Filling(Loading):
             now, then = (cavity.measure(reference + at)[0] for at in (found, u))
             if now < (1.0 + MOST_GROWTH_INFLATED) * then:
                 return found
-            # Newton may leap over a limit point, but the law needs the strain path on the way.
+            # Newton may leap over a limit point, but the law needs the strain path across it.
         self.snaps.append((lower, level))
         return through_snap(self.membrane, u, lower, level)
 
@@ -371,12 +325,12 @@ class Filling(Loading):
     ) -> Array | None:
         found = self.equilibrium(start, level)
         if found is None and cuts == self.most_cuts:
-            # Folds of a cap come and go: what helps against slack helps here before smaller steps.
+            # Folds of a cap come and go: treat it as slack before trying smaller steps.
             found = self.membrane.equilibrium_from_slack(u, level)
         return found if found is not None else halved(self, lower, u, level, cuts)
 
     def _from_slack(self, level: float, cuts: int) -> Array:
-        """Facets carry no pressure until they are stretched."""
+        """Return the first equilibrium: facets carry no pressure until they are stretched."""
         initial_moduli(self.membrane.law)
         none = np.zeros_like(self.membrane.reference)
         found = self.membrane.equilibrium_from_slack(none, level)
@@ -393,22 +347,22 @@ class Filling(Loading):
 def prepare(
     model: CylinderModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """What does not change from one law to the next; a tension field unless asked otherwise."""
+    """Build the membrane of a cylinder; a tension field unless another wall is given."""
     return closed_model.prepare(closed_membrane_of(model), law, tolerance, wall or TENSION_FIELD)
 
 
 def analyse_cylinder(
     membrane: ClosedMembrane, model: CylinderModel, asked: Asked
 ) -> tuple[History, Array]:
-    """As `inflated.analyse`."""
+    """Return `analyse_inflated` of the cylinder's closed membrane."""
     return analyse_inflated(membrane, closed_membrane_of(model), asked)
 
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:
-    """The cylinder with its posts and ring; whatever is held, reported and closed in stays.
+    """Return the cylinder with its posts and ring; all that is held, reported and closed in stays.
 
-    A quarter has the support at z = span / 2 and half of the ring, as its planes of symmetry have
-    it; the whole cylinder has both supports, whose forces are reported as one.
+    A quarter has the support at z = span / 2 and half of the ring; the whole cylinder has both
+    supports, whose forces are reported as one.
     """
     half, radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
     sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
@@ -425,11 +379,6 @@ def closed_membrane_of(model: CylinderModel) -> InflatedModel:
         reported=model.reported.tolist(),
     )
     return InflatedModel(
-        model.mesh,
-        model.thickness,
-        np.asarray(model.mesh.warp),
-        model.inflation,
-        {**model.guides, "support_bottom": (1,)},
-        model.copies,
-        bending,
-    )
+        model.mesh, model.thickness, np.asarray(model.mesh.warp), model.inflation,
+        {**model.guides, "support_bottom": (1,)}, model.copies, bending,
+    )  # fmt: skip

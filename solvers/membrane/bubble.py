@@ -32,19 +32,12 @@ from .newton import (
 
 @dataclass(frozen=True)
 class Wall:
-    """What a closed membrane's wall does where it is pressed together.
+    """Behaviour of a closed membrane's wall where it is pressed together.
 
-    Parameters
-    ----------
     wrinkle_stiffness : share of its stiffness that is left across a wrinkle (a tension field, see
-        materials/wrinkles.py); None: it carries compression as it carries tension, and folds
-        where that makes it unstable.
-    bending_stiffness : share of the wall's own, E t^3/12, that counts where rigid bodies bend the
-        membrane; with none, folds are as fine as the mesh.
-
-    Raises
-    ------
-    InputError : a share that is not a number from 0 to 1 (bending: to any size).
+    materials/wrinkles.py); None: it carries compression as it carries tension, and folds where that
+    makes it unstable. bending_stiffness : share of the wall's own, E t^3/12, where rigid bodies
+    bend the membrane; with none, folds are as fine as the mesh.
     """
 
     wrinkle_stiffness: float | None = None
@@ -59,19 +52,20 @@ class Wall:
             raise InputError(None, "bending_stiffness", problem)
 
 
-#: Names of the walls: both ends of the band, what is predicted first; or one of them alone.
+Array = NDArray[np.float64]
+#: Increments from which the start of the next one is extrapolated.
+LOOK_BACK = 4
+#: Heights tried for the first increment, as multiples of the estimate; and multiples of the first
+#: pressure from which it is reached where none of them works.
+FIRST_HEIGHTS, HIGHER = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5), (3.0, 10.0)
+#: Names of the walls: both ends of the band, or one of them alone.
 Walls = Literal["band", "tension field", "stiff"]
-
-#: Share of its stiffness that a tension field keeps across a wrinkle: what it carries is about one
-#: per cent of the load. With a third of it a beam of 25 mm elements collapses where finer ones do
-#: not (150 mm, 140 kPa, card "bubble 1": 4 % less load at 240 mm), and three times the work.
+#: Share of its stiffness that a tension field keeps across a wrinkle, with about one per cent of
+#: the load. With a third of it a beam of 25 mm elements collapses where finer ones do not (150 mm,
+#: 140 kPa, card "bubble 1": 4 % less load at 240 mm), at three times the work.
 LEFT = 3e-4
-#: A coated fabric bends far more easily than a solid sheet of its thickness: it wrinkles where it
-#: is pressed together.
-TENSION_FIELD = Wall(wrinkle_stiffness=LEFT)
-#: The other end: as stiff as a solid sheet.
-STIFF = Wall()
-
+#: A coated fabric, which bends far more easily than a solid sheet of its thickness, and that sheet.
+TENSION_FIELD, STIFF = Wall(wrinkle_stiffness=LEFT), Wall()
 BAND = (
     BandEnd(
         "tension field",
@@ -93,16 +87,12 @@ BAND = (
 def chosen_wall(
     name: Walls, wrinkle_stiffness: float | None, bending_stiffness: float | None
 ) -> Wall | None:
-    """The one wall that settings ask for; None: the band.
+    """Return the one wall of the settings; None: the band.
 
-    Parameters
-    ----------
-    wrinkle_stiffness, bending_stiffness : as `Wall` has them, None where they are not given. Where
-        one of them is, there is no band: the wall is a tension field if it has the first.
+    wrinkle_stiffness, bending_stiffness : as `Wall` has them, None where they are not given. With
+    one of them there is no band: the wall is a tension field if it has the first.
 
-    Raises
-    ------
-    InputError : as `Wall`; a name that there is not, a stiff wall with wrinkles.
+    Raises InputError : as `Wall`; an unknown name, a stiff wall with wrinkles.
     """
     if name not in ("band", "tension field", "stiff"):
         problem = f"expected 'band', 'tension field' or 'stiff', got {name!r}"
@@ -117,42 +107,30 @@ def chosen_wall(
     return Wall(wrinkle_stiffness, 1.0 if bending_stiffness is None else bending_stiffness)
 
 
-Array = NDArray[np.float64]
-
-#: Increments that the start of the next one is extrapolated from.
-LOOK_BACK = 4
-# Heights tried for the first increment, as multiples of the estimate.
-FIRST_HEIGHTS = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5)
-# Multiples of the first pressure from which it is looked for where that finds nothing.
-HIGHER = (3.0, 10.0)
-
-
 def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    """What does not change from one law to the next; the wall of a sheet is not bent."""
+    """Build the membrane of a sheet, whose wall is not bent; it serves every law."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
-        points,
-        quads,
-        reference_elements(model.stress_free, quads),
-        model.thickness,
-        law,
-        free,
-        tangent_for(quads, points.size, free),
-        tolerance,
+        points, quads, reference_elements(model.stress_free, quads), model.thickness, law, free,
+        tangent_for(quads, points.size, free), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-    )
+    )  # fmt: skip
 
 
 def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[History, Array]:
-    """History, and the derivatives by the parameters in the reported frames.
+    """Return the history, and the derivatives by the parameters in the reported frames.
 
     The membrane is fresh: no strain, no stress.
     """
     levels = np.array(model.increments)
     shape = membrane.reference.shape
-    derivatives = _derivatives(membrane, model, asked.parameters)
+    derivatives = None
+    if asked.parameters:
+        of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
+        slopes = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
+        derivatives = Derivatives(membrane, asked.parameters, model.stress_free, slopes)
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
     record, keep = Record(membrane, len(levels)), model.reported
     judged, unstable = set(keep.tolist()), []
@@ -165,38 +143,19 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
             rates[i] = derivatives.increment(u, levels[i]).reshape(*shape, -1)
         record.accept(i, u)
         membrane.keep_tangent = derivatives is not None or i + 1 in judged
-    reactions = {
-        name: record.forces[keep][:, model.mesh.node_sets[name]].sum(axis=1)
-        for name in model.supports
-        if name in model.mesh.node_sets
-    }
+    forces, sets = record.forces[keep], model.mesh.node_sets
+    reactions = {n: forces[:, sets[n]].sum(axis=1) for n in model.supports if n in sets}
     history = History(
-        levels[keep],
-        record.path[keep],
-        record.low,
-        record.high,
-        reactions,
-        iterations=membrane.iterations,
-        path=record.path,
+        levels[keep], record.path[keep], record.low, record.high, reactions,
+        iterations=membrane.iterations, path=record.path,
         path_slope=rates if asked.parameters else None,
         unstable=named(1e3 * levels[unstable], "kPa"),
-    )
+    )  # fmt: skip
     return history, rates[keep]
 
 
-def _derivatives(
-    membrane: Membrane, model: BubbleModel, parameters: Sequence[str]
-) -> Derivatives | None:
-    if not parameters:
-        return None
-    not_of_sheet = (PRESSURE_OFFSET, THICKNESS)
-    of_sheet = [n for n in parameters if n in model.parameters and n not in not_of_sheet]
-    slopes = {name: model.sheet_slope(name) for name in of_sheet}
-    return Derivatives(membrane, parameters, model.stress_free, slopes)
-
-
 class Inflation(Loading):
-    """A membrane, flat or nearly so, under a pressure (MPa); its rim goes where the model says."""
+    """A flat or nearly flat membrane under a pressure (MPa); its rim moves as in the model."""
 
     def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
         self.membrane, self.model = membrane, model
@@ -211,7 +170,7 @@ class Inflation(Loading):
         return self._from_flat(level, self.most_cuts)
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Extrapolated in p^(1/3), in which inflation is nearly linear."""
+        """Extrapolate in p^(1/3), in which inflation is nearly linear."""
         x = np.cbrt(levels[-LOOK_BACK:])
         if len(path) == 1:
             return np.asarray(path[0] * math.cbrt(level / levels[0]))
@@ -225,7 +184,7 @@ class Inflation(Loading):
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
     def _from_flat(self, level: float, cuts: int) -> Array:
-        """A flat membrane has no stiffness, so start from an inflated guess."""
+        """Return the first equilibrium from an inflated guess: a flat membrane has no stiffness."""
         found = self._from_domes(level)
         if found is None and cuts == self.most_cuts:
             found = self._from_above(level)
@@ -239,7 +198,7 @@ class Inflation(Loading):
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
 
     def _from_domes(self, level: float) -> Array | None:
-        """From paraboloids of about the height that Hencky's membrane has."""
+        """Search from paraboloids of about the height of Hencky's membrane."""
         membrane = self.membrane
         moduli = initial_moduli(membrane.law)
         held = np.setdiff1d(np.arange(membrane.reference.size), membrane.free)
@@ -247,7 +206,7 @@ class Inflation(Loading):
         if not len(edge):
             return None  # nothing holds the sheet down
         form = rim_form(edge)
-        # Of a taut flat sheet with an elliptic edge, the circle that rises as high.
+        # The circle that rises as high as a taut flat sheet with this elliptic edge.
         size = math.sqrt(2.0 / float(np.trace(form)))
         stiffness = 0.5 * float(np.median(membrane.section)) * (moduli[0] + moduli[1])
         # Hencky: apex = 0.662 R (p R / (E t))^(1/3)
@@ -263,7 +222,7 @@ class Inflation(Loading):
         return None
 
     def _from_above(self, level: float) -> Array | None:
-        """From a higher pressure down: a slack sheet is taut there and finds its way back."""
+        """Search from a higher pressure down, where a slack sheet is taut."""
         for factor in HIGHER:
             above = self._from_domes(factor * level)
             if above is None:

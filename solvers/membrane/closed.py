@@ -19,16 +19,27 @@ from .kernel import reference_elements
 from .newton import Membrane, initial_stiffness, searched_equilibrium
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+#: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
+STRAIGHT = 0.7
+#: mm to which the first touch is found, and places tried at once on the way to it.
+TOUCH, WAYS = 1e-9, 500
+#: The slack state's artificial stiffness is multiplied by this in every iteration.
+FADE = 0.6
+#: Artificial stress of the slack state, as multiples of the one with a first step as large as the
+#: result for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
+#: artificial stress alone it would by p R^2/(4 t stress).
+SLACK_SHARES = (4.0, 0.4, 40.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Cavity:
     """A closed surface, or the part of one that symmetry planes close.
 
-    weight, origin (3,): see `volume_and_gradient`. A plane x_k = origin_k adds nothing to
-    direction k, and nothing to any other because its normal is along k; where two planes share a
-    direction (a slice of a long tube) that direction gets no weight. symmetric (3,): directions
-    with a plane; planes (n, 3): nodes of open edges in one, by its normal.
+    weight, origin (3,): see `volume_and_gradient`. A plane x_k = origin_k adds nothing to direction
+    k, and nothing to any other because its normal is along k; where two planes share a direction (a
+    slice of a long tube) that direction gets no weight. symmetric (3,): directions with a plane;
+    planes (n, 3): nodes of open edges in one, by its normal.
     """
 
     quads: NDArray[np.intp]
@@ -38,7 +49,7 @@ class Cavity:
     planes: NDArray[np.bool_]
 
     def measure(self, position: Array) -> tuple[float, Array]:
-        """Volume (mm^3) of the meshed part at `position` (n, 3), and its derivative (3 n,) mm^2."""
+        """Return volume (mm^3) of the meshed part at `position` (n, 3) and derivative (3 n,)."""
         volume, push = volume_and_gradient(position, self.quads, self.weight, self.origin)
         return volume, push.reshape(-1)
 
@@ -46,13 +57,8 @@ class Cavity:
 def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp]) -> Cavity:
     """Find the symmetry planes that close the surface.
 
-    Parameters
-    ----------
-    fixed : held unknowns, 3 * node + direction.
-
-    Raises
-    ------
-    InputError : an open edge that lies in no plane that its nodes are held in.
+    fixed : held unknowns, 3 * node + direction. InputError : an open edge in no plane in which its
+    nodes are held.
     """
     sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
@@ -82,7 +88,7 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
     return Cavity(quads, weight / weight.sum(), origin, in_plane.any(axis=0), planes)
 
 
-# Bending stiffness of the membrane's wall: what keeps a wrinkle from being as fine as the mesh.
+# Bending stiffness of the wall, which keeps a wrinkle from being as fine as the mesh.
 #
 # No rotations: the curvature along a line of the mesh is the second difference of three positions,
 #
@@ -93,15 +99,10 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
 # Processing 2006, on the lines of a grid). It is quadratic in the positions, so that its stiffness
 # is one constant matrix. The sheet is flat when it is free; twist has no stiffness.
 
-Numbers = NDArray[np.intp]
-
-#: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
-STRAIGHT = 0.7
-
 
 @dataclass(frozen=True, eq=False)
 class Flexure:
-    """The lines of a mesh through its nodes.
+    """Lines of a mesh through its nodes.
 
     nodes (h, 3): before, at and after the node; where a plane of symmetry ends the line the node
     after it twice, once mirrored. differences (h, 3, 3): by node and component, 1/mm^2, of the
@@ -113,13 +114,13 @@ class Flexure:
     shares: Array
 
     def stiffness(self, law: HypoelasticLaw) -> Array:
-        """(h, 3, 3, 3) N/mm: by line, component, node and node; with moduli at zero strain."""
+        """Return (h, 3, 3, 3) N/mm by line, component, node, node; with moduli at zero strain."""
         plane = np.diagonal(initial_stiffness(law))[:2]
         c = self.differences
         return np.asarray(np.einsum("h,hai,hbi->hiab", self.shares @ plane, c, c))
 
     def matrix(self, law: HypoelasticLaw, count: int) -> sp.csr_matrix:
-        """(3 count, 3 count) N/mm on all unknowns of `count` nodes."""
+        """Return (3 count, 3 count) N/mm on all unknowns of `count` nodes."""
         values = self.stiffness(law)
         unknowns = 3 * self.nodes[:, None, :] + np.arange(3)[:, None]  # (h, 3, 3)
         rows = np.broadcast_to(unknowns[..., :, None], values.shape)
@@ -131,12 +132,10 @@ class Flexure:
 def flexure_of(
     points: Array, quads: Numbers, warp: Array, thickness: Array, planes: NDArray[np.bool_]
 ) -> Flexure:
-    """The lines through every node of a mesh.
+    """Return the lines through every node of a mesh.
 
-    Parameters
-    ----------
-    points : (n, 3) mm. warp : (quads, 3). thickness : mm, one or (quads,).
-    planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
+    points : (n, 3) mm. warp : (quads, 3). thickness : mm, one or (quads,). planes : (n, 3) whether
+    an open edge at the node lies in a plane of symmetry, by its normal.
     """
     share, inertia, along = _of_nodes(points, quads, warp, thickness)
     nodes, differences, shares = [], [], []
@@ -149,7 +148,7 @@ def flexure_of(
         one = np.ones(3)
         slopes = np.stack([mirror / behind, -one / behind - one / ahead, one / ahead])
         if before == after:
-            # What is normal to the plane is the same on both sides, so that none of it is left.
+            # Components normal to the plane are equal on both sides and cancel.
             slopes *= mirror > 0
         nodes.append((before, node, after))
         differences.append(slopes / (0.5 * (ahead + behind)))
@@ -167,7 +166,7 @@ def flexure_of(
 def _of_nodes(
     points: Array, quads: Numbers, warp: Array, thickness: Array
 ) -> tuple[Array, Array, Array]:
-    """Of every node: surface mm^2, mean of thickness^3 / 12, direction of the warp."""
+    """Return of every node: surface mm^2, mean of thickness^3 / 12, direction of the warp."""
     corner = points[quads]
     across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     area = 0.5 * np.linalg.norm(across, axis=1)
@@ -186,9 +185,9 @@ def _of_nodes(
 def _lines(
     points: Array, quads: Numbers, planes: NDArray[np.bool_]
 ) -> Iterator[tuple[int, int, int, Array]]:
-    """(before, node, after, mirror (3,)): neighbours that continue each other through a node.
+    """Yield (before, node, after, mirror (3,)): neighbours that continue each other through a node.
 
-    Where a plane of symmetry ends a line, what is after is before as well, and mirrored.
+    Where a plane of symmetry ends a line, the node before is also the one after, mirrored.
     """
     beside: list[dict[int, set[int]]] = [{} for _ in points]
     for e, quad in enumerate(quads.tolist()):
@@ -213,12 +212,8 @@ def _lines(
                         yield a, node, b, np.ones(3)
 
 
-#: mm to which the first touch is found, and places looked at at once on the way to it.
-TOUCH, WAYS = 1e-9, 500
-
-
 def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
-    """Distance (n,) mm of points (n, 3) from a body, its gradient (n, 3) and Hessian (n, 3, 3).
+    """Return distance (n,) mm of points (n, 3) from a body, gradient (n, 3) and Hessian (n, 3, 3).
 
     Negative inside the body. A ring's mouth is rounded by its fillet: there the distance is that
     from the circle through the fillet's centre, less its radius.
@@ -249,7 +244,7 @@ def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
 def contact_forces(
     body: RigidCylinder, position: Array, stiffness: Array
 ) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
+    """Return forces (n, 3) N on the nodes, minus their derivative (touched, 3, 3), and which touch.
 
     stiffness (n,) N/mm: penalty times the node's share of the reference surface.
     """
@@ -265,7 +260,7 @@ def contact_forces(
 
 
 def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
-    """The few nodes that may be inside the body: all that are, without their distances."""
+    """Return the few nodes that may be inside the body, without their distances."""
     arm = position - np.asarray(body.centre, dtype=float)
     along = arm @ np.asarray(body.axis, dtype=float)
     square = np.einsum("ni,ni->n", arm, arm) - along**2
@@ -278,10 +273,8 @@ def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
 def brought_to_touch(
     body: RigidCylinder, position: Array, direction: Array, bite: float
 ) -> RigidCylinder:
-    """The body moved along `direction` until it is `bite` (mm) into the surface.
+    """Return the body moved along `direction` until it is `bite` (mm) into the surface.
 
-    Raises
-    ------
     InputError : no node lies on its way.
     """
     centre, axis = np.asarray(body.centre, dtype=float), np.asarray(body.axis, dtype=float)
@@ -295,12 +288,12 @@ def brought_to_touch(
         raise InputError(None, "mesh", problem)
     nodes, heights = position[near], arm[near] @ direction
     low, high = float(heights.min()) - 2 * body.radius, float(heights.max()) + 2 * body.radius
-    # The first touch from outside is the one wanted; a ring starts around the membrane's middle.
+    # Search the first touch from outside; a ring starts around the membrane's middle.
     if body.ring:
         low = 0.5 * float(heights.min() + heights.max())
 
     def least(ways: Array) -> Array:
-        """Smallest gap with the body moved by each of them: the nodes move the other way."""
+        """Return the smallest gap for each way: the nodes move instead of the body."""
         shifted = nodes - ways[:, None, None] * direction
         return gaps(body, shifted.reshape(-1, 3))[0].reshape(len(ways), -1).min(axis=1)
 
@@ -311,26 +304,17 @@ def brought_to_touch(
     return replace(body, centre=tuple((centre + low * direction).tolist()))
 
 
-#: The slack state's artificial stiffness is multiplied by this in every iteration.
-FADE = 0.6
-#: Artificial stress of the slack state, as multiples of what makes the first step as large as the
-#: answer for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
-#: artificial stress alone it would by p R^2/(4 t stress).
-SLACK_SHARES = (4.0, 0.4, 40.0)
-
-
 @dataclass(eq=False, kw_only=True)
 class ClosedMembrane(Membrane):
     """A membrane with a cavity. `tangent` is a `BorderedTangent`.
 
-    gas : where given, the pressure follows from the volume and the level asked for is ignored.
-    bodies, penalty : rigid bodies at their present place, and their stiffness in MPa/mm.
-    slack : MPa of artificial isotropic stress in the next tangent; it fades with every tangent
-        and is in no residual, so that no equilibrium depends on it.
-    viscosity, anchor : MPa/mm times the distance (n, 3) from there resists; see `drag`.
-    flexure, line_slot : the lines of the mesh that resist bending, if any do, and the places
-        (lines, 144) of their stiffness in the tangent, each a quad of before, node, after, node.
-    pressure, volume : at the last evaluation.
+    gas : where given, the pressure follows from the volume and the given level is ignored. bodies,
+    penalty : rigid bodies at their present place, and their stiffness in MPa/mm. slack : MPa of
+    artificial isotropic stress in the next tangent; it fades with every tangent and is in no
+    residual, so that no equilibrium depends on it. viscosity, anchor : see `drag`. flexure,
+    line_slot : lines of the mesh that resist bending, and the places (lines, 144) of their
+    stiffness in the tangent, each a quad of before, node, after, node. pressure, volume : at the
+    last evaluation.
     """
 
     cavity: Cavity
@@ -379,7 +363,7 @@ class ClosedMembrane(Membrane):
         return super().unbalance(u, self.pressure, with_tangent)
 
     def bending_stiffness(self) -> tuple[sp.csr_matrix, Array]:
-        """Of all unknowns, and what it adds to the tangent's data; anew where the law is new."""
+        """Return the matrix of all unknowns, and its part in the tangent; anew for a new law."""
         assert self.flexure is not None
         if self._stiff is None or self._stiff[0] is not self.law:
             added = np.zeros(len(self.tangent.data))
@@ -393,7 +377,7 @@ class ClosedMembrane(Membrane):
         return self._stiff[1], self._stiff[2]
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
-        """As of any membrane; with a line search where rigid bodies may touch it."""
+        """Return the equilibrium; with a line search where rigid bodies may touch the membrane."""
         if self.bodies:
             return searched_equilibrium(self, u, pressure)
         return super().equilibrium(u, pressure)
@@ -423,11 +407,11 @@ class ClosedMembrane(Membrane):
                 self._add(self.node_slot[touched], stiffness)
 
     def drag(self, viscosity: float, anchor: Array) -> None:
-        """Resist (MPa/mm) every motion away from the displacement `anchor` (n, 3), or no more."""
+        """Resist (MPa/mm times distance) motion away from the displacement `anchor` (n, 3)."""
         self.viscosity, self.anchor = viscosity, anchor
 
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
-        """Share of the reference surface of `sides` (elements,) without tension in a direction.
+        """Return the share of the surface of `sides` (elements,) without tension in a direction.
 
         There a wall without bending stiffness wrinkles.
         """
@@ -437,10 +421,10 @@ class ClosedMembrane(Membrane):
         return float(area[folded].sum() / area.sum())
 
     def wrinkle_work(self, wrinkle: Array) -> float:
-        """Work (N mm, of the meshed part) done on what stiffness is left to the wrinkles.
+        """Return the work (N mm, of the meshed part) on the stiffness that is left to wrinkles.
 
-        From the last `accept` (before the next one), where they were `wrinkle` (elements, 4, 3),
-        to the last evaluation.
+        From the last `accept` (before the next one), where they were `wrinkle` (elements, 4, 3), to
+        the last evaluation.
         """
         if not self.wrinkle_stiffness:
             return 0.0
@@ -456,7 +440,7 @@ class ClosedMembrane(Membrane):
         np.add.at(self.tangent.data, slot[inside], entries[inside])
 
     def equilibrium_from_slack(self, start: Array, level: float) -> Array | None:
-        """Equilibrium from a start with slack parts: with an artificial stress, which fades."""
+        """Return the equilibrium from a slack start, by an artificial stress that fades."""
         modulus = 0.5 * (float(self.law.E1(0.0)) + float(self.law.E2(0.0)))
         area = float((self.elements.area.sum(axis=1) * self.section).sum())
         line = 2.0 * level * self.cavity.measure(self.reference)[0] / area  # p R/t of a tube
@@ -472,18 +456,14 @@ class ClosedMembrane(Membrane):
 def prepare(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """What does not change from one law to the next; a stiff wall unless asked otherwise."""
+    """Build the membrane of a model; a stiff wall unless another is given."""
     return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
 
 
 def closed_membrane(
-    model: InflatedModel,
-    law: HypoelasticLaw,
-    tolerance: float,
-    fixed: NDArray[np.intp],
-    wall: Wall,
+    model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
-    """The membrane of a model with these unknowns held."""
+    """Build the membrane of a model with these unknowns held."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))

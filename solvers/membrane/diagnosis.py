@@ -1,4 +1,4 @@
-"""The embedded solver: its law on the bars."""
+"""Diagnosis of the embedded solver by its law on the bars."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ...files import __version__
-from ...materials.law import HypoelasticLaw
 from ...materials.responses import bar
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import Diagnosis
@@ -16,22 +15,13 @@ EMBEDDED = "embedded"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """One entry; there is no program to name."""
-    stresses = tuple(
-        _end_stress(bar_law(bar.model), bar.elongation, 0 if bar.direction == "warp" else 1)
-        for bar in BARS
-    )
-    off = difference(stresses)
-    good = off < TOLERANCE
-    advice = "" if good else "the embedded law is broken; install bubblefit and numba again"
-    return [Diagnosis("membrane", __version__, None, EMBEDDED, True, None, good,
-                      stresses, off, advice)]  # fmt: skip
-
-
-def _end_stress(law: HypoelasticLaw, elongation: float, pulled: int) -> float:
-    """Cauchy stress (MPa) of a bar pulled along warp (0) or fill (1), the other direction free.
-
-    The law's own increments, the ones the membrane solver takes.
-    """
-    ends = np.log1p(elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
-    return float(bar(law, pulled, ends)[1][-1, pulled])
+    """Return one entry, with the bars in the solver's increments; there is no program to name."""
+    stresses = []
+    for one in BARS:
+        pulled = int(one.direction == "fill")
+        ends = np.log1p(one.elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
+        stresses.append(float(bar(bar_law(one.model), pulled, ends)[1][-1, pulled]))
+    off = difference(tuple(stresses))
+    advice = "the embedded law is broken; install bubblefit and numba again"
+    return [Diagnosis("membrane", __version__, None, EMBEDDED, True, None, off < TOLERANCE,
+                      tuple(stresses), off, "" if off < TOLERANCE else advice)]  # fmt: skip

@@ -1,8 +1,8 @@
 """The tangent matrix and its factorisation, by a library.
 
-Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into
-band storage, which is faster there (benchmarks/bench_cost.py growth). Large ones: SuperLU. Both are
-unsymmetric, because the hypoelastic tangent is, and exact sensitivities want it whole.
+Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into band
+storage, which is faster there (benchmarks/bench_cost.py growth). Large ones: SuperLU. Both are
+unsymmetric, because the hypoelastic tangent is, and exact sensitivities need all of it.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 NEAR = 1e-9  # of the length
+# Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
+LARGEST_BAND = 8_000_000
 
 
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
-    """Orders of the nodes (n,), swept from either end of the longest axis.
+    """Return orders of the nodes (n,), swept from either end of the longest axis.
 
     Cuthill and McKee start at one node, so that on a tube their fronts lie askew and are up to
     twice as long as a ring; started at all nodes of an end they are the rings.
@@ -38,7 +40,7 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
 
 
 def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
-    """Breadth first from the nodes of an end, which follow one another along it."""
+    """Return the order, breadth first from the nodes of an end, which follow one another."""
     first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
     degree, seen = np.diff(graph.indptr), np.zeros(graph.shape[0], dtype=bool)
     seen[first] = True
@@ -50,16 +52,12 @@ def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
         seen[fresh] = True
         order += fresh.tolist()
         at += 1
-    # What hangs together with no end comes last; it has a band of its own.
+    # Parts connected to no end come last, with a band of their own.
     return np.concatenate([order, np.flatnonzero(~seen)]).astype(np.intp)
 
 
-# Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
-LARGEST_BAND = 8_000_000
-
-
 class SingularTangent(Exception):
-    """The tangent cannot be factorised at this iterate."""
+    """An iterate at which the tangent cannot be factorised."""
 
 
 class Tangent(Protocol):
@@ -69,13 +67,14 @@ class Tangent(Protocol):
     slot: NDArray[np.int64]
 
     def factor(self) -> None:
-        """Factorise what `data` holds. SingularTangent on failure."""
+        """Factorise `data`; SingularTangent on failure."""
 
     def definite(self) -> bool:
-        """Whether the symmetric part of what `data` holds is positive definite.
+        """Return whether the symmetric part of `data` is positive definite: stability.
 
-        That of the hypoelastic tangent stands for all of it: the two differ by 1 to 5 %, and their
-        least eigenvalues agree to a few tenths of a per cent (measured on strips and bubbles).
+        Then every small motion away takes work (Hill, J. Mech. Phys. Solids 6 (1958) 236). The part
+        stands for all of the hypoelastic tangent: they differ by 1 to 5 %, their least eigenvalues
+        by a few tenths of a per cent (measured on strips and bubbles).
         """
 
     def solve(self, rhs: Array) -> Array:
@@ -85,7 +84,7 @@ class Tangent(Protocol):
 def tangent_for(
     quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
 ) -> Tangent:
-    """Storage for the tangent of `quads` restricted to the `free` of `size` unknowns.
+    """Return storage for the tangent of `quads` restricted to the `free` of `size` unknowns.
 
     points : (n, 3) mm, of a long surface: it may be ordered along its length.
     """
@@ -114,13 +113,9 @@ class BandedTangent:
     """LAPACK gbtrf/gbtrs on a renumbered band."""
 
     def __init__(
-        self,
-        rank: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
-        width: int,
-    ) -> None:
+        self, rank: NDArray[np.int64], rows: NDArray[np.int64], columns: NDArray[np.int64],
+        inside: NDArray[np.bool_], width: int,
+    ) -> None:  # fmt: skip
         self.width, self.size = width, len(rank)
         self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.data = np.zeros(self.depth * self.size)
@@ -153,12 +148,9 @@ class SparseTangent:
     """SuperLU with a symmetric-pattern ordering."""
 
     def __init__(
-        self,
-        rows: NDArray[np.int64],
-        columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64], inside: NDArray[np.bool_],
         size: int,
-    ) -> None:
+    ) -> None:  # fmt: skip
         keys, position = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
         self.slot[inside] = position
@@ -184,11 +176,9 @@ class SparseTangent:
     @staticmethod
     def _factors(matrix: sp.csc_matrix) -> Any:
         try:
+            symmetric = {"SymmetricMode": True}
             return splu(
-                matrix,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.001,
-                options={"SymmetricMode": True},
+                matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001, options=symmetric
             )
         except RuntimeError as error:
             raise SingularTangent from error
@@ -213,7 +203,7 @@ class BorderedTangent:
         self.answer = self.inner.solve(self.border) if self.stiffness else self.border
 
     def definite(self) -> bool:
-        """Whether the sparse part is (the rest is never negative)."""
+        """Return whether the sparse part is (the rest is never negative)."""
         return self.inner.definite()
 
     def solve(self, rhs: Array) -> Array:

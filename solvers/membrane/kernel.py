@@ -1,9 +1,15 @@
-"""Residual and consistent tangent of the membrane, compiled.
+"""Residual and consistent tangent of the membrane and their derivatives, compiled.
 
 Total Lagrangian: with base vectors F1, F2 (images of the unit warp and fill vectors) the virtual
-strains are B_n = a_n A0 + d_n A1, a_n and d_n being the derivatives of shape function n, and
-A0, A1 (3 strains x 3 directions) built from F1 and F2. So the tangent of a node pair is
-a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), with four 3 x 3 blocks a Gauss point.
+strains are B_n = a_n A0 + d_n A1, a_n and d_n being the derivatives of shape function n, and A0, A1
+(3 strains x 3 directions) built from F1 and F2. So the tangent of a node pair is a_n (a_m K00 + d_m
+K01) + d_n (a_m K10 + d_m K11), with four 3 x 3 blocks a Gauss point: `assemble`.
+
+Direct differentiation through the strain path, for every parameter b: K du/db = -dR/db at fixed
+displacement, where dR/db carries the explicit dependence on b and the derivatives of strain and
+stress at the start of the increment (`explicit`; `by_sheet` for parameters of the stress-free
+shape, which change places, areas and slopes of shape functions). After the solve, `advance` takes
+strain and stress derivatives to the end of the increment.
 """
 
 from __future__ import annotations
@@ -13,17 +19,58 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...caching import compiled
 from ...errors import InputError
-from ...materials.point_law import FAST, SLOPES, membrane_stress
+from ...files import compiled
+from ...materials.point_law import (
+    BEFORE1,
+    BEFORE2,
+    BEFORE3,
+    BY1,
+    BY2,
+    D11,
+    D11_E1,
+    D11_E2,
+    D11_NU,
+    D12,
+    D22,
+    D22_E1,
+    D22_E2,
+    D22_NU,
+    FAST,
+    G12,
+    RATIO1,
+    RATIO2,
+    SLOPES,
+    TURN1,
+    TURN2,
+    by_pieces,
+    membrane_stress,
+)  # fmt: skip
 from ...materials.wrinkles import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
 
+Array = NDArray[np.float64]
+#: Numbers that `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), tangent (9).
+POINT = 24
+_G = 1.0 / np.sqrt(3.0)
+#: 2 x 2 Gauss points of the square; all weights are one.
+GAUSS_POINTS = np.array([[-_G, -_G], [_G, -_G], [_G, _G], [-_G, _G]])
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+#: Bilinear shape functions (point, node) and their derivatives (point, 2, node) on the square.
+VALUES = 0.25 * np.prod(1.0 + GAUSS_POINTS[:, None, :] * _CORNERS[None], axis=2)
+NATURAL = 0.25 * np.stack(
+    [
+        _CORNERS[:, 0] * (1.0 + GAUSS_POINTS[:, None, 1] * _CORNERS[:, 1]),
+        _CORNERS[:, 1] * (1.0 + GAUSS_POINTS[:, None, 0] * _CORNERS[:, 0]),
+    ],
+    axis=1,
+)
+
 
 @compiled(fastmath=FAST, inline="always")
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
-    """f (2, 3): images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
+    """Write f (2, 3), the images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
     for i in range(2):
         for k in range(3):
             f[i, k] = (
@@ -36,7 +83,7 @@ def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
 
 @compiled(fastmath=FAST, inline="always")
 def metric(f):  # type: ignore[no-untyped-def]
-    """m, q, c of the Cauchy-Green components (see materials/point_law.py)."""
+    """Return m, q, c of the Cauchy-Green components (see materials/point_law.py)."""
     c11 = f[0, 0] ** 2 + f[0, 1] ** 2 + f[0, 2] ** 2
     c22 = f[1, 0] ** 2 + f[1, 1] ** 2 + f[1, 2] ** 2
     c12 = f[0, 0] * f[1, 0] + f[0, 1] * f[1, 1] + f[0, 2] * f[1, 2]
@@ -49,17 +96,17 @@ def assemble(  # type: ignore[no-untyped-def]
     pieces, coupling, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
     share, wrinkle,
 ):  # fmt: skip
-    """Internal minus pressure forces at `position`, and the tangent.
+    """Write internal minus pressure forces at `position`, and the tangent.
 
     position (n, 3) mm; thickness (elements,) mm; h_*, s_* (elements, 4, 3) log strain and stress
     before (old) and at this position (new, written); slot (elements, 144) place of each element
     entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written;
     share : of the stiffness, left to wrinkles; below 0 the membrane does not wrinkle, otherwise
-    strain and stress are those of the fabric and wrinkle (elements, 4, 3), its strain less that
-    of the surface, is written (see materials/wrinkles.py).
+    strain and stress are those of the fabric and wrinkle (elements, 4, 3), its strain less that of
+    the surface, is written (see materials/wrinkles.py).
 
-    Returns the largest nodal pressure force of an element (N), or -1 when a point has no valid
-    stress.
+    Returns the largest nodal pressure force of an element (N), or -1 without valid stress at a
+    point.
     """
     residual[:] = 0.0
     if with_tangent:
@@ -168,23 +215,6 @@ def assemble(  # type: ignore[no-untyped-def]
     return largest
 
 
-Array = NDArray[np.float64]
-
-_G = 1.0 / np.sqrt(3.0)
-#: 2 x 2 Gauss points of the square; all weights are one.
-GAUSS_POINTS = np.array([[-_G, -_G], [_G, -_G], [_G, _G], [-_G, _G]])
-_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-#: Bilinear shape functions (point, node) and their derivatives (point, 2, node) on the square.
-VALUES = 0.25 * np.prod(1.0 + GAUSS_POINTS[:, None, :] * _CORNERS[None], axis=2)
-NATURAL = 0.25 * np.stack(
-    [
-        _CORNERS[:, 0] * (1.0 + GAUSS_POINTS[:, None, 1] * _CORNERS[:, 1]),
-        _CORNERS[:, 1] * (1.0 + GAUSS_POINTS[:, None, 0] * _CORNERS[:, 0]),
-    ],
-    axis=1,
-)
-
-
 @dataclass(frozen=True, eq=False)
 class ReferenceElements:
     """Shape functions and their derivatives in each facet's material frame.
@@ -203,14 +233,8 @@ def reference_elements(
 ) -> ReferenceElements:
     """Evaluate the bilinear shape functions on a flat or faceted surface.
 
-    Parameters
-    ----------
-    points : (n, 2) or (n, 3) mm. quads : (m, 4).
-    warp : (m, 3) direction of the warp yarn in each facet; x unless given.
-
-    Raises
-    ------
-    InputError : a quad that is inside out, or a warp direction normal to its facet.
+    points : (n, 2) or (n, 3) mm. quads : (m, 4). warp : (m, 3) direction of the warp yarn in each
+    facet; x unless given. InputError : a quad that is inside out, or a warp normal to its facet.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -232,3 +256,251 @@ def reference_elements(
     jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
     slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), NATURAL)
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
+
+
+@compiled(fastmath=FAST)
+def explicit(  # type: ignore[no-untyped-def]
+    position, quads, values, slopes, area, thickness, pieces, coupling, power,
+    h_old, s_old, rows, by_coupling, push, dh_old, ds_old, ds_new, point, rate,
+):  # fmt: skip
+    """Write the derivative of the residual at fixed displacement.
+
+    rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_coupling (3,
+    np) those of the coupling of warp and fill, push the number of the parameter that is a pressure,
+    or -1; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of the increment; writes
+    ds_new (same shape; the part at fixed displacement), point (elements, 4, POINT) and rate (3 n,
+    np).
+    """
+    nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
+    rate[:] = 0.0
+    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
+    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    work, stiff = np.empty((3, 3)), np.empty((3, 3))
+    x, f = np.empty((4, 3)), np.empty((2, 3))
+    own = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
+    t0, t1, t2 = np.empty(count), np.empty(count), np.empty(count)
+    local = np.empty((12, count))
+    for e in range(quads.shape[0]):
+        for n in range(4):
+            for k in range(3):
+                x[n, k] = position[quads[e, n], k]
+        local[:] = 0.0
+        for g in range(4):
+            dn = slopes[e, g]
+            base_vectors(x, dn, f)
+            m, q, c = metric(f)
+            membrane_stress(
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
+                pk2, stiff, p, law, steep, pull, work,
+            )  # fmt: skip
+            for i in range(3):
+                first, stop = by_pieces(pieces, i, h[i], h_old[e, g, i], weights)
+                row = own[i]
+                row[:] = 0.0
+                for k in range(first, stop):
+                    w0, w1, w2, w3 = weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3]
+                    third, second, first_power, constant = rows[i, k]
+                    for j in range(count):
+                        row[j] += (
+                            w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
+                        )
+            dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
+            wt = area[e, g] * thickness[e]
+            for i in range(3):
+                for k in range(3):
+                    pull[i, k] *= wt
+            old, before = dh_old[e, g], ds_old[e, g]
+            after = ds_new[e, g]
+            for j in range(count):
+                o0, o1, o2 = old[0, j], old[1, j], old[2, j]
+                warp = own[0, j] + o0 * steep[BEFORE1] + by_coupling[1, j] * steep[RATIO1]
+                fill = own[1, j] + o1 * steep[BEFORE2] + by_coupling[2, j] * steep[RATIO2]
+                shear = own[2, j] + o2 * steep[BEFORE3]
+                d11 = steep[D11_E1] * warp + steep[D11_E2] * fill + by_nu[j] * steep[D11_NU]
+                d22 = steep[D22_E1] * warp + steep[D22_E2] * fill + by_nu[j] * steep[D22_NU]
+                d12 = nu * d22 + by_nu[j] * steep[D22]
+                a0 = before[0, j] + d11 * dh0 + d12 * dh1 - steep[D11] * o0 - steep[D12] * o1
+                a1 = before[1, j] + d12 * dh0 + d22 * dh1 - steep[D12] * o0 - steep[D22] * o1
+                a2 = before[2, j] + shear * dh2 - steep[G12] * o2
+                turn = steep[BY1] * (a0 + before[0, j]) + steep[BY2] * (a1 + before[1, j])
+                a0 += turn * steep[TURN1]
+                a1 += turn * steep[TURN2]
+                after[0, j], after[1, j], after[2, j] = a0, a1, a2
+                t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
+                t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2
+                t2[j] = pull[2, 0] * a0 + pull[2, 1] * a1 + pull[2, 2] * a2
+            for n in range(4):
+                for k in range(3):
+                    b0 = dn[0, n] * f[0, k]
+                    b1 = dn[1, n] * f[1, k]
+                    b2 = dn[0, n] * f[1, k] + dn[1, n] * f[0, k]
+                    for j in range(count):
+                        local[3 * n + k, j] += b0 * t0[j] + b1 * t1[j] + b2 * t2[j]
+            if push >= 0:
+                nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+                ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
+                nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+                for n in range(4):
+                    share = area[e, g] * values[g, n]
+                    local[3 * n, push] -= share * nx
+                    local[3 * n + 1, push] -= share * ny
+                    local[3 * n + 2, push] -= share * nz
+            record = point[e, g]
+            for k in range(3):
+                record[k], record[3 + k] = f[0, k], f[1, k]
+                for i in range(3):
+                    record[6 + 3 * i + k], record[15 + 3 * i + k] = p[i, k], law[i, k]
+        for n in range(4):
+            for k in range(3):
+                for j in range(count):
+                    rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
+
+
+@compiled(fastmath=FAST)
+def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
+    """Add the part of the displacement derivatives du (3 n, np) to dh and ds (in place)."""
+    count = du.shape[1]
+    e0, e1, e2 = np.empty(count), np.empty(count), np.empty(count)
+    for e in range(quads.shape[0]):
+        for g in range(4):
+            record, dn = point[e, g], slopes[e, g]
+            e0[:] = 0.0
+            e1[:] = 0.0
+            e2[:] = 0.0
+            for n in range(4):
+                for k in range(3):
+                    b0 = dn[0, n] * record[k]
+                    b1 = dn[1, n] * record[3 + k]
+                    b2 = dn[0, n] * record[3 + k] + dn[1, n] * record[k]
+                    row = du[3 * quads[e, n] + k]
+                    for j in range(count):
+                        e0[j] += b0 * row[j]
+                        e1[j] += b1 * row[j]
+                        e2[j] += b2 * row[j]
+            strain, stress = dh[e, g], ds[e, g]
+            for j in range(count):
+                a0 = record[6] * e0[j] + record[7] * e1[j] + record[8] * e2[j]
+                a1 = record[9] * e0[j] + record[10] * e1[j] + record[11] * e2[j]
+                a2 = record[12] * e0[j] + record[13] * e1[j] + record[14] * e2[j]
+                strain[0, j], strain[1, j], strain[2, j] = a0, a1, a2
+                stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
+                stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
+                stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2
+
+
+@compiled(fastmath=FAST)
+def by_sheet(  # type: ignore[no-untyped-def]
+    position, quads, values, slopes, area, thickness, pressure, pieces, coupling, power, h_old,
+    s_old, surface, slopes_by, area_by, green, rate,
+):  # fmt: skip
+    """Write the derivative of the residual at fixed displacement and fixed strain at the start.
+
+    surface (k, n, 3), slopes_by (k, elements, 4, 2, 4), area_by (k, elements, 4): derivatives of
+    the reference places, of the shape functions' slopes and of the area by k parameters; writes
+    green (elements, 4, 3, k), of the Green-Lagrange strain (E11, E22, 2 E12), and rate (3 n, k).
+    """
+    count = len(surface)
+    rate[:] = 0.0
+    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    steep = np.empty(SLOPES)
+    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    work, stiff = np.empty((3, 3)), np.empty((3, 3))
+    x, f, f_by = np.empty((4, 3)), np.empty((2, 3)), np.empty((2, 3))
+    first, second = np.empty(3), np.empty(3)
+    first_by, second_by = np.empty(3), np.empty(3)
+    normal, normal_by = np.empty(3), np.empty(3)
+    for e in range(quads.shape[0]):
+        for n in range(4):
+            for k in range(3):
+                x[n, k] = position[quads[e, n], k]
+        for g in range(4):
+            dn = slopes[e, g]
+            base_vectors(x, dn, f)
+            m, q, c = metric(f)
+            membrane_stress(
+                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
+                pk2, stiff, p, law, steep, pull, work,
+            )  # fmt: skip
+            normal[0] = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+            normal[1] = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
+            normal[2] = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+            for k in range(3):
+                first[k] = pk2[0] * f[0, k] + pk2[2] * f[1, k]
+                second[k] = pk2[1] * f[1, k] + pk2[2] * f[0, k]
+            for j in range(count):
+                dn_by = slopes_by[j, e, g]
+                for i in range(2):
+                    for k in range(3):
+                        total = 0.0
+                        for n in range(4):
+                            total += dn_by[i, n] * x[n, k] + dn[i, n] * surface[j, quads[e, n], k]
+                        f_by[i, k] = total
+                e0, e1, e2 = 0.0, 0.0, 0.0
+                for k in range(3):
+                    e0 += f[0, k] * f_by[0, k]
+                    e1 += f[1, k] * f_by[1, k]
+                    e2 += f[0, k] * f_by[1, k] + f[1, k] * f_by[0, k]
+                green[e, g, 0, j], green[e, g, 1, j], green[e, g, 2, j] = e0, e1, e2
+                s0 = stiff[0, 0] * e0 + stiff[0, 1] * e1 + stiff[0, 2] * e2
+                s1 = stiff[1, 0] * e0 + stiff[1, 1] * e1 + stiff[1, 2] * e2
+                s2 = stiff[2, 0] * e0 + stiff[2, 1] * e1 + stiff[2, 2] * e2
+                for k in range(3):
+                    first_by[k] = (
+                        s0 * f[0, k] + pk2[0] * f_by[0, k] + s2 * f[1, k] + pk2[2] * f_by[1, k]
+                    )
+                    second_by[k] = (
+                        s1 * f[1, k] + pk2[1] * f_by[1, k] + s2 * f[0, k] + pk2[2] * f_by[0, k]
+                    )
+                    a, b = (k + 1) % 3, (k + 2) % 3
+                    normal_by[k] = (
+                        f_by[0, a] * f[1, b] - f_by[0, b] * f[1, a]
+                        + f[0, a] * f_by[1, b] - f[0, b] * f_by[1, a]
+                    )  # fmt: skip
+                share, share_by = area[e, g], area_by[j, e, g]
+                wall, wall_by = thickness[e] * share, thickness[e] * share_by
+                for n in range(4):
+                    push = pressure * values[g, n]
+                    for k in range(3):
+                        rate[3 * quads[e, n] + k, j] += (
+                            wall_by * (dn[0, n] * first[k] + dn[1, n] * second[k])
+                            + wall * (dn_by[0, n] * first[k] + dn_by[1, n] * second[k])
+                            + wall * (dn[0, n] * first_by[k] + dn[1, n] * second_by[k])
+                            - push * (share_by * normal[k] + share * normal_by[k])
+                        )
+
+
+def element_slopes(points: Array, quads: NDArray[np.intp], direction: Array) -> tuple[Array, Array]:
+    """Return derivatives of `reference_elements` where the points move along a direction.
+
+    The warp yarn is x, laid onto each facet. points : (n, 3) mm, without stress. quads : (m, 4).
+    direction : (n, 3) mm per unit. Returns those of slopes (m, 4 points, 2, 4 nodes), 1/mm per
+    unit, and of area (m, 4), mm^2 per unit.
+    """
+    base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
+    base_by = np.einsum("pan,mnk->mpak", NATURAL, direction[quads])
+    normal = np.cross(base[:, :, 0], base[:, :, 1])
+    normal_by = np.cross(base_by[:, :, 0], base[:, :, 1])
+    normal_by += np.cross(base[:, :, 0], base_by[:, :, 1])
+    unit, unit_by, _, area_by = _normalised(normal, normal_by)
+    # Along the yarn: x less its part along the normal.
+    across, across_by = unit[..., :1], unit_by[..., :1]
+    along = np.array([1.0, 0.0, 0.0]) - across * unit
+    along, along_by, _, _ = _normalised(along, -across_by * unit - across * unit_by)
+    frame = np.stack([along, np.cross(unit, along)], axis=2)
+    frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=2)
+    jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
+    jacobian_by = np.einsum("mpak,mpbk->mpab", base_by, frame)
+    jacobian_by += np.einsum("mpak,mpbk->mpab", base, frame_by)
+    inverse = np.linalg.inv(jacobian)
+    inverse_by = -inverse @ jacobian_by @ inverse
+    slopes_by = np.einsum("mpab,pan->mpbn", inverse_by.transpose(0, 1, 3, 2), NATURAL)
+    return slopes_by, area_by
+
+
+def _normalised(vector: Array, by: Array) -> tuple[Array, Array, Array, Array]:
+    """Return unit vectors (..., 3) and lengths (...), each followed by its derivative."""
+    length = np.linalg.norm(vector, axis=-1)
+    unit = vector / length[..., None]
+    length_by = np.einsum("...k,...k->...", unit, by)
+    return unit, (by - length_by[..., None] * unit) / length[..., None], length, length_by

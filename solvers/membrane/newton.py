@@ -1,4 +1,8 @@
-"""One load level: Newton iteration with the consistent tangent, and cut-back."""
+"""Equilibria of a membrane: one level (Newton, line search), level after level, derivatives.
+
+The strain history is committed at the levels only and not at steps in between, so that the path
+integral of the law, and with it the result, does not depend on how a level was reached.
+"""
 
 from __future__ import annotations
 
@@ -13,37 +17,42 @@ from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw, law_slopes
 from ..base import Progress
 from .factorisation import SingularTangent, Tangent
-from .kernel import ReferenceElements, assemble
-from .sensitivity import POINT, advance, by_sheet, element_slopes, explicit
+from .kernel import POINT, ReferenceElements, advance, assemble, by_sheet, element_slopes, explicit
 
 Array = NDArray[np.float64]
 
-MOST_ITERATIONS = 40
-MOST_BACKTRACKS = 8
+MOST_ITERATIONS, MOST_BACKTRACKS = 40, 8
 # Below this residual, a step that shrank the residual this much is followed by a chord step
 # (no new tangent): it costs a quarter of a Newton step and still gains one to two digits.
-CHORD_BELOW = 1e-2
-CHORD_GAIN = 0.15
+CHORD_BELOW, CHORD_GAIN = 1e-2, 0.15
 # Below this residual Newton gains digits in every step. Where it no longer does, the residual is
 # rounding (fine meshes at low pressure reach 1e-8): the iterate is as good as it gets.
-ROUNDING_BELOW = 1e-6
-MOST_IDLE = 3
+ROUNDING_BELOW, MOST_IDLE = 1e-6, 3
 # Where a modulus jumps (a tri-linear one at a break) so does the tangent, and full steps can go to
 # and fro between two sides for ever. After this many without progress every step has to make some.
 MOST_FRUITLESS = 3
+#: Steps of a line search: after as many without equilibrium, half the way is tried instead.
+MOST_STEPS = 16
+#: Residuals computed in one step, and the share of the work along it that is good enough.
+MOST_TRIALS, LEFT = 10, 0.5
+#: A step is good enough, too, where the residual falls to this part or was as small as this.
+GAIN, SMALL = 0.1, 1e-2
+#: Part of the way to the end known to be too far: at least, where only that is known, at most.
+NEAREST, BLIND, FARTHEST = 0.1, 0.3, 0.9
+#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones.
+SheetSlopes = Mapping[str, tuple[Array, Array]]
 
 
 @dataclass(eq=False)
 class Membrane:
-    """Everything an equilibrium iteration needs; strain and stress at the start and the end.
+    """State of an equilibrium iteration: strain and stress at start and end of an increment.
 
     reference (n, 3) mm; thickness mm, one or (elements,), which section (elements,) repeats;
     strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal correction of one
-    iteration; keep_tangent: end every increment with the tangent of its
-    equilibrium assembled (sensitivities want it; in a chord step it costs little more).
-    wrinkle_stiffness: share of the stiffness left to wrinkles; None: the membrane carries
-    compression as it carries tension. wrinkle (elements, 4, 3): strain of the fabric less that of
-    the surface at the last evaluation.
+    iteration; keep_tangent: end every increment with the tangent of its equilibrium assembled (for
+    sensitivities; in a chord step it costs little more); wrinkle_stiffness: share of the stiffness
+    left to wrinkles; None: the membrane carries compression as it carries tension; wrinkle
+    (elements, 4, 3): strain of the fabric less that of the surface at the last evaluation.
     """
 
     reference: Array
@@ -75,7 +84,7 @@ class Membrane:
         self.residual = np.zeros(3 * len(self.reference))
 
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
-        """Largest free residual over the largest pressure force; inf where there is no stress."""
+        """Return the largest free residual over the largest pressure force; inf without stress."""
         law, e = self.law, self.elements
         force = assemble(
             self.reference + u, self.quads, e.values, e.slopes, e.area, self.section, pressure,
@@ -88,13 +97,13 @@ class Membrane:
         if force < 0:
             return np.inf
         self.further_forces(u, with_tangent)
-        if force == 0.0:  # no pressure: the reactions of what is prescribed are the measure
+        if force == 0.0:  # no pressure: reactions of the prescribed unknowns are the measure
             force = float(np.abs(self.residual).max()) or 1.0
         ratio = float(np.abs(self.residual[self.free]).max()) / force
         return ratio if np.isfinite(ratio) else np.inf
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
-        """Add to `residual` (and the tangent) what is neither stress nor pressure: nothing here."""
+        """Add forces beside stress and pressure to `residual` (and the tangent): none here."""
 
     def accept(self) -> None:
         """Take the strain and stress of the last evaluation as the start of the next increment."""
@@ -102,19 +111,14 @@ class Membrane:
         self.stress_old[:] = self.stress_new
 
     def factor(self) -> None:
-        """Factorise the tangent that `keep_tangent` left.
-
-        Raises
-        ------
-        SolverFailure : the tangent is singular, so the state is a limit point.
-        """
+        """Factorise the tangent that `keep_tangent` left; SolverFailure at a limit point."""
         try:
             self.tangent.factor()
         except SingularTangent:
             raise SolverFailure("the tangent is singular: a limit point") from None
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
-        """Displacement (n, 3) in equilibrium at `pressure`, starting from u; None if not found."""
+        """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
         u = u.copy()
         flat = u.reshape(-1)
         step = before = np.empty(0)
@@ -158,12 +162,7 @@ class Membrane:
 
 
 def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
-    """E1, E2, G12 at zero strain, MPa.
-
-    Raises
-    ------
-    SolverFailure : one of them is not positive, so that there is no equilibrium to look for.
-    """
+    """Return E1, E2, G12 at zero strain, MPa; SolverFailure unless all are positive."""
     e1, e2, g12 = (float(modulus(0.0)) for modulus in (law.E1, law.E2, law.G12))
     if not min(e1, e2, g12) > 0:
         raise SolverFailure(
@@ -174,31 +173,20 @@ def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
 
 
 def initial_stiffness(law: HypoelasticLaw) -> Array:
-    """Plane stress stiffness (3, 3) at zero strain, MPa.
-
-    Raises
-    ------
-    SolverFailure : as `initial_moduli`.
-    """
+    """Return the plane stress stiffness (3, 3) at zero strain, MPa; fails as `initial_moduli`."""
     initial_moduli(law)
     none = np.zeros(3)
     _, tangent = law.increment(none, none, none)
     return tangent[0]
 
 
-# From one level of a load to the next, through halved steps where the next one is too far.
-#
-# The strain history is committed at the levels only and not in between, so that the path integral
-# of the law, and with it the result, does not depend on how a level was reached.
-
-
 class NoEquilibrium(SolverFailure):
-    """No step from a level to the next one was found."""
+    """A step from a level to the next one that was not found."""
 
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is asked of an analysis beside its model.
+    """Options of an analysis beside its model.
 
     parameters : of the derivatives. guess : (increments, nodes, 3) displacements to start each
     increment from. tell : called with every increment that is done.
@@ -211,71 +199,58 @@ class Asked:
 
 @dataclass(frozen=True)
 class Done:
-    """How far a run is: increments of the model."""
+    """Progress of a run in increments of the model."""
 
     time: float
 
 
 class Loading:
-    """One way of loading a membrane, by a level: a pressure, an elongation, a deflection.
+    """One way of loading a membrane, by a level: a pressure, an elongation, a deflection."""
 
-    What differs from one to the other: what equilibrium at a level means, and where to look for it.
-    """
-
-    #: How often a step between two levels is halved at most.
-    most_cuts = 6
+    most_cuts = 6  #: how often a step between two levels is halved at most
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        """Displacement (nodes, 3) at a level, looked for from `start`; None if not found."""
+        """Return the displacement (nodes, 3) at a level, from `start`; None if not found."""
         raise NotImplementedError
 
     def first(self, level: float) -> Array | None:
-        """Displacement at the first level, from the unloaded membrane."""
+        """Return the displacement at the first level, from the unloaded membrane."""
         raise NotImplementedError
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Where to look for the next level after all that were found."""
+        """Return a start for the next level after the path so far."""
         raise NotImplementedError
 
     def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
-        """Where to look for a level from u at another, inside a step that is halved: straight on.
+        """Return a start inside a step that is halved, straight on from u at another level.
 
         before : the displacement as far back, where there is one.
         """
         return u if before is None else np.asarray(2.0 * u - before)
 
     def guessed(self, guess: Array) -> Array:
-        """A guess as it may be taken for a start."""
+        """Return a guess as an admissible start."""
         return guess
 
     def reached(
         self, lower: float, u: Array, level: float, start: Array, cuts: int
     ) -> Array | None:
-        """Equilibrium at `level` from that at `lower`, which is u."""
+        """Return the equilibrium at `level` from that at `lower`, which is u."""
         return reach(self, lower, u, level, start, cuts)
 
     def problem(self, before: float, level: float, place: str) -> str:
-        """What to say where `level` cannot be reached; place : "increment 3 of 7"."""
+        """Return the message where `level` cannot be reached; place : "increment 3 of 7"."""
         raise NotImplementedError
 
 
 def march(
-    loading: Loading,
-    levels: Sequence[float] | Array,
-    asked: Asked,
-    begun: tuple[float, Array] | None = None,
-    done: int = 0,
-) -> Iterator[Array]:
-    """Displacement (nodes, 3) at one level after the other; the caller accepts each in between.
+    loading: Loading, levels: Sequence[float] | Array, asked: Asked,
+    begun: tuple[float, Array] | None = None, done: int = 0,
+) -> Iterator[Array]:  # fmt: skip
+    """Yield the displacement (nodes, 3) at each level; the caller accepts it before the next one.
 
-    Parameters
-    ----------
-    begun : level and displacement to start from; the unloaded membrane otherwise.
-    done : increments of the model that are behind us.
-
-    Raises
-    ------
-    NoEquilibrium : a level cannot be reached.
+    begun : level and displacement to start from; the unloaded membrane otherwise. done : earlier
+    increments of the model. NoEquilibrium : a level cannot be reached.
     """
     known, path = ([begun[0]], [begun[1]]) if begun is not None else ([], [])
     for i, level in enumerate(float(value) for value in levels):
@@ -300,13 +275,13 @@ def march(
 def reach(
     loading: Loading, lower: float, u: Array, level: float, start: Array, cuts: int
 ) -> Array | None:
-    """Equilibrium at `level`: from `start`, else through the middle between `lower` and it."""
+    """Return the equilibrium at `level` from `start`, else through halved steps from `lower`."""
     found = loading.equilibrium(start, level)
     return found if found is not None else halved(loading, lower, u, level, cuts)
 
 
 def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) -> Array | None:
-    """Equilibrium at `level` in two steps from `lower`, where it is u; each may be halved again."""
+    """Return the equilibrium at `level` in two steps from `lower`, each perhaps halved again."""
     if cuts == 0:
         return None
     middle = 0.5 * (lower + level)
@@ -319,7 +294,7 @@ def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) ->
 
 
 def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-    """On the line through the last two of the path; where the last one is without two."""
+    """Return the point on the line through the last two of the path; else its last one."""
     if len(path) < 2:
         return path[-1]
     ahead = (level - levels[-1]) / (levels[-1] - levels[-2])
@@ -327,7 +302,7 @@ def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) ->
 
 
 def lagrange(x: Array, known: Array, at: float) -> Array:
-    """The polynomial through `known` (k, nodes, 3) at x (k,), at another place."""
+    """Return the polynomial through `known` (k, nodes, 3) at x (k,), at another place."""
     shares = [
         math.prod((at - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
         for a in range(len(x))
@@ -336,9 +311,9 @@ def lagrange(x: Array, known: Array, at: float) -> Array:
 
 
 class Record:
-    """What every analysis keeps of its increments.
+    """Record of an analysis' increments.
 
-    path (increments, nodes, 3) mm; forces likewise, N, of the nodes on what holds them; low, high
+    path (increments, nodes, 3) mm; forces likewise, N, of the nodes on their supports; low, high
     (3,) extremes of the strain components.
     """
 
@@ -364,18 +339,9 @@ class Record:
 # Numer. Methods Eng. 14 (1979) 1613). Gas, contact and an increment of the law are nearly
 # conservative.
 
-#: Steps that have not found the equilibrium by then rarely do: half the way is tried instead.
-MOST_STEPS = 16
-#: Residuals looked at in one step, and what is left of the work along it when it is good enough.
-MOST_TRIALS, LEFT = 10, 0.5
-#: A step is good enough, too, where the residual falls to this part or was as small as this.
-GAIN, SMALL = 0.1, 1e-2
-#: Part of the way to the end known to be too far: at least, where only that is known, at most.
-NEAREST, BLIND, FARTHEST = 0.1, 0.3, 0.9
-
 
 def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array | None:
-    """Displacement (n, 3) in equilibrium at `pressure`, starting from u; None if not found."""
+    """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
     u = u.copy()
     norm = membrane.unbalance(u, pressure, with_tangent=True)
     least, idle = np.inf, 0
@@ -400,7 +366,7 @@ def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array
 
 
 def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: float) -> float:
-    """Move u along the step as far as is good; the residual there, with its tangent."""
+    """Move u along the step as far as is good; return the residual there, with its tangent."""
     flat, free = u.reshape(-1), membrane.free
     before = flat[free].copy()
     slope = float(step @ membrane.residual[free])
@@ -428,39 +394,23 @@ def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: flo
     return found
 
 
-# Where equilibria are unstable, in words.
-#
-# An equilibrium is stable where the tangent's symmetric part is positive definite (Hill, J. Mech.
-# Phys. Solids 6 (1958) 236): then every small motion away from it takes work, whatever it is.
-
-
 def named(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
-    """Loads (n,) by their number and unit."""
+    """Return loads (n,) in words, by number and unit."""
     return tuple(f"{level:.4g} {unit}" for level in levels.tolist())
-
-
-#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones.
-SheetSlopes = Mapping[str, tuple[Array, Array]]
 
 
 class Derivatives:
     """Derivatives of displacement, strain and stress, carried along the strain path.
 
-    Parameters
-    ----------
-    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", "thickness" (of
-        a sheet of one thickness), and those of `sheet`.
-    stress_free : (n, 3) mm, places of the nodes without stress; needed with `sheet` only.
-    sheet : of the parameters that are of the sheet.
+    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", "thickness" (of a
+    sheet of one thickness), and those of `sheet`. stress_free : (n, 3) mm, places of the nodes
+    without stress; needed with `sheet` only. sheet : slopes of the sheet's own parameters.
     """
 
     def __init__(
-        self,
-        membrane: Membrane,
-        parameters: Sequence[str],
-        stress_free: Array | None = None,
+        self, membrane: Membrane, parameters: Sequence[str], stress_free: Array | None = None,
         sheet: SheetSlopes | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
@@ -474,7 +424,7 @@ class Derivatives:
             self.sheet = Sheet(membrane, stress_free, sheet, [names.index(n) for n in sheet])
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
-        """Explicit derivative of the residual at the equilibrium u, (3 n, np)."""
+        """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         explicit(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.pieces,
@@ -496,7 +446,7 @@ class Derivatives:
             self.stress[..., self.sheet.columns] += stress
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
-        """d u / d parameters (3 n, np) at the equilibrium u, factorised and not yet accepted."""
+        """Return d u / d parameters (3 n, np) at the equilibrium u, before it is accepted."""
         m = self.membrane
         rate = self.at_fixed_displacement(u, pressure)
         du = np.zeros_like(rate)
@@ -506,12 +456,7 @@ class Derivatives:
 
 
 class Sheet:
-    """What the parameters of the stress-free sheet bring at fixed displacement.
-
-    Parameters
-    ----------
-    columns : where these parameters stand among all.
-    """
+    """Part of the stress-free sheet's parameters at fixed displacement; columns : among all."""
 
     def __init__(
         self, membrane: Membrane, stress_free: Array, slopes: SheetSlopes, columns: Sequence[int]
@@ -525,7 +470,7 @@ class Sheet:
         self.rate = np.empty((membrane.reference.size, len(columns)))
 
     def at_fixed_displacement(self, u: Array, pressure: float) -> Array:
-        """Of the residual, (3 n, columns)."""
+        """Return the derivative of the residual, (3 n, columns)."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         by_sheet(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure, law.pieces,
@@ -535,7 +480,7 @@ class Sheet:
         return self.rate
 
     def at_points(self, point: Array) -> tuple[Array, Array]:
-        """Of log strain and stress (elements, 4, 3, columns); point : what `explicit` left."""
+        """Return those of strain and stress (elements, 4, 3, columns); point : from `explicit`."""
         to_strain = point[..., 6:15].reshape(*point.shape[:2], 3, 3)
         to_stress = point[..., 15:24].reshape(*point.shape[:2], 3, 3)
         strain = to_strain @ self.green

@@ -10,10 +10,7 @@ from ..settings import Offer, SolverSettings
 
 
 class MembraneSettings(SolverSettings):
-    """What a closed membrane's wall does where it is pressed together; for bendings.
-
-    Both ends of a band unless `wall` names one, or a share of a stiffness is given.
-    """
+    """Wall of a closed membrane, for bendings: a band unless a setting is given."""
 
     wall: Literal["band", "tension field", "stiff"] = "band"
     wrinkle_stiffness: Annotated[float, Field(gt=0, le=1)] | None = None

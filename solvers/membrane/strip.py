@@ -35,17 +35,15 @@ Array = NDArray[np.float64]
 MOST_CORRECTIONS = 12
 #: mm of gauge elongation over mm of gauge length.
 GAUGE_TOLERANCE = 1e-10
+#: Increments from which the start of the next one is extrapolated.
+LOOK_BACK = 4
 
 
 class DrivenTangent:
     """The factorisable tangent of the free unknowns, and beside it that of the driven ones.
 
-    Both lie in one array, so that one assembly fills them: first what `free` needs, then every
-    element entry with a driven row or column.
-
-    Parameters
-    ----------
-    driven : unknowns that move together; none of them free.
+    Both lie in one array, so that one assembly fills them: first that of `free`, then every element
+    entry with a driven row or column. driven : unknowns that move together; none of them free.
     """
 
     def __init__(
@@ -74,25 +72,19 @@ class DrivenTangent:
         return self.inner.solve(rhs)
 
     def edge(self) -> sp.csr_matrix:
-        """(size, size): the driven rows and columns of the tangent as last assembled."""
+        """Return (size, size): the driven rows and columns of the tangent as last assembled."""
         return sp.csr_matrix((self._tail, self._at), shape=self._shape)
 
 
 class Pull:
-    """A set of unknowns that moves together by one amount, and the gauge that it has to open.
+    """A set of unknowns that moves together by one amount, and the gauge that it opens.
 
-    Parameters
-    ----------
     direction : (3 n,) displacement of every driven unknown for one mm of pull, zero elsewhere.
     gauge : its two nodes.
     """
 
     def __init__(
-        self,
-        membrane: Membrane,
-        tangent: DrivenTangent,
-        direction: Array,
-        gauge: NDArray[np.intp],
+        self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
     ) -> None:
         self.membrane, self.tangent = membrane, tangent
         self.direction, self.gauge = direction, gauge
@@ -100,7 +92,7 @@ class Pull:
         self.gauge_length = float(np.linalg.norm(upper - lower))
 
     def elongation(self, u: Array) -> tuple[float, Array]:
-        """Elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
+        """Return the elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
         lower, upper = (self.membrane.reference + u)[self.gauge]
         length = float(np.linalg.norm(upper - lower))
         slope = np.zeros(u.shape)
@@ -109,17 +101,17 @@ class Pull:
         return length - self.gauge_length, slope.reshape(-1)
 
     def response(self) -> Array:
-        """(3 n,) displacement per mm of pull, for the tangent as last assembled and factorised."""
+        """Return (3 n,) displacement per mm of pull, by the tangent as last factorised."""
         free = self.membrane.free
         w = self.direction.copy()
         w[free] = -self.tangent.solve((self.tangent.edge() @ self.direction)[free])
         return w
 
     def equilibrium(self, u: Array, elongation: float) -> Array | None:
-        """Equilibrium (n, 3) in which the gauge has this elongation, from u; None if not found.
+        """Return the equilibrium (n, 3) with this elongation of the gauge, from u; or None.
 
-        Newton on the pull: between two equilibria the whole strip follows its tangent, so that
-        the second one is near.
+        Newton on the pull: between two equilibria the whole strip follows its tangent, so that the
+        second one is near.
         """
         m = self.membrane
         for _ in range(MOST_CORRECTIONS):
@@ -140,40 +132,30 @@ class Pull:
         return None
 
 
-#: Increments that the start of the next one is extrapolated from.
-LOOK_BACK = 4
-
-
 def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    """What does not change from one law to the next; the wall of a sheet is not bent."""
+    """Build the membrane of a strip, whose wall is not bent; it serves every law."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     held = np.concatenate([model.fixed, model.driven])
     free = np.setdiff1d(np.arange(points.size), held)
     warp = np.broadcast_to(model.warp, (len(quads), 3))
     return Membrane(
-        points,
-        quads,
-        reference_elements(points, quads, warp),
-        model.thickness,
-        law,
-        free,
-        DrivenTangent(quads, points.size, free, model.driven),
-        tolerance,
+        points, quads, reference_elements(points, quads, warp), model.thickness, law, free,
+        DrivenTangent(quads, points.size, free, model.driven), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-    )
+    )  # fmt: skip
 
 
 def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[History, Array]:
-    """History, and the derivatives of the displacements by the parameters in every increment.
+    """Return the history, and the derivatives by the parameters in every increment.
 
-    The membrane is fresh: no strain, no stress. Direct differentiation through the gauge: the
-    strip at a fixed pull moves by a, for one mm of pull by w, and the pull changes so that the
-    gauge does not: du = a - w (g a)/(g w), g the derivative of its length. The load's derivative
-    is that of the residual at the driven unknowns.
+    The membrane is fresh: no strain, no stress. Direct differentiation through the gauge: the strip
+    at a fixed pull moves by a, for one mm of pull by w, and the pull changes so that the gauge does
+    not: du = a - w (g a)/(g w), g the derivative of its length. The load's derivative is that of
+    the residual at the driven unknowns.
 
-    An increment is stable where the sheet between grips that stand still is, in its plane: a
-    machine prescribes their distance, not the load.
+    An increment is stable where the sheet between fixed grips is, in its plane: a machine
+    prescribes their distance, not the load.
     """
     parameters = asked.parameters
     initial_moduli(membrane.law)
@@ -202,27 +184,19 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
             derivatives.advance(du)
             rates[i] = du.reshape(*shape, -1)
         record.accept(i, u)
-    forces = record.forces
+    forces, sets = record.forces, model.mesh.node_sets
     history = History(
-        model.load_factor * (forces.reshape(len(levels), -1) @ direction),
-        record.path,
-        record.low,
-        record.high,
-        {
-            n: forces[:, model.mesh.node_sets[n]].sum(axis=1)
-            for n in (*model.supports, model.pulled)
-        },
-        iterations=membrane.iterations,
-        path=record.path,
-        path_slope=rates if parameters else None,
+        model.load_factor * (forces.reshape(len(levels), -1) @ direction), record.path, record.low,
+        record.high, {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
+        iterations=membrane.iterations, path=record.path, path_slope=rates if parameters else None,
         load_slope=model.load_factor * load_slope if parameters else None,
         unstable=named(levels[unstable], "mm of elongation"),
-    )
+    )  # fmt: skip
     return history, rates
 
 
 class Pulling(Loading):
-    """A strip whose gauge is to open by a length (mm)."""
+    """A strip with a gauge that opens by a length (mm)."""
 
     def __init__(self, pull: Pull) -> None:
         self.pull = pull
@@ -235,7 +209,7 @@ class Pulling(Loading):
         return self.reached(0.0, none, level, self._stretched(level), self.most_cuts)
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
-        """Extrapolated in the elongation, from zero or from the last increments."""
+        """Extrapolate in the elongation, from zero or from the last increments."""
         x = np.array([0.0, *levels][-LOOK_BACK:])
         known = np.array([np.zeros_like(path[0]), *path][-LOOK_BACK:])
         return lagrange(x, known, level)
@@ -248,7 +222,7 @@ class Pulling(Loading):
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
     def guessed(self, guess: Array) -> Array:
-        """With the held unknowns at zero and the driven ones at their common value."""
+        """Return a guess with held unknowns at zero and driven ones at their common value."""
         flat = np.array(guess, dtype=float).reshape(-1)
         driven = self.pull.direction != 0
         free = self.pull.membrane.free
@@ -258,7 +232,7 @@ class Pulling(Loading):
         return moved.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
-        """The strip stretched evenly along y: the start of the first increment."""
+        """Return the strip stretched evenly along y: the start of the first increment."""
         reference = self.pull.membrane.reference
         u = np.zeros_like(reference)
         share = elongation / self.pull.gauge_length
@@ -268,7 +242,7 @@ class Pulling(Loading):
 
 @dataclass(eq=False)
 class Patch:
-    """What the solver keeps of a patch from run to run: its law, and where the last run ended."""
+    """State of a patch between runs: its law, and the end of the last run."""
 
     law: HypoelasticLaw
     strain_old: Array = field(default_factory=lambda: np.zeros((1, 1, 3)))
@@ -278,15 +252,13 @@ class Patch:
 
 
 def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
-    """There is nothing to prepare; equilibrium holds to rounding, whatever the tolerance."""
+    """Return the patch; equilibrium holds to rounding, whatever the tolerance."""
     return Patch(law)
 
 
 def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[History, Array]:
-    """History, and the derivatives of the displacements by the parameters at every load.
+    """Return the history, and the derivatives by the parameters at every load.
 
-    Raises
-    ------
     SolverFailure : the law has no strain for a load.
     """
     found = biaxial_response(patch.law, model.loads, model.thickness, asked.parameters)
@@ -309,11 +281,8 @@ def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[Histor
     if asked.tell is not None:
         asked.tell(Done(float(len(model.loads))))
     history = History(
-        model.loads.sum(axis=1),
-        moved,
-        np.concatenate([found.strain.min(axis=0), none]),
-        np.concatenate([found.strain.max(axis=0), none]),
-        iterations=patch.iterations,
+        model.loads.sum(axis=1), moved, np.concatenate([found.strain.min(axis=0), none]),
+        np.concatenate([found.strain.max(axis=0), none]), iterations=patch.iterations,
         unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
-    )
+    )  # fmt: skip
     return history, rates

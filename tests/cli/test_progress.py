@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 import pytest
-from bubblefit import caching
+from bubblefit import files
 from bubblefit.cli import progress
 from bubblefit.cli.progress import COMPILING, SeriesProgress, StudyProgress
 from bubblefit.runs.simulation import Step
@@ -92,10 +92,10 @@ def test_compilation_is_announced_where_it_comes(
 
 
 def test_kernels_are_there_once_they_are_kept(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(caching, "_kernel_folder", lambda: tmp_path)
-    assert not caching.kernels_are_compiled()
+    monkeypatch.setattr(files, "_kernel_folder", lambda: tmp_path)
+    assert not files.kernels_are_compiled()
     (tmp_path / "membrane").mkdir()
     (tmp_path / "membrane" / "kernel.assemble.1.nbc").touch()
-    assert caching.kernels_are_compiled()
-    monkeypatch.setattr(caching, "_kernel_folder", lambda: None)
-    assert not caching.kernels_are_compiled()
+    assert files.kernels_are_compiled()
+    monkeypatch.setattr(files, "_kernel_folder", lambda: None)
+    assert not files.kernels_are_compiled()

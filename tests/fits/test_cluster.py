@@ -20,8 +20,7 @@ from bubblefit.runs.executor import Executor, executor_of
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers import licences
 from bubblefit.solvers.base import Announcement, announce, hearing
-from bubblefit.solvers.process import run_process
-from bubblefit.solvers.scheduler import check
+from bubblefit.solvers.process import check, run_process
 
 from .. import counted_program, needs
 from ..commands import in_process

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import bubblefit as bf
-import bubblefit.content
 import bubblefit.runs.record
+import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
@@ -160,7 +160,7 @@ def test_everything_that_differs_is_named(first, tmp_path):
 
 def test_another_version_is_named(first, tmp_path, monkeypatch):
     setup = prepared(read_project(written(tmp_path)))
-    for module in (bubblefit.content, bubblefit.runs.record):
+    for module in (bubblefit.solvers.run_cache, bubblefit.runs.record):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'

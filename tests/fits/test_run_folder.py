@@ -16,7 +16,6 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit import writing
-from bubblefit.content import digest_of
 from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
 from bubblefit.experiments.kinds import RunRecord
@@ -41,6 +40,7 @@ from bubblefit.runs.predictions import mark_of
 from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFiles, StartRecord
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
+from bubblefit.solvers.run_cache import digest_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

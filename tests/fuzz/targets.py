@@ -28,10 +28,10 @@ from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.surfaces import read_surfaces
 from bubblefit.runs.setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
-from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
 from bubblefit.solvers.marc.t19 import T19File
+from bubblefit.solvers.registry import FORMATS
 
 from .. import dic_exports, projects
 from ..biaxial_files import BENT, HEAD, rows_of, write_rows

@@ -26,7 +26,7 @@ from bubblefit.materials.forms.base import UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, CUBIC
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.registry import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -21,7 +21,7 @@ ROOMS = (
     "materials/card.py",
     "reports/*.py",
     "runs/*.py",
-    "writing.py",
+    "files.py",
 )
 
 

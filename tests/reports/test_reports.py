@@ -9,11 +9,11 @@ import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import OutputError
+from bubblefit.files import replacing
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports.bubbles import node_cut, point_cut
 from bubblefit.reports.html import number, percent
 from bubblefit.reports.vtu import write_vtu
-from bubblefit.writing import replacing
 
 
 def cap(xy: np.ndarray, height: float) -> np.ndarray:

@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +27,7 @@ from ..places import PUBLISHED
 from ..programs import program
 
 
-def fake(path: Path, version: str = "2.99", then: str = "exit 0") -> Path:
+def fake(path, version="2.99", then="exit 0"):
     """A script that tells a version and does something else when it is to run a deck."""
     return program(path, f'#!/bin/sh\n[ "$1" = -v ] && echo "This is Version {version}"\n{then}\n')
 
@@ -61,9 +60,6 @@ def test_the_bars_are_the_published_ones():
         assert [float(row[f"c{i}"]) for i in range(4)] == list(bar.modulus)
         assert float(row["end_strain_engineering"]) == bar.elongation
         assert float(row["marc_end_stress_MPa"]) == bar.stress
-
-
-def test_the_tolerance_is_what_the_published_digits_allow():
     # The integral of the published coefficients itself is up to 6e-5 off the published stress.
     for bar in BARS:
         antiderivative = np.polyint(1e3 * np.array(bar.modulus[::-1]))
@@ -238,13 +234,10 @@ def test_a_ccx_with_another_law_is_no_proof(tmp_path):
         prove(liar, tmp_path / "libBUBBLEFIT.so")
 
 
-def test_doctor_is_content_when_ccx_is_good(ccx):
+def test_doctor_accepts_a_good_ccx(ccx):
     text = doctor("--ccx", ccx.path)
     assert "membrane    ok" in text
     assert f"{ccx.path} (named)  external materials: yes  bars within" in text
-
-
-def test_doctor_says_the_same_in_json(ccx):
     content = json.loads(doctor("--json", BUBBLEFIT_CCX=str(ccx.path)))
     assert content["ok"]
     by_path = {one["path"]: one for one in content["solvers"]}
@@ -254,13 +247,10 @@ def test_doctor_says_the_same_in_json(ccx):
     assert mine["stresses"] == pytest.approx([bar.stress for bar in BARS], rel=1e-4)
 
 
-def test_doctor_works_without_ccx(bare):
+def test_doctor_works_without_a_usable_ccx(bare):
     text = doctor()
     assert "there is no ccx" in text and "make calculix" in text
     assert json.loads(doctor("--json"))["ok"] is True
-
-
-def test_doctor_reports_a_ccx_on_the_path_that_cannot_and_goes_on(bare):
     shutil.copy("/bin/true", bare / "bin" / "ccx")
     text = doctor()
     assert "NOT USABLE" in text and "external materials: no" in text

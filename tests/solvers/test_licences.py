@@ -3,15 +3,12 @@
 The program that is run counts its copies itself (`counted_program`).
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os
 import signal
 import stat
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,15 +40,15 @@ LAW: Any = None
 PROJECT = Path("/somewhere/project.toml")
 
 
-def settings(folder: Path, licences: int | None = 2, **more: Any) -> LicenceSettings:
+def settings(folder, licences=2, **more):
     return LicenceSettings(licences=licences, licence_folder=str(folder / "locks"), **more)
 
 
-def licensed(solver: Any, given: LicenceSettings) -> Any:
+def licensed(solver, given):
     return licences.licensed(solver, solver.name, given.model_dump(exclude_unset=True))
 
 
-def in_processes(count: int, work: Callable[[int], None]) -> None:
+def in_processes(count, work):
     processes = [FORK.Process(target=work, args=(n,)) for n in range(count)]
     for process in processes:
         process.start()
@@ -63,8 +60,8 @@ def in_processes(count: int, work: Callable[[int], None]) -> None:
 # Counting
 
 
-def test_never_more_at_once_than_there_are_licences(tmp_path: Path) -> None:
-    def work(process: int) -> None:
+def test_never_more_at_once_than_there_are_licences(tmp_path):
+    def work(process):
         solver = licensed(CountedSolver(tmp_path / "runs"), settings(tmp_path))
         for job in range(5):
             solver.run(f"{process}.{job}", LAW)
@@ -76,16 +73,16 @@ def test_never_more_at_once_than_there_are_licences(tmp_path: Path) -> None:
     assert found.ended == {f"{p}.{j}": 1 for p in range(4) for j in range(5)}
 
 
-def test_the_program_counts_its_copies(tmp_path: Path) -> None:
+def test_the_program_counts_its_copies(tmp_path):
     """Without licences there are as many as there are processes: the test above can fail."""
     in_processes(4, lambda n: CountedSolver(tmp_path / "runs", 0.3).run(n, LAW) and None)
     assert seen(tmp_path / "runs").most > 2
 
 
-def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path: Path) -> None:
+def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path):
     folder = tmp_path / "runs"
 
-    def work(process: int) -> None:
+    def work(process):
         licensed(CountedSolver(folder, 60.0), settings(tmp_path, 1)).run("killed", LAW)
 
     holder = FORK.Process(target=work, args=(0,))
@@ -101,11 +98,11 @@ def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path: Path) -> N
     assert found.most == 1 and found.ended == {"next": 1}
 
 
-def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path: Path) -> None:
+def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path):
     """Who started it may be gone before: a child of a child is killed by nobody."""
     from bubblefit.solvers.process import run_process
 
-    def work(_: int) -> None:
+    def work(_):
         with held("acme", settings(tmp_path, 1)):
             # As a wrapper script leaves a program behind: in a session of its own.
             script = "setsid sleep 0.8 & sleep 0.2"
@@ -118,7 +115,7 @@ def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path: Path)
     assert [bool(said.words) for said in heard] == [True, False]
 
 
-def test_waiting_is_said_once_and_so_is_its_end(tmp_path: Path) -> None:
+def test_waiting_is_said_once_and_so_is_its_end(tmp_path):
     # Forked before the lock is there: a copy of this process would hold it, too.
     ready = FORK.Event()
     process = FORK.Process(target=_hold, args=(settings(tmp_path, 1), tmp_path, ready))
@@ -133,10 +130,10 @@ def test_waiting_is_said_once_and_so_is_its_end(tmp_path: Path) -> None:
     assert heard[0].of == heard[1].of and str(process.pid) in heard[0].of
 
 
-def _hold(given: LicenceSettings, folder: Path, ready: Any) -> None:
+def _hold(given, folder, ready):
     ready.wait(30)
 
-    def write(said: Announcement) -> None:
+    def write(said):
         with (folder / "heard").open("a") as file:
             file.write(json.dumps([said.words, said.of]) + "\n")
 
@@ -144,16 +141,22 @@ def _hold(given: LicenceSettings, folder: Path, ready: Any) -> None:
         pass
 
 
-def test_other_programs_and_folders_count_apart(tmp_path: Path) -> None:
+def test_other_programs_folders_and_files_count_apart(tmp_path):
     with (
         locked("acme", 1, tmp_path / "a", pytest.fail),
         locked("b", 1, tmp_path / "a", pytest.fail),
     ):
         with locked("acme", 1, tmp_path / "b", pytest.fail):
             pass
+    # Whoever opened it before the other one was there may not run beside who locks that.
+    with locked("acme", 1, tmp_path, pytest.fail) as file:
+        (tmp_path / "acme-1.lock").unlink()
+        with locked("acme", 1, tmp_path, pytest.fail) as other:
+            assert not os.path.samestat(os.fstat(file), os.fstat(other))
+            assert licences._any(tmp_path, "acme", 1) is None
 
 
-def test_the_machines_own_folder_is_everybodys(tmp_path: Path, monkeypatch) -> None:
+def test_the_machines_own_folder_is_everybodys(tmp_path, monkeypatch):
     monkeypatch.setattr(licences, "FOLDER", tmp_path / "machine")
     old = os.umask(0o077)
     try:
@@ -165,22 +168,11 @@ def test_the_machines_own_folder_is_everybodys(tmp_path: Path, monkeypatch) -> N
     assert stat.S_IMODE((tmp_path / "machine" / "acme-1.lock").stat().st_mode) == 0o666
 
 
-def test_a_file_that_was_tidied_away_is_no_lock(tmp_path: Path) -> None:
-    """Whoever opened it before the other one was there may not run beside who locks that."""
-    with locked("acme", 1, tmp_path, pytest.fail) as file:
-        (tmp_path / "acme-1.lock").unlink()
-        with locked("acme", 1, tmp_path, pytest.fail) as other:
-            assert not os.path.samestat(os.fstat(file), os.fstat(other))
-            assert licences._any(tmp_path, "acme", 1) is None
-
-
-def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(tmp_path, monkeypatch):
     """Tidied away, and made again by somebody else, between opening and locking it."""
     opened = licences._opened
 
-    def replaced(path: Path) -> int:
+    def replaced(path):
         file = opened(path)
         path.unlink()
         path.touch()
@@ -193,7 +185,7 @@ def test_a_lock_of_a_file_that_has_another_in_its_place_is_none(
         pass
 
 
-def test_a_link_is_not_followed_and_a_folder_must_be_one(tmp_path: Path) -> None:
+def test_a_link_is_not_followed_and_a_folder_must_be_one(tmp_path):
     (tmp_path / "victim").write_text("")
     (tmp_path / "acme-1.lock").symlink_to(tmp_path / "victim")
     for place in (tmp_path, tmp_path / "victim"):
@@ -206,7 +198,7 @@ def test_a_link_is_not_followed_and_a_folder_must_be_one(tmp_path: Path) -> None
 
 
 @pytest.fixture
-def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
+def pauses(monkeypatch):
     """Pauses between tries, none of which is made; time passes as if they were."""
     made: list[float] = []
     monkeypatch.setattr(licences.time, "sleep", made.append)
@@ -215,11 +207,11 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     yield made
 
 
-def denials(count: int, folder: Path, error: type[SolverFailure] = LicenceDenied) -> Any:
+def denials(count, folder, error=LicenceDenied):
     """Fails so many times, then gives 7; every try leaves a scratch folder."""
     tries: list[Path] = []
 
-    def run() -> int:
+    def run():
         if len(tries) == count:
             return 7
         tries.append(folder / f"try-{len(tries)}")
@@ -229,7 +221,7 @@ def denials(count: int, folder: Path, error: type[SolverFailure] = LicenceDenied
     return run, tries
 
 
-def test_pauses_double_up_to_ten_times_the_first(tmp_path: Path, pauses: list[float]) -> None:
+def test_pauses_double_up_to_ten_times_the_first(tmp_path, pauses):
     run, tries = denials(7, tmp_path)
     heard: list[Announcement] = []
     given = settings(tmp_path, licence_wait=1000.0, licence_retry=3.0)
@@ -241,7 +233,7 @@ def test_pauses_double_up_to_ten_times_the_first(tmp_path: Path, pauses: list[fl
     assert not any(folder.exists() for folder in tries)
 
 
-def test_after_the_stated_time_it_is_a_failure(tmp_path: Path, pauses: list[float]) -> None:
+def test_after_the_stated_time_it_is_a_failure(tmp_path, pauses):
     run, tries = denials(99, tmp_path)
     given = settings(tmp_path, licence_wait=20.0, licence_retry=4.0)
     with pytest.raises(LicenceDenied) as caught:
@@ -254,7 +246,7 @@ def test_after_the_stated_time_it_is_a_failure(tmp_path: Path, pauses: list[floa
     assert failure.scratch == tries[-1]
 
 
-def test_pauses_differ_by_chance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pauses_differ_by_chance(tmp_path, monkeypatch):
     made: list[float] = []
     monkeypatch.setattr(licences.time, "sleep", made.append)
     for k in range(40):
@@ -264,7 +256,7 @@ def test_pauses_differ_by_chance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert 1.0 <= min(made) < 1.4 and 2.6 < max(made) <= 3.0 and len(set(made)) == 40
 
 
-def test_words_of_the_site_mean_a_denied_licence(tmp_path: Path, pauses: list[float]) -> None:
+def test_words_of_the_site_mean_a_denied_licence(tmp_path, pauses):
     given = settings(tmp_path, licence_denied=["flexlm ERROR -4"])
     run, tries = denials(2, tmp_path, SolverFailure)
     assert patiently(run, "acme", given) == 7 and len(tries) == 2
@@ -276,10 +268,15 @@ def test_words_of_the_site_mean_a_denied_licence(tmp_path: Path, pauses: list[fl
     assert len(tries) == 1 and "tries" not in caught.value.reason
 
 
-def test_how_long_is_waited_unless_said() -> None:
+def test_defaults_and_the_file_of_the_site(tmp_path):
     assert LicenceSettings().wait == 0
     assert LicenceSettings(licences=3).wait == 600
     assert LicenceSettings(licences=3, licence_wait=0.0).wait == 0
+    site = tmp_path / "site.toml"
+    site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
+    solver: Any = solver_named("marc", marc=site, licences=5)
+    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
+    assert solver.licences.licence_folder == str(tmp_path / "locks")
 
 
 # Which solvers have them
@@ -293,7 +290,7 @@ class THING:
 """
 
 
-def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
+def test_a_solver_stays_what_it_is(tmp_path):
     own = CountedSolver(tmp_path)
     assert licensed(own, LicenceSettings(licence_denied=["no"])) is own
     assert licensed(own, LicenceSettings(licence_wait=1.0)) is not own
@@ -307,13 +304,13 @@ def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
     assert own.progress is print
 
     class Able(CountedSolver):
-        def run_with_sensitivity(self, model: Any, law: Any, parameters: Any = None) -> Any:
+        def run_with_sensitivity(self, model, law, parameters=None):
             return model, parameters
 
         programs = (Path("/opt/acme"),)
         keep = load_ratios = True
 
-        def band(self, model: Any) -> Any:
+        def band(self, model):
             return (model,)
 
     able: Any = licensed(Able(tmp_path), settings(tmp_path))
@@ -326,8 +323,15 @@ def test_a_solver_stays_what_it_is(tmp_path: Path) -> None:
     assert not plain.keep and not isinstance(plain, ProgramSolver)
     assert type(able).__module__ == __name__
 
+    class Able(CountedSolver):
+        def run_with_sensitivity(self, *_):
+            return licences._any(tmp_path / "locks", "counted", 1)
 
-def test_a_run_that_is_in_the_cache_needs_no_licence(packages: Path, tmp_path: Path) -> None:
+    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
+    assert able.run_with_sensitivity(3, LAW) is None
+
+
+def test_a_run_that_is_in_the_cache_needs_no_licence(packages, tmp_path):
     install(packages, "acme", ACME, group="bubblefit.solvers")
     folder = str(tmp_path / "locks")
     solver: Any = solver_named(
@@ -337,16 +341,7 @@ def test_a_run_that_is_in_the_cache_needs_no_licence(packages: Path, tmp_path: P
     assert solver.options == {}  # licences change no result
 
 
-def test_slopes_need_a_licence_too(tmp_path: Path) -> None:
-    class Able(CountedSolver):
-        def run_with_sensitivity(self, *_: Any) -> Any:
-            return licences._any(tmp_path / "locks", "counted", 1)
-
-    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
-    assert able.run_with_sensitivity(3, LAW) is None
-
-
-def test_every_external_solver_has_the_keys(packages: Path) -> None:
+def test_every_external_solver_has_the_keys(packages):
     install(packages, "acme", ACME, group="bubblefit.solvers")
     keys = {"licences": 4, "licence_folder": "locks", "licence_denied": ["no seat"]}
     tables = {"marc": keys, "calculix": keys, "acme": {**keys, "acmes": 1}}
@@ -361,14 +356,14 @@ def test_every_external_solver_has_the_keys(packages: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["marc", "calculix", "acme"])
-def test_a_wrong_value_names_file_and_key(packages: Path, name: str) -> None:
+def test_a_wrong_value_names_file_and_key(packages, name):
     install(packages, "acme", "THING = None", group="bubblefit.solvers")
     for key, value in {"licences": 0, "licence_wait": -1.0, "licence_denied": "text"}.items():
         said = complaint(solver_settings, PROJECT, {name: {key: value}})
         assert said.startswith(f"{PROJECT}: solver.{name}.{key}: expected "), said
 
 
-def test_no_project_names_a_scheduler(packages: Path) -> None:
+def test_no_project_names_a_scheduler(packages):
     """Who answers there runs code here."""
     install(packages, "acme", ACME, group="bubblefit.solvers")
     for name in ("marc", "calculix", "acme"):
@@ -376,19 +371,11 @@ def test_no_project_names_a_scheduler(packages: Path) -> None:
         assert said.startswith(f"{PROJECT}: solver.{name}.licence_scheduler: ")
 
 
-def test_the_sites_file_counts_licences_too(tmp_path: Path) -> None:
-    site = tmp_path / "site.toml"
-    site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
-    solver: Any = solver_named("marc", marc=site, licences=5)
-    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
-    assert solver.licences.licence_folder == str(tmp_path / "locks")
-
-
 # What is said of it
 
 
-def test_what_a_worker_announces_is_heard_here() -> None:
-    def prepare() -> Any:
+def test_what_a_worker_announces_is_heard_here():
+    def prepare():
         return lambda number, tell: announce("waiting", f"run {number}")
 
     heard: list[Announcement] = []
@@ -398,7 +385,7 @@ def test_what_a_worker_announces_is_heard_here() -> None:
     assert records[-1] is None  # what the task gives; nothing else is a record
 
 
-def test_progress_says_who_waits(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_says_who_waits(capsys, monkeypatch):
     with StudyProgress(4, quiet=False) as progress:
         for who in "ab":
             announce("waiting for a licence of marc", who)
@@ -413,9 +400,6 @@ def test_progress_says_who_waits(capsys: pytest.CaptureFixture[str]) -> None:
     with StudyProgress(4, quiet=True):
         announce("waiting for a licence of marc", "a")
     assert capsys.readouterr().err == ""
-
-
-def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     with StudyProgress(4, quiet=False) as progress:
         announce("waiting for a licence of marc", "a")
         progress.said -= 100.0
@@ -424,11 +408,11 @@ def test_the_line_of_a_minute_says_who_waits(capsys, monkeypatch: pytest.MonkeyP
     assert said.endswith("not known yet, 1 waiting for a licence of marc")
 
 
-def lines(path: Path) -> list[str]:
+def lines(path):
     return path.read_text().splitlines()
 
 
-def wait_for(there: Callable[[], object]) -> None:
+def wait_for(there):
     end = time.monotonic() + 30
     while not there():
         assert time.monotonic() < end

@@ -1,7 +1,5 @@
 """An external solver runs the same analysis once, and another one every time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -36,7 +34,7 @@ class Counting:
 
     name, external, progress, identity = "counting", True, None, "counting 1"
 
-    def __init__(self, programs: tuple[Path, ...] = (), fails: int = 0) -> None:
+    def __init__(self, programs=(), fails=0):
         self.programs, self.fails, self.runs = programs, fails, 0
 
     def run(self, model, law, scratch=None, timeout=None):
@@ -46,16 +44,16 @@ class Counting:
         zero = np.zeros((1, 4, 3))
         return History(np.array([float(self.runs)]), zero, np.zeros(3), np.zeros(3))
 
-    def check(self) -> SolverCheck:
+    def check(self):
         return SolverCheck(self.name, True, "1", True)
 
 
 @pytest.fixture
-def cache(tmp_path: Path) -> RunCache:
+def cache(tmp_path):
     return RunCache(tmp_path / "runs")
 
 
-def test_a_second_run_of_the_same_is_no_run(cache: RunCache) -> None:
+def test_a_second_run_of_the_same_is_no_run(cache):
     solver = Counting()
     once = with_cache(solver, cache, {"element": 4})
     assert isinstance(once, Solver) and once.name == "counting" and once.external
@@ -67,16 +65,13 @@ def test_a_second_run_of_the_same_is_no_run(cache: RunCache) -> None:
     other = Counting()
     third = with_cache(other, RunCache(cache.folder), {"element": 4}).run(MODEL, LAW)
     assert other.runs == 0 and third.load == 1.0
-
-
-def test_progress_reaches_the_solver(cache: RunCache) -> None:
     solver = Counting()
     once = with_cache(solver, cache, {})
     once.progress = print
     assert solver.progress is print and once.progress is print
 
 
-def test_where_and_how_long_it_may_run_reaches_the_solver_and_changes_no_result(cache) -> None:
+def test_where_and_how_long_it_may_run_reaches_the_solver_and_changes_no_result(cache):
     solver, heard = Counting(), []
     run = solver.run
     solver.run = lambda model, law, **given: heard.append(given) or run(model, law)
@@ -101,20 +96,20 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_another_law_or_model_is_another_run(cache: RunCache, what: str) -> None:
+def test_another_law_or_model_is_another_run(cache, what):
     solver = Counting()
     once = with_cache(solver, cache, {})
     once.run(MODEL, LAW)
     assert not once.run(*OTHERS[what]).from_cache and solver.runs == 2
 
 
-def test_another_solver_is_another_run(cache: RunCache, tmp_path: Path) -> None:
+def test_another_solver_is_another_run(cache, tmp_path):
     """Its name, what it says of itself, its options, its programs by what is in them, its code."""
     one = program(tmp_path / "a" / "solve", "#!/bin/sh\ntrue\n")
     moved = program(tmp_path / "b" / "elsewhere", "#!/bin/sh\ntrue\n")
     changed = program(tmp_path / "c" / "solve", "#!/bin/sh\nfalse\n")
 
-    def runs(options=(), module=None, **given) -> int:
+    def runs(options=(), module=None, **given):
         solver = Counting(given.pop("programs", (one,)))
         for name, value in given.items():
             setattr(solver, name, value)
@@ -131,7 +126,7 @@ def test_another_solver_is_another_run(cache: RunCache, tmp_path: Path) -> None:
     assert runs() == 1
 
 
-def test_the_code_of_a_plug_in_counts(packages: Path) -> None:
+def test_the_code_of_a_plug_in_counts(packages):
     from importlib import import_module, reload
 
     from bubblefit.solvers.decks import code_mark
@@ -149,7 +144,13 @@ def test_the_code_of_a_plug_in_counts(packages: Path) -> None:
     assert first != code_mark("acme_cached") and first != ours
 
 
-def test_a_run_that_fails_is_not_kept(cache: RunCache) -> None:
+def test_runs_that_are_not_kept(cache):
+    solver = Counting()
+    once = with_cache(solver, cache, {})
+    strange = SimpleNamespace(mesh=mesh)
+    once.run(strange, LAW)
+    once.run(strange, LAW)
+    assert solver.runs == 2 and cache.entries() == []
     solver = Counting(fails=1)
     once = with_cache(solver, cache, {})
     with pytest.raises(SolverFailure, match="no licence"):
@@ -158,16 +159,7 @@ def test_a_run_that_fails_is_not_kept(cache: RunCache) -> None:
     assert once.run(MODEL, LAW).load == 2.0 and once.run(MODEL, LAW).from_cache
 
 
-def test_a_model_of_which_it_is_not_known_what_it_holds_is_run_every_time(cache) -> None:
-    solver = Counting()
-    once = with_cache(solver, cache, {})
-    strange = SimpleNamespace(mesh=mesh)
-    once.run(strange, LAW)
-    once.run(strange, LAW)
-    assert solver.runs == 2 and cache.entries() == []
-
-
-def test_which_solvers_have_none(cache: RunCache) -> None:
+def test_which_solvers_have_none_and_a_band_stays_one(cache):
     """Ours in this process, one that starts from a guess, one whose folders are to be kept."""
 
     class Sloped(Counting):
@@ -185,8 +177,6 @@ def test_which_solvers_have_none(cache: RunCache) -> None:
     membrane = registry.solver_named("membrane", cache)
     assert isinstance(membrane, DifferentiatingSolver)
 
-
-def test_a_band_stays_one(cache: RunCache) -> None:
     class Banded(Counting):
         def band(self, model):
             return (BandEnd("stiff", "", {}),)
@@ -196,13 +186,13 @@ def test_a_band_stays_one(cache: RunCache) -> None:
     assert isinstance(banded, BandedSolver) and banded.band(MODEL)[0].name == "stiff"
 
 
-def options_of(name: str, **given) -> dict:
+def options_of(name, **given):
     solver = registry.solver_named(name, RunCache(Path("nowhere")), **given)
     assert isinstance(solver, Once)
     return dict(solver.options)
 
 
-def test_what_of_our_solvers_settings_counts() -> None:
+def test_what_of_our_solvers_settings_counts():
     """Where files lie does not, nor how long a run may take."""
     assert options_of("calculix", element="S4", timeout=7.0, scratch=Path("x"), ccx="y") == {
         "element": "S4"

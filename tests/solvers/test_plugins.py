@@ -366,14 +366,11 @@ def test_a_check_that_fails_stops_a_study_in_one_line(packages, strips, monkeypa
     assert done.output.count("\n") == 1
 
 
-def test_compiled_factories_without_a_signature_are_called(packages):
+def test_factories_without_a_signature_and_unknown_names(packages):
+    done = CliRunner().invoke(main, ["doctor", "--solver", "nothere"])
+    assert done.exit_code == 2 and "--solver: 'nothere' is not one of: calculix" in done.output
+    assert "is not one of" in complaint(solver_named, "nothere")
     # dict tells no signature on some Pythons; whatever it is, it is no solver.
     install(packages, "acme", "Solver = dict")
     with pytest.raises(SolverFailure, match="gives no solver: dict has no name"):
         solver_named("acme")
-
-
-def test_an_unknown_name_for_the_doctor_is_bad_input():
-    done = CliRunner().invoke(main, ["doctor", "--solver", "nothere"])
-    assert done.exit_code == 2 and "--solver: 'nothere' is not one of: calculix" in done.output
-    assert "is not one of" in complaint(solver_named, "nothere")

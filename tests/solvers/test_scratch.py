@@ -1,7 +1,5 @@
 """What a killed process leaves goes with the next one; what is in use, or kept, stays."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -30,7 +28,7 @@ with run_folder("t", Path(sys.argv[1]), False, "t", "log") as folder:
 """
 
 
-def begun(place: Path) -> tuple[subprocess.Popen, Path]:
+def begun(place):
     process = subprocess.Popen(
         [sys.executable, "-c", BEGIN, place], stdout=subprocess.PIPE, text=True
     )
@@ -42,7 +40,7 @@ def begun(place: Path) -> tuple[subprocess.Popen, Path]:
     return process, folder
 
 
-def members(group: int) -> int:
+def members(group):
     """How many processes of a group live."""
     count = 0
     for stat in Path("/proc").glob("[0-9]*/stat"):
@@ -54,7 +52,7 @@ def members(group: int) -> int:
     return count
 
 
-def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp_path) -> None:
+def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp_path):
     """Also what a script has started, which the kernel's signal does not reach."""
     needs.linux("processes by their group")
     running, folder = begun(tmp_path)
@@ -73,28 +71,22 @@ def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_watcher_ends_with_the_run(tmp_path) -> None:
+def test_a_watcher_and_a_folder_end_with_the_run(tmp_path, monkeypatch):
     needs.linux("processes by their name")
     with run_folder("t", tmp_path, False, "t", "log") as folder:
         process.run_process(["/bin/sh", "-c", "true"], folder, folder / "log")
         children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
         names = [Path(f"/proc/{child}/cmdline").read_bytes() for child in children]
         assert not [name for name in names if b"bubblefit-watch" in name]
-
-
-def test_without_a_shell_the_run_is_the_same(tmp_path, monkeypatch) -> None:
+    with run_folder("t", tmp_path, False, "t", "log") as folder:
+        assert sweep([tmp_path]) == [] and folder.exists()
+    assert not folder.exists()
     monkeypatch.setattr(process, "WATCHER", (str(tmp_path / "no shell"),))
     with run_folder("t", tmp_path, False, "t", "log") as folder:
         assert process.run_process(["true"], folder, folder / "log").exit_code == 0
 
 
-def test_a_folder_under_way_is_this_processs(tmp_path) -> None:
-    with run_folder("t", tmp_path, False, "t", "log") as folder:
-        assert sweep([tmp_path]) == [] and folder.exists()
-    assert not folder.exists()
-
-
-def test_what_is_kept_is_never_swept(tmp_path, monkeypatch) -> None:
+def test_what_is_kept_is_never_swept(tmp_path, monkeypatch):
     with run_folder("good", tmp_path, True, "t", "log") as good:
         (good / "result").write_text("1")
     with (
@@ -123,7 +115,7 @@ def test_what_is_kept_is_never_swept(tmp_path, monkeypatch) -> None:
     ]  # fmt: skip
 
 
-def left(place: Path, **said: str) -> Path:
+def left(place, **said):
     """A folder whose owner's file says what it says, locked by nobody."""
     own = dict(zip(("machine", "boot", "process", "started"), scratch._self(), strict=True))
     folder = place / f"bubblefit-t-{len(list(place.iterdir()))}"
@@ -133,7 +125,7 @@ def left(place: Path, **said: str) -> Path:
     return folder
 
 
-def test_whose_is_swept(tmp_path) -> None:
+def test_whose_is_swept(tmp_path):
     stays = [
         left(tmp_path),  # of this process, on a file system without locks
         left(tmp_path, machine="other", boot="other"),
@@ -148,7 +140,7 @@ def test_whose_is_swept(tmp_path) -> None:
     assert all(folder.exists() for folder in stays)
 
 
-def test_what_is_locked_stays_whatever_it_says(tmp_path) -> None:
+def test_what_is_locked_stays_whatever_it_says(tmp_path):
     """In another container a process of ours has another number."""
     folder = left(tmp_path, process="999999999")
     process = os.fork()
@@ -168,7 +160,7 @@ def test_what_is_locked_stays_whatever_it_says(tmp_path) -> None:
     assert sweep([tmp_path]) == [folder]
 
 
-def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path) -> None:
+def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path):
     empty, cut, others = (tmp_path / f"bubblefit-{n}-1" for n in ("empty", "cut", "others"))
     for folder in (empty, cut, others):
         folder.mkdir()
@@ -185,7 +177,7 @@ def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path) 
     assert others.exists() and plain.exists() and link.is_symlink()
 
 
-def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch) -> None:
+def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch):
     folder = tmp_path / "bubblefit-t-1"
     (folder / "deep").mkdir(parents=True)
     (folder / "file").touch()
@@ -196,7 +188,7 @@ def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch) -> None:
     os.close(lock)
 
 
-def test_the_usual_places_are_swept(tmp_path, monkeypatch) -> None:
+def test_the_usual_places_are_swept(tmp_path, monkeypatch):
     monkeypatch.setattr(scratch, "MEMORY", tmp_path / "memory")
     monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))
     folders = []

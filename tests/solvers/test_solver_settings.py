@@ -31,7 +31,7 @@ from ..complaints import complaint
 PROJECT = Path("/somewhere/project.toml")
 
 
-def test_without_tables_every_solver_of_ours_has_its_defaults():
+def test_settings_of_our_solvers():
     found = solver_settings(PROJECT, {})
     assert set(found) == set(SOLVERS) == {"calculix", "marc", "membrane"}
     assert found["membrane"] == {
@@ -39,9 +39,6 @@ def test_without_tables_every_solver_of_ours_has_its_defaults():
     }  # fmt: skip
     assert found["calculix"]["element"] == "S8R" and found["calculix"]["ccx"] is None
     assert all(isinstance(solver_named(name, **o), Solver) for name, o in found.items())
-
-
-def test_paths_are_beside_the_project_and_bare_names_on_the_path():
     tables = {"calculix": {"ccx": "bin/ccx", "templates": "mine", "scratch": "~/runs"}}
     found = solver_settings(PROJECT, tables)["calculix"]
     assert found["ccx"] == Path("/somewhere/bin/ccx")
@@ -49,6 +46,11 @@ def test_paths_are_beside_the_project_and_bare_names_on_the_path():
     assert found["scratch"] == Path.home() / "runs"
     tables = {"calculix": {"ccx": "ccx_2.21"}}
     assert solver_settings(PROJECT, tables)["calculix"]["ccx"] == "ccx_2.21"
+    for name, section in solver_sections().items():
+        schema = section.model_json_schema()
+        assert schema["additionalProperties"] is False, name
+        assert set(schema["properties"]) == set(section.model_fields)
+        json.dumps(schema)
 
 
 @pytest.mark.parametrize(
@@ -65,14 +67,6 @@ def test_paths_are_beside_the_project_and_bare_names_on_the_path():
 )
 def test_a_wrong_table_is_one_line_with_file_and_key(tables, words):
     assert complaint(solver_settings, PROJECT, tables).startswith(f"{PROJECT}: {words}")
-
-
-def test_a_json_schema_can_be_made_of_every_section():
-    for name, section in solver_sections().items():
-        schema = section.model_json_schema()
-        assert schema["additionalProperties"] is False, name
-        assert set(schema["properties"]) == set(section.model_fields)
-        json.dumps(schema)
 
 
 def test_a_usable_solver_names_the_file_and_the_key():
@@ -193,7 +187,7 @@ NO_CCX = "/nowhere/ccx"
 
 
 @pytest.fixture
-def templates(tmp_path: Path) -> Path:
+def templates(tmp_path):
     folder = tmp_path / "templates"
     (folder / "parts").mkdir(parents=True)
     (folder / "bubble.inp.j2").write_text("{% include 'heading.inp' %}\n*STEP\n")
@@ -203,7 +197,7 @@ def templates(tmp_path: Path) -> Path:
     return folder
 
 
-def solvers(folder: Path) -> list[Solver]:
+def solvers(folder):
     return [CalculixSolver(NO_CCX, templates=folder), MarcSolver(templates=str(folder))]
 
 
@@ -230,21 +224,18 @@ def test_moving_the_folder_or_what_is_no_template_does_not(templates, tmp_path):
     assert all(s.identity not in before for s in solvers(elsewhere))
 
 
-def test_a_template_that_cannot_be_parsed_still_counts(templates):
+def test_broken_and_circular_templates_count(templates, tmp_path):
     before = templates_mark(templates)
     (templates / "bubble.inp.j2").write_text("{% include ")
     broken = templates_mark(templates)
     (templates / "bubble.inp.j2").write_text("{% include  ")
     assert len({before, broken, templates_mark(templates), templates_mark(None)}) == 4
-
-
-def test_templates_that_include_each_other_end(tmp_path):
     (tmp_path / "a.j2").write_text("{% include 'b' %}{% include name %}{% include 'gone' %}")
     (tmp_path / "b").write_text("{% include 'a.j2' %}")
     assert len(templates_mark(tmp_path)) == 64
 
 
-def test_what_changes_no_result_is_not_in_it(tmp_path):
+def test_what_counts_for_the_identity(tmp_path):
     one = CalculixSolver(NO_CCX)
     other = CalculixSolver(NO_CCX, timeout=1.0, scratch=tmp_path, keep=True, threads=2)
     assert one.identity == other.identity != CalculixSolver(NO_CCX, element="S4").identity
@@ -256,9 +247,6 @@ def test_what_changes_no_result_is_not_in_it(tmp_path):
         MembraneSolver(bending_stiffness=0.0).identity,
     }
     assert len({plain, *others}) == 4
-
-
-def test_blocks_of_a_site_count_by_content(tmp_path):
     one, other = tmp_path / "post.dat", tmp_path / "moved" / "post.dat"
     one.write_text("post\n")
     other.parent.mkdir()
@@ -268,7 +256,4 @@ def test_blocks_of_a_site_count_by_content(tmp_path):
     one.write_text("post again\n")
     assert MarcSolver(include={"post": str(one)}).identity != marks[0]
     assert MarcSolver(version="2023.1").identity != MarcSolver().identity
-
-
-def test_a_file_that_is_not_there(tmp_path):
     assert "cannot be read: No such file" in complaint(file_mark, tmp_path / "none")

@@ -16,8 +16,7 @@ from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.point_law import RIGHT, load_angle
 from bubblefit.materials.responses import biaxial_response, piece_constants
 from bubblefit.solvers.base import carries_load_ratios, check_carries
-from bubblefit.solvers.exports import FORMATS
-from bubblefit.solvers.registry import solver_named
+from bubblefit.solvers.registry import FORMATS, solver_named
 from bubblefit.solvers.run_cache import Once, RunCache
 from hypothesis import given, settings
 from hypothesis import strategies as st

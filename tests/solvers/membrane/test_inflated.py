@@ -10,7 +10,6 @@ from bubblefit.meshes.cylinder_model import (
     Bending,
     ClosedGas,
     Collar,
-    CylinderModel,
     Gas,
     InflatedModel,
     RigidCylinder,
@@ -18,22 +17,11 @@ from bubblefit.meshes.cylinder_model import (
     inflated_cylinder,
 )
 from bubblefit.meshes.mesh import log_strain_of
-from bubblefit.runs.verification.closed_forms import (
-    ISOTROPIC,
-    NU,
-    E,
-    capped_strain,
-    in_the_middle,
-)
-from bubblefit.runs.verification.closed_forms import (
-    RADIUS_THIN_WALLS as RADIUS,
-)
-from bubblefit.runs.verification.closed_forms import (
-    THICKNESS_THIN_WALLS as THICKNESS,
-)
+from bubblefit.runs.verification.closed_forms import ISOTROPIC, NU, E, capped_strain, in_the_middle
+from bubblefit.runs.verification.closed_forms import RADIUS_THIN_WALLS as RADIUS
+from bubblefit.runs.verification.closed_forms import THICKNESS_THIN_WALLS as THICKNESS
 from bubblefit.runs.verification.closed_forms import sphere_model as sphere
 from bubblefit.runs.verification.closed_forms import tube_model as tube
-from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bending import settled
 from bubblefit.solvers.membrane.bubble import Wall
 from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity, closed_membrane
@@ -51,19 +39,19 @@ from ...published_laws import TABLE_4_2
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 
 
-def run(model: InflatedModel, law: HypoelasticLaw = ISOTROPIC, tolerance: float = 1e-9):
+def run(model, law=ISOTROPIC, tolerance=1e-09):
     """History and the membrane with the strain and stress of the last increment."""
     solver = MembraneSolver(tolerance)
     history = solver.run(model, law)
     return history, solver._prepared[1]
 
 
-def order(errors, factor: float = 2.0) -> float:
+def order(errors, factor=2.0):
     return float(np.log(abs(errors[-2] / errors[-1])) / np.log(factor))
 
 
 # Reference surface
-def twisted() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def twisted():
     """Facets that are not plane, and their warp directions, none of them in its facet."""
     x, y = np.meshgrid(np.linspace(0, 30, 5), np.linspace(0, 20, 4), indexing="ij")
     points = np.stack([x, y, 0.02 * x * y + 0.01 * x**2], axis=-1).reshape(-1, 3)
@@ -139,7 +127,7 @@ def test_thickness_by_element():
 
 
 # Cavity and gas
-def test_volume_of_a_box_and_its_derivative():
+def test_volume_of_a_box_and_of_a_slice():
     model = tube(8, 3, 60.0, [0.01])
     mesh, fixed = model.mesh, model.fixed()
     cavity = closed_cavity(mesh.points, mesh.quads, fixed)
@@ -154,17 +142,11 @@ def test_volume_of_a_box_and_its_derivative():
         step[dof] = 1e-3
         up, down = (cavity.measure(bent + s * step.reshape(-1, 3))[0] for s in (1, -1))
         assert push[dof] == pytest.approx((up - down) / 2e-3, rel=1e-7, abs=1e-6)
-
-
-def test_slice_between_two_planes_has_the_same_volume():
     model = tube(8, 2, 40.0, [0.01], caps=False)
     cavity = closed_cavity(model.mesh.points, model.mesh.quads, model.fixed())
     volume = 0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 40.0
     assert cavity.measure(model.mesh.points)[0] == pytest.approx(volume, rel=1e-12)
     assert cavity.symmetric.tolist() == [True, False, True]
-
-
-def test_open_cavity_is_refused():
     model = tube(8, 2, 40.0, [0.01], caps=False)
     supports = {k: v for k, v in model.supports.items() if k != "end"}
     assert "the cavity is open between nodes" in complaint(run, replace(model, supports=supports))
@@ -275,10 +257,7 @@ def test_refusals():
     assert "no node set 'rim' in the mesh" in complaint(replace, model, supports={"rim": (0, 1, 2)})
     with pytest.raises(InputError, match="takes no parameters"):
         MembraneSolver().run_with_sensitivity(model, ISOTROPIC)
-
-
-def test_a_sphere_beyond_its_limit_pressure_is_a_failure():
-    """p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1."""
+    # p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1.
     limit = 2 * THICKNESS * E / ((1 - NU) * RADIUS * np.e)
     with pytest.raises(SolverFailure, match="no equilibrium at"):
         MembraneSolver().run(sphere(2, [0.1, 0.5, 1.0, 2.0, 1.1 * limit]), ISOTROPIC)
@@ -307,23 +286,23 @@ def test_a_limit_pressure_is_passed_by_volume():
 PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]
 
 
-def thesis_case(symmetry: str = "quarter") -> CylinderModel:
+def thesis_case(symmetry="quarter"):
     """150 mm at 140 kPa, coarse; increments of which two are reported."""
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, symmetry=symmetry)
     return replace(model, deflections=[4.0, 12.0], increments=INCREMENTS)
 
 
-def bend(model: CylinderModel | InflatedModel, law: HypoelasticLaw = LAW) -> History:
+def bend(model, law=LAW):
     return MembraneSolver(1e-9, wall="tension field").run(model, law)
 
 
 @pytest.fixture(scope="module")
-def quarter() -> tuple[CylinderModel, History]:
+def quarter():
     model = thesis_case()
     return model, bend(model)
 
 
-def test_frames_are_the_inflated_cylinder_and_what_is_to_be_reported(quarter):
+def test_frames_bodies_and_supports_as_said_by_hand(quarter):
     model, history = quarter
     assert history.displacement.shape == (3, *model.mesh.points.shape)
     assert history.path.shape == (5, *model.mesh.points.shape)
@@ -331,9 +310,6 @@ def test_frames_are_the_inflated_cylinder_and_what_is_to_be_reported(quarter):
     assert history.load[0] == 0.0 and (np.diff(history.load) > 0).all()
     assert history.cavity_pressure[0] == PRESSURE
     assert set(history.reactions) == {"supports", "collar"}  # as on CalculiX
-
-
-def test_bodies_and_what_is_held_as_said_by_hand(quarter):
     model, history = quarter
     by_hand = InflatedModel(
         model.mesh, model.thickness, model.mesh.warp, model.inflation,
@@ -373,7 +349,7 @@ def test_forces_balance_and_the_gas_keeps_its_mass(symmetry, quarter):
     assert history.cavity_pressure[-1] > PRESSURE
 
 
-def test_gas_and_bodies_of_the_model_are_taken(quarter):
+def test_gas_bodies_and_span_of_the_model_are_taken(quarter):
     model, before = quarter
     thin = bend(replace(model, gas=Gas(ambient=0.01)))
     energy = (thin.cavity_pressure + 0.01) * thin.cavity_volume
@@ -383,9 +359,6 @@ def test_gas_and_bodies_of_the_model_are_taken(quarter):
     assert 0 < rise[1] < 0.75 * rise[0]
     long = bend(replace(model, collar=Collar(240.0, 400.0)))
     assert long.load[-1] > 1.05 * before.load[-1]
-
-
-def test_a_shorter_span_is_stiffer(quarter):
     narrow = RigidSupports(span=1600.0)
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, supports=narrow, deflections=[4, 12.0])
     assert bend(model).load[-1] > 1.3 * quarter[1].load[-1]
@@ -404,7 +377,7 @@ def test_the_first_millimetres_hardly_hang_on_the_mesh():
 def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch):
     find = ClosedMembrane.equilibrium
 
-    def inflates_only(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def inflates_only(self, u, pressure):
         return None if self.bodies else find(self, u, pressure)
 
     monkeypatch.setattr(ClosedMembrane, "equilibrium", inflates_only)
@@ -417,7 +390,7 @@ def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch):
 def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch):
     find = ClosedMembrane.equilibrium
 
-    def tired(self: ClosedMembrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def tired(self, u, pressure):
         if not self.bodies:
             return find(self, u, pressure)
         heights.append(self.bodies[-1].centre[1])
@@ -477,7 +450,7 @@ def test_the_inflated_frame_is_the_closed_form_away_from_caps(law):
 
 # --- settling ---
 @pytest.fixture
-def inflated() -> tuple[np.ndarray, ClosedMembrane]:
+def inflated():
     """A tube at 50 kPa, and the membrane with the strain and stress of that increment."""
     history, membrane = run(tube(8, 4, 100.0, [0.02, 0.05]), LAW)
     return history.displacement[-1], membrane

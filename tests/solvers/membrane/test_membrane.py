@@ -1,6 +1,5 @@
 """The membrane: kernel, equilibrium, failure, single elements, marching."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +39,7 @@ E1, E2, G12, NU, THICKNESS = 300.0, 220.0, 5.0, 0.24, 0.81
 BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
 
 
-def grid(across: int, along: int, width: float, length: float, distort: float = 0.0):
+def grid(across, along, width, length, distort=0.0):
     """Points (n, 3) and quads of a rectangle; inside nodes moved by `distort` of a cell."""
     x, y = np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, width, across + 1))
     points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
@@ -52,7 +51,7 @@ def grid(across: int, along: int, width: float, length: float, distort: float = 
     return points, quads
 
 
-def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11) -> Membrane:
+def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11):
     free = np.setdiff1d(np.arange(points.size), held)
     return Membrane(
         points, quads, reference_elements(points, quads), thickness, law, free,
@@ -60,18 +59,18 @@ def membrane(points, quads, law, held, thickness=THICKNESS, tolerance=1e-11) -> 
     )  # fmt: skip
 
 
-def rotation(seed: int = 4) -> np.ndarray:
+def rotation(seed=4):
     turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
     return turn * np.sign(np.linalg.det(turn))
 
 
-def quarter_bubble(elements: int = 192, law_steps=None) -> BubbleModel:
+def quarter_bubble(elements=192, law_steps=None):
     mesh = disk_mesh(100.0, elements, "quarter")
     steps = default_increments(PRESSURES) if law_steps is None else law_steps
     return BubbleModel(mesh, THICKNESS, PRESSURES, steps)
 
 
-def inflated(model: BubbleModel, law: HypoelasticLaw = LAW) -> tuple[Membrane, np.ndarray]:
+def inflated(model, law=LAW):
     """A membrane that holds the stress of the last but one increment, and the last path point."""
     solver = MembraneSolver(1e-11)
     history = solver.run(model, law)
@@ -175,7 +174,7 @@ def test_rigid_rotation_turns_every_force_and_nothing_else(thickness_change):
     assert m.stress_new == pytest.approx(stress, abs=1e-9)
 
 
-def polygon_area(points: np.ndarray) -> float:
+def polygon_area(points):
     order = np.argsort(np.arctan2(points[:, 1], points[:, 0]))
     x, y = points[order, 0], points[order, 1]
     return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
@@ -222,7 +221,7 @@ def test_increments_converge_with_second_order():
     apex = seven.mesh.node_sets["apex"][0]
     exact = MembraneSolver().run(fine, LAW).displacement[:, apex, 2]
 
-    def error(model: BubbleModel) -> np.ndarray:
+    def error(model):
         return MembraneSolver().run(model, LAW).displacement[:, apex, 2] / exact - 1.0
 
     between = 0.5 * (PRESSURES + np.concatenate([[0.0], PRESSURES[:-1]]))
@@ -316,7 +315,7 @@ def test_cut_back_does_not_change_the_result(monkeypatch, level, refused):
     expected = MembraneSolver(1e-11).run(model, LAW)
     original, calls = Membrane.equilibrium, []
 
-    def stubborn(self: Membrane, u: np.ndarray, pressure: float) -> np.ndarray | None:
+    def stubborn(self, u, pressure):
         calls.append(pressure)
         # One level is refused until the load step has been halved often enough.
         if pressure == model.increments[level] and calls.count(pressure) <= refused:
@@ -342,7 +341,7 @@ def test_one_increment_to_full_pressure_equals_many(thickness_change):
     assert once.displacement == pytest.approx(often.displacement, abs=1e-7)
 
 
-def test_a_warm_start_finds_the_same_result():
+def test_guesses_tolerance_and_earlier_runs_leave_the_result():
     model = quarter_bubble()
     cold = MembraneSolver(1e-11).run(model, LAW)
     other = LAW.with_beta(LAW.beta * 1.01)
@@ -350,26 +349,17 @@ def test_a_warm_start_finds_the_same_result():
     warm = MembraneSolver(1e-11).run(model, other, guess=cold.path)
     assert warm.displacement == pytest.approx(expected.displacement, abs=1e-7)
     assert warm.iterations < expected.iterations
-
-
-def test_a_useless_guess_is_survived():
     model = quarter_bubble()
     expected = MembraneSolver(1e-11).run(model, LAW)
     guess = np.random.default_rng(0).uniform(-60, 60, expected.path.shape)
     guess[2] = np.nan
     found = MembraneSolver(1e-11).run(model, LAW, guess=guess)
     assert found.displacement == pytest.approx(expected.displacement, abs=1e-7)
-
-
-def test_a_tolerance_below_rounding_is_met_as_well_as_can_be():
     model = quarter_bubble()
     expected = MembraneSolver(1e-10).run(model, LAW)
     found = MembraneSolver(1e-15).run(model, LAW)
     assert found.displacement == pytest.approx(expected.displacement, abs=1e-8)
     assert found.iterations < 3 * expected.iterations
-
-
-def test_runs_leave_nothing_behind():
     model, solver = quarter_bubble(), MembraneSolver()
     first = solver.run(model, LAW)
     with pytest.raises(SolverFailure):
@@ -392,19 +382,13 @@ def test_hopeless_moduli_raise_solver_failure(law):
         MembraneSolver().run(quarter_bubble(), law)
 
 
-def test_a_modulus_that_turns_negative_on_the_way_fails_there():
+def test_negative_moduli_and_pressure_offsets():
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = G12, E2, -5000.0, E1
     with pytest.raises(SolverFailure, match="kPa"):
         MembraneSolver().run(quarter_bubble(), HypoelasticLaw(beta))
-
-
-def test_a_pressure_offset_below_the_first_pressure_fails():
     with pytest.raises(InputError, match="expected positive"):
         quarter_bubble().with_parameters({"pressure_offset": -1.0})
-
-
-def test_a_pressure_offset_is_a_shift_of_every_load():
     model = quarter_bubble()
     shifted = BubbleModel(
         model.mesh, THICKNESS, PRESSURES + 0.002, np.array(model.increments) + 0.002
@@ -416,23 +400,17 @@ def test_a_pressure_offset_is_a_shift_of_every_load():
 
 
 # Bad input
-def test_a_quad_inside_out_is_named():
+def test_bad_input():
     points, quads = grid(2, 2, 1.0, 1.0)
     points[4] = [2.0, 2.0, 0.0]
     with pytest.raises(InputError, match=r"element .*mend the mesh"):
         reference_elements(points, quads)
-
-
-def test_pressures_must_increase_and_be_increments():
     mesh = disk_mesh(100.0, 48, "quarter")
     for pressures in ([], [0.0, 0.1], [0.2, 0.1], [0.1, 0.1], [-0.1]):
         assert "pressures" in complaint(BubbleModel, mesh, THICKNESS, pressures)
     assert "increments" in complaint(BubbleModel, mesh, THICKNESS, [0.1, 0.2], [0.05, 0.2])
     assert "rim" in complaint(BubbleModel, Mesh(mesh.points, mesh.quads, {}), THICKNESS, [0.1])
     assert "thickness" in complaint(BubbleModel, mesh, 0.0, [0.1])
-
-
-def test_solvers_by_name():
     check = solver_named("membrane").check()
     assert check.available and check.carries_law
     assert "membrane" in complaint(solver_named, "abacus")
@@ -463,29 +441,20 @@ def test_the_corners_move_as_the_law_says_and_so_do_their_derivatives():
     np.testing.assert_allclose(history.load, LOADS.sum(axis=1))
 
 
-def test_progress_and_stress_are_told():
+def test_progress_failure_and_stability_of_a_patch():
     solver, told = MembraneSolver(), []
     solver.progress = lambda done: told.append(done.time)
     solver.run(PatchModel(LOADS, 0.8), BENT)
     assert told == [8.0]
     stress = biaxial_response(BENT, LOADS, 0.8).stress[-1]
     np.testing.assert_allclose(solver.stress[0, 0], [*stress, 0.0])
-
-
-def test_a_load_without_equilibrium_is_a_failure_that_says_which():
     falling = HypoelasticLaw([0, 0, 0, 30, 0, 0, -8e3, 600, 0, 0, -8e3, 600], 0.2, [0.08] * 3)
     loads = np.outer(np.linspace(2, 60, 30), [1.0, 1.0])
     with pytest.raises(SolverFailure, match=r"no equilibrium at \d+ and \d+ N/mm.*load \d+ of 30"):
         MembraneSolver().run(PatchModel(loads, 0.8), falling)
-
-
-def test_unstable_loads_are_named():
     law = HypoelasticLaw.linear(100.0, 100.0, 5.0, 0.6)
     history = MembraneSolver().run(PatchModel([[10.0, 10.0], [100.0, 100.0]], 0.8), law)
     assert history.unstable == ("100 and 100 N/mm",)
-
-
-def test_a_patch_needs_loads_and_a_thickness():
     complaint_with(["loads", "(n, 2)", "(3,)"], PatchModel, [1.0, 2.0, 3.0], 0.8)
     complaint_with(["finite"], PatchModel, [[1.0, np.nan]], 0.8)
     complaint_with(["thickness", "> 0"], PatchModel, [[1.0, 1.0]], 0.0)
@@ -500,7 +469,7 @@ class Ladder(Loading):
 
     most_cuts = 3
 
-    def __init__(self, reach: float, top: float = np.inf) -> None:
+    def __init__(self, reach, top=np.inf):
         self.reach, self.top, self.looks = reach, top, []
 
     def equilibrium(self, start, level):
@@ -521,11 +490,11 @@ class Ladder(Loading):
         return f"nothing between {before:g} and {level:g}, {place}"
 
 
-def ends(loading: Loading, levels: Sequence[float], **options) -> list[float]:
+def ends(loading, levels, **options):
     return [float(u[0, 0]) for u in march(loading, levels, Asked(), **options)]
 
 
-def test_what_is_near_is_reached_directly():
+def test_levels_are_reached_directly_or_in_parts():
     ladder = Ladder(1.0)
     assert ends(ladder, [1.0, 2.0, 3.0]) == [1.0, 2.0, 3.0]
     assert ladder.looks == [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]
@@ -533,26 +502,17 @@ def test_what_is_near_is_reached_directly():
     ladder = Ladder(1.0)
     assert ends(ladder, [6.0], begun=(5.0, np.full((1, 3), 5.0))) == [6.0]
     assert ladder.looks == [(5.0, 6.0)]
-
-
-def test_what_is_far_is_reached_in_halves_and_quarters():
     ladder = Ladder(1.0)
     assert ends(ladder, [1.0, 5.0]) == [1.0, 5.0]
     assert [level for _, level in ladder.looks] == [1.0, 5.0, 3.0, 2.0, 3.0, 5.0, 4.0, 5.0]
     assert ends(Ladder(0.125), [1.0]) == [1.0]  # eighths: three cuts
     with pytest.raises(NoEquilibrium, match="nothing between 0 and 1, increment 1 of 1"):
         ends(Ladder(0.1), [1.0])
-
-
-def test_the_levels_before_the_last_one_are_not_lost():
     found = []
     with pytest.raises(SolverFailure, match="nothing between 2 and 3, increment 3 of 3"):
         for u in march(Ladder(1.0, top=2.0), [1.0, 2.0, 3.0], Asked()):
             found.append(float(u[0, 0]))
     assert found == [1.0, 2.0]
-
-
-def test_a_good_guess_is_taken_and_a_bad_one_costs_a_look():
     ladder, guess = Ladder(1.0), np.array([1.0, 9.0])[:, None, None] * np.ones((2, 1, 3))
     found = [float(u[0, 0]) for u in march(ladder, [2.0, 3.0], Asked(guess=guess))]
     assert found == [2.0, 3.0]

@@ -35,9 +35,7 @@ OFFSET = "pressure_offset"
 TIGHT = 1e-10
 
 
-def changed(
-    law: HypoelasticLaw, model: BubbleModel, name: str, step: float
-) -> tuple[BubbleModel, HypoelasticLaw]:
+def changed(law, model, name, step):
     """Model and law with one parameter moved."""
     if name == "nu12":
         return model, replace(law, nu12=law.nu12 + step)
@@ -48,10 +46,10 @@ def changed(
     return model, law.with_beta(beta)
 
 
-def differences(law, name: str, slope, move: float = 0.01, model=MODEL) -> np.ndarray:
+def differences(law, name, slope, move=0.01, model=MODEL):
     """Central differences, extrapolated, with the step that moves the bubble by `move` mm."""
 
-    def central(step: float) -> np.ndarray:
+    def central(step):
         ahead, behind = (
             MembraneSolver(TIGHT).run(*changed(law, model, name, by)).displacement
             for by in (step, -step)
@@ -75,7 +73,7 @@ def test_each_parameter(name, thickness_change):
     assert first < 2e-5 * np.abs(expected[0]).max()
 
 
-def sheet(thickness_change: str) -> tuple[BubbleModel, HypoelasticLaw]:
+def sheet(thickness_change):
     """A whole disk that is neither flat nor taut, with a rim that moves."""
     mesh = disk_mesh(100.0, 64)
     modes = disk_modes(mesh.points, 100.0, 10)
@@ -134,12 +132,9 @@ def test_each_parameter_of_a_trilinear_law(name, thickness_change):
     assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_a_trilinear_law_has_no_derivative_by_what_it_does_not_have():
+def test_a_trilinear_bubble():
     _, slope = MembraneSolver().run_with_sensitivity(MODEL, TRILINEAR, ["beta_0", "beta_3"])
     assert not slope[..., 0].any() and slope[..., 1].any()
-
-
-def test_a_trilinear_bubble_hardly_depends_on_the_increments():
     few = MembraneSolver(TIGHT).run(MODEL, TRILINEAR)
     assert len(MODEL.increments) == 9
     levels = np.interp(np.linspace(0, 9, 73)[1:], range(10), [0, *MODEL.increments])
@@ -150,7 +145,7 @@ def test_a_trilinear_bubble_hardly_depends_on_the_increments():
     assert few.displacement[:, apex, 2] == pytest.approx(many.displacement[:, apex, 2], rel=1e-4)
 
 
-def test_all_at_once_equals_one_by_one():
+def test_derivatives_do_not_depend_on_how_they_are_computed():
     solver = MembraneSolver(TIGHT)
     assert isinstance(solver, DifferentiatingSolver)
     together = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS)[1]
@@ -158,16 +153,10 @@ def test_all_at_once_equals_one_by_one():
         alone = solver.run_with_sensitivity(MODEL, LAW, [name])[1]
         near = pytest.approx(together[..., j], rel=1e-9, abs=1e-9 * np.abs(alone).max())
         assert alone[..., 0] == near
-
-
-def test_a_warm_start_changes_no_derivative():
     solver = MembraneSolver(TIGHT)
     history, cold = solver.run_with_sensitivity(MODEL, LAW)
     _, warm = solver.run_with_sensitivity(MODEL, LAW, guess=history.path)
     assert warm == pytest.approx(cold, rel=1e-6, abs=1e-8 * np.abs(cold).max())
-
-
-def test_the_history_is_that_of_a_plain_run():
     history, slope = MembraneSolver().run_with_sensitivity(MODEL, LAW)
     plain = MembraneSolver().run(MODEL, LAW)
     assert history.displacement == pytest.approx(plain.displacement, abs=1e-9)
@@ -176,9 +165,6 @@ def test_the_history_is_that_of_a_plain_run():
     assert history.path_slope is not None
     assert (history.path_slope[MODEL.reported] == slope).all()
     assert (slope[:, MODEL.mesh.node_sets["rim"]] == 0).all()
-
-
-def test_fine_meshes_take_the_other_factorisation():
     solver = MembraneSolver(TIGHT)
     band = solver.run_with_sensitivity(MODEL, LAW)[1]
     with pytest.MonkeyPatch.context() as patch:
@@ -203,14 +189,11 @@ def test_each_parameter_of_a_spline(name):
     assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_every_value_of_a_spline_unless_named():
+def test_a_spline_through_a_cubic_is_that_cubic():
     _, slope = MembraneSolver().run_with_sensitivity(MODEL, SPLINE)
     assert slope.shape[-1] == 12
     assert "beta_12" in complaint(MembraneSolver().run_with_sensitivity, MODEL, SPLINE, ["beta_12"])
-
-
-def test_a_spline_through_a_cubic_is_that_cubic():
-    """Solution and derivatives: those by the values are those by the coefficients."""
+    # Solution and derivatives: those by the values are those by the coefficients.
     values = [LAW.modulus(n, KNOTS[1]) for n in ("G12", "E2", "E1")]
     form = Spline.at([KNOTS[1]] * 3)
     spline = HypoelasticLaw(np.ravel(values), 0.24, LAW.strain_range, form=form)
@@ -231,16 +214,14 @@ LOOSE = replace(CASE_MODEL, slack=(0.04, 0.04))
 EVEN = HypoelasticLaw.linear(500.0, 500.0, 150.0)
 
 
-def drawn(number: int) -> list[HypoelasticLaw]:
+def drawn(number):
     """Random laws of the bubble's bounds, feasible; some are unstable somewhere."""
     draws = draw(FREE, np.random.default_rng([1, 0]), 2000)
     some = draws[allowed(FREE, draws)][:number]
     return [CASE_LAW.with_beta(FREE.beta(FREE.at(coefficients))) for coefficients in some]
 
 
-def judged(
-    monkeypatch: pytest.MonkeyPatch, model: BubbleModel, law: HypoelasticLaw
-) -> list[tuple[bool, bool]]:
+def judged(monkeypatch, model, law):
     """At every increment: whether the least eigenvalue is positive, and what the solver says."""
     every = replace(model, pressures=model.increments)
     solver, pairs = MembraneSolver(), []
@@ -248,7 +229,7 @@ def judged(
     tangent, count = membrane.tangent, len(membrane.free)
     accept = bubble.Record.accept
 
-    def look(self: bubble.Record, i: int, u: np.ndarray) -> None:
+    def look(self, i, u):
         tangent.factor()
         whole = np.linalg.inv(tangent.solve(np.eye(count)))
         least = float(np.linalg.eigvalsh(0.5 * (whole + whole.T))[0])

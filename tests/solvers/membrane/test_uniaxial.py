@@ -43,12 +43,12 @@ BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"
 STRAIGHT = pytest.mark.parametrize("direction", ["warp", "fill"])
 
 
-def straight(direction: str, increments: int = 100) -> UniaxialModel:
+def straight(direction, increments=100):
     lengths = WARP if direction == "warp" else FILL
     return straight_strip(direction, *lengths, THICKNESS, increments=increments)
 
 
-def bias(increments: int = 100, final: float = BIAS[1], **counts: int) -> UniaxialModel:
+def bias(increments=100, final=BIAS[1], **counts):
     return bias_strip(BIAS[0], final, THICKNESS, increments=increments, **counts)
 
 
@@ -85,17 +85,13 @@ def test_every_quad_and_set(symmetry, along, gauge):
     assert y[a] == pytest.approx(8.0 - y[b], abs=1e-13)
 
 
-def test_bad_meshes_are_named():
+def test_bad_meshes_and_models_are_named():
     good = {"width": 4.0, "length": 8.0, "across": 4, "along": 6}
     for change in (
         {"width": 0.0}, {"length": np.inf}, {"gauge_length": 9.0}, {"across": 3},
         {"along": 2, "gauge_length": 4.0},
     ):  # fmt: skip
         assert next(iter(change)) in complaint(strip_mesh, **{**good, **change})
-
-
-# Model
-def test_bad_models_are_named():
     model = bias()
     assert "elongations" in complaint(replace, model, elongations=[1.0, 1.0])
     assert "thickness" in complaint(replace, model, thickness=0.0)
@@ -107,15 +103,15 @@ def test_bad_models_are_named():
     assert "final_length" in complaint(straight_strip, "warp", 20.0, 19.0, THICKNESS)
     assert "direction" in complaint(straight_strip, "bias", *WARP, THICKNESS)
     assert "increments" in complaint(straight_strip, "warp", *WARP, THICKNESS, increments=0)
-
-
-def test_a_strip_has_no_pressure():
     with pytest.raises(InputError, match="pressure_offset"):
         MembraneSolver().run_with_sensitivity(straight("warp"), LAW, ["pressure_offset"])
 
 
+# Model
+
+
 # Warp and fill: the homogeneous strip
-def closed_form(direction: str, law: HypoelasticLaw, model: UniaxialModel):
+def closed_form(direction, law, model):
     """Load (N), Cauchy stress (MPa), strain across: the integral of the modulus.
 
     Across, d eps1 = -nu21 d eps2 with nu21 = nu12 E2/E1, and d eps2 = -nu12 d eps1. In the fill
@@ -276,24 +272,19 @@ def test_refinement_of_the_bias_strip():
     assert off.max() < 1e-2
     assert off[:, -1].max() < 1e-4
     assert off[1].max() < 0.5 * off[0].max()
-
-
-def test_a_fine_strip_fails_where_its_corners_leave_the_modulus_positive():
     assert LAW.E1(0.34) < 0 < LAW.E1(0.32)
     with pytest.raises(SolverFailure, match="mm of gauge elongation"):
         MembraneSolver().run(bias(20, across=20, along=60), LAW)
 
 
 # Derivatives
-def differences(
-    model: UniaxialModel, law: HypoelasticLaw, name: str, scale: float, move: float
-) -> tuple[np.ndarray, np.ndarray]:
+def differences(model, law, name, scale, move):
     """Extrapolated central differences of load and displacement; `scale` is N per MPa.
 
     The step moves the load by `move` N.
     """
 
-    def central(step: float) -> list[np.ndarray]:
+    def central(step):
         ends = []
         for sign in (1.0, -1.0):
             if name == "nu12":
@@ -318,9 +309,7 @@ def differences(
     return load, displacement
 
 
-def check_derivatives(
-    model: UniaxialModel, law: HypoelasticLaw, names: list[str], move: float = 0.05
-) -> None:
+def check_derivatives(model, law, names, move=0.05):
     history, slope = MembraneSolver(1e-12).run_with_sensitivity(model, law, names)
     assert history.load_slope is not None
     assert history.load_slope.shape == (len(model.elongations), len(names))
@@ -379,7 +368,7 @@ def test_the_gauge_does_not_move_with_the_parameters():
 
 
 # Robustness
-def test_a_warm_start_finds_the_same_with_less_work():
+def test_guesses_and_earlier_runs_leave_the_result():
     model = bias(20)
     cold = MembraneSolver(TIGHT).run(model, LAW)
     # Derivatives or not: the history is the same.
@@ -391,15 +380,20 @@ def test_a_warm_start_finds_the_same_with_less_work():
     warm = MembraneSolver(TIGHT).run(model, other, guess=cold.path)
     assert warm.load == pytest.approx(expected.load, rel=1e-8)
     assert warm.iterations < expected.iterations
-
-
-def test_a_useless_guess_is_survived():
     model = bias(8, across=4, along=12)
     expected = MembraneSolver(TIGHT).run(model, LAW)
     guess = np.random.default_rng(0).uniform(-20, 20, expected.displacement.shape)
     guess[3] = np.nan
     found = MembraneSolver(TIGHT).run(model, LAW, guess=guess)
     assert found.load == pytest.approx(expected.load, rel=1e-8)
+    solver, strip = MembraneSolver(), straight("fill", 10)
+    first = solver.run(strip, LAW)
+    bubble = BubbleModel(disk_mesh(100.0, 48, "quarter"), THICKNESS, [0.1, 0.2])
+    inflated = solver.run(bubble, LAW)
+    with pytest.raises(SolverFailure):
+        solver.run(strip, HypoelasticLaw.linear(300.0, -200.0, 5.0))
+    assert (solver.run(strip, LAW).load == first.load).all()
+    assert (solver.run(bubble, LAW).path == inflated.path).all()
 
 
 @pytest.mark.parametrize("refused", [1, 3])
@@ -410,7 +404,7 @@ def test_cut_back_does_not_change_the_result(monkeypatch, refused, at):
     original: Callable = Pull.equilibrium
     calls: list[float] = []
 
-    def stubborn(self: Pull, u: np.ndarray, elongation: float) -> np.ndarray | None:
+    def stubborn(self, u, elongation):
         calls.append(elongation)
         level = model.elongations[at]
         if elongation == level and calls.count(level) <= refused:
@@ -437,17 +431,6 @@ def test_newton_gets_past_moduli_that_jump(monkeypatch):
     monkeypatch.setattr(newton, "MOST_FRUITLESS", newton.MOST_ITERATIONS + 1)
     with pytest.raises(SolverFailure, match="no equilibrium"):
         MembraneSolver(TIGHT).run(model, RESTLESS)
-
-
-def test_one_solver_for_strips_and_bubble():
-    solver, strip = MembraneSolver(), straight("fill", 10)
-    first = solver.run(strip, LAW)
-    bubble = BubbleModel(disk_mesh(100.0, 48, "quarter"), THICKNESS, [0.1, 0.2])
-    inflated = solver.run(bubble, LAW)
-    with pytest.raises(SolverFailure):
-        solver.run(strip, HypoelasticLaw.linear(300.0, -200.0, 5.0))
-    assert (solver.run(strip, LAW).load == first.load).all()
-    assert (solver.run(bubble, LAW).path == inflated.path).all()
 
 
 HOPELESS = {
