@@ -1,4 +1,4 @@
-"""The project file as it is written: what all tests share, in the file's own units."""
+"""Describe the project file as it is written: what all tests share, in the file's own units."""
 
 from __future__ import annotations
 
@@ -140,13 +140,13 @@ class ProjectFile(CommonSections):
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 
     def tests(self, kind: str) -> Sequence[Any]:
-        """The sections of a kind, in the file's order."""
+        """Return the sections of a kind, in the file's order."""
         return cast(Sequence[Any], getattr(self, kind))
 
 
 @functools.cache
 def project_file() -> type[ProjectFile]:
-    """The model with the sections of all kinds that are there."""
+    """Return the model with the sections of all kinds that are there."""
     tests: dict[str, Any] = {
         name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
         for name, kind in kinds().items()
@@ -163,11 +163,9 @@ def _list_of(section: type[BaseModel]) -> Any:
 def parse(path: Path) -> ProjectFile:
     """Parse a project file; tests have the keys of [defaults.KIND] that they do not say.
 
-    Raises
-    ------
-    InputError : one line naming the file and the dotted key: TOML syntax, a file of version 0.1,
-        missing or unknown keys, values that cannot be meant. PlugInFailure : a kind of test that
-        a plug-in offers, and that does not work.
+    InputError: TOML syntax, a file of version 0.1, missing or unknown keys, values that cannot be
+    meant; one line naming the file and the dotted key. PlugInFailure: a kind of test that a plug-in
+    offers, and that does not work.
     """
     content = _content(path)
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
@@ -208,7 +206,7 @@ def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said in `own`, and in `common` where it is not; tables key by key."""
+    """Return what is said in `own`, and in `common` where it is not; tables key by key."""
     merged = {**common, **own}
     for key in common.keys() & own.keys():
         if isinstance(common[key], dict) and isinstance(own[key], dict):
@@ -225,14 +223,10 @@ REFERENCE = "#/$defs/"
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
-    """The schema of a whole file, as plain data.
+    """Return the schema of a whole file, as plain data, kinds of plug-ins included or not.
 
     A test may have its keys from [defaults.KIND], so that none is required here; bubblefit itself
     says which are missing.
-
-    Parameters
-    ----------
-    with_plug_ins : whether kinds of test that other distributions add are in it.
     """
     schema = project_file().model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
@@ -267,12 +261,12 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
 
 
 def schema_text(with_plug_ins: bool = True) -> str:
-    """The schema as a file."""
+    """Return the schema as a file."""
     return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
 
 
 def _plain(part: Any) -> Any:
-    """Without null, which TOML does not have, and without the titles that only repeat the keys."""
+    """Return it without null, which TOML does not have, and without titles that repeat the keys."""
     if isinstance(part, list):
         return [_plain(one) for one in part]
     if not isinstance(part, dict):
@@ -291,7 +285,7 @@ def _plain(part: Any) -> Any:
 
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
-    """Names of the definitions that a part of the schema leads to."""
+    """Return the names of the definitions that a part of the schema leads to."""
     used: set[str] = set()
     waiting = [part]
     while waiting:

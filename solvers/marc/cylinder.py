@@ -27,9 +27,8 @@ from .deck import (
     supports,
     time_table,
 )
-from .plates import pressure_context
-from .results import NO_REACTIONS, REACTION, by_time, displacements, whole_times
 from .settings import MarcSettings
+from .sheets import NO_REACTIONS, REACTION, by_time, displacements, pressure_context, whole_times
 
 Array = NDArray[np.float64]
 
@@ -41,15 +40,9 @@ UP = [0.0, 1.0, 0.0]
 
 
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
-    """Support, then collar: name, table of the path, patches (n, 12) towards the cylinder.
+    """Return support and collar: name, table of the path, patches (n, 12) towards the cylinder.
 
-    Parameters
-    ----------
-    inflated : (nodes, 3) mm of displacement of the inflated cylinder.
-
-    Raises
-    ------
-    InputError : a whole cylinder, whose bodies this does not make.
+    inflated : (nodes, 3) mm of displacement. InputError: a whole cylinder.
     """
     if model.copies != 4:
         problem = "Marc's deck bends a quarter; mesh it as 'quarter'"
@@ -74,7 +67,7 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
 
 
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Heights (mm) of support and collar over their places, at times 0, 1, 2, ...
+    """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ...
 
     inflation : increments of it; one more brings the support up, then the collar goes down.
     """
@@ -92,11 +85,9 @@ TONNES = 1e-12  # t/mm^3 in a kg/m^3
 
 
 def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Inflation by a pressure, the bottom held in height at the supports.
+    """Return the deck of inflation by a pressure, the bottom held in height at the supports.
 
-    Raises
-    ------
-    InputError : a template that cannot be used, a law that Marc's shells do not carry.
+    InputError: a template that cannot be used, a law that Marc's shells do not carry.
     """
     return _deck(model, law, settings, None)
 
@@ -104,15 +95,9 @@ def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSett
 def bending_deck(
     model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, inflated: Array
 ) -> str:
-    """Inflation of a cavity, the support brought up, and bending with a constant mass of gas.
+    """Return the deck of a cavity's inflation, and of bending with a constant mass of gas.
 
-    Parameters
-    ----------
-    inflated : (nodes, 3) mm of displacement of the inflated cylinder.
-
-    Raises
-    ------
-    InputError : as `inflation_deck`; a whole cylinder.
+    inflated : (nodes, 3) mm of displacement. InputError: as `inflation_deck`; a whole cylinder.
     """
     gas = model.gas
     cavity = {
@@ -182,26 +167,20 @@ UNBALANCED = 0.02
 
 
 def inflated(path: Path, model: CylinderModel) -> Array:
-    """Displacement (nodes, 3) mm at the end of inflation; SolverFailure as `whole_times`."""
+    """Return the displacement (nodes, 3) mm at the end of inflation; SolverFailure as
+    `whole_times`."""
     return displacements(whole_times(path, model.mesh, len(model.inflation)))[-1]
 
 
 def cylinder_history(
     path: Path, model: CylinderModel, iterations: int, ended: bool = True
 ) -> History:
-    """The inflated cylinder, then every reported deflection; `load` of the collar in N.
+    """Return the inflated cylinder, then every reported deflection; `load` of the collar in N.
 
     The cavity's pressure is not in the file: it is that of a constant mass in the volume found.
-
-    Parameters
-    ----------
     ended : the run ended well. If not, the history ends with the last increment that the file
-        holds whole, and a remark says so.
-
-    Raises
-    ------
-    SolverFailure : the file is not there or damaged, holds no forces or no increment of bending;
-        or the run ended and one is missing.
+    holds whole, and a remark says so. SolverFailure: the file is not there or damaged, holds no
+    forces or no increment of bending; or the run ended and one is missing.
     """
     filled = len(model.inflation)
     wanted = {filled: 0.0} | {
@@ -245,7 +224,7 @@ def cylinder_history(
 
 
 def may_touch(model: CylinderModel) -> dict[str, Numbers]:
-    """Nodes of the tube that collar and supports may touch."""
+    """Return the nodes of the tube that collar and supports may touch."""
     p, tube = model.mesh.points, np.ones(len(model.mesh.points), bool)
     # The rim where caps and tube meet is the tube's.
     caps = np.setdiff1d(model.mesh.node_sets["caps"], model.mesh.node_sets["ends"])
@@ -260,7 +239,7 @@ def may_touch(model: CylinderModel) -> dict[str, Numbers]:
 def _forces(
     model: CylinderModel, frames: list[dict[str, Array]]
 ) -> tuple[dict[str, Array], list[Note]]:
-    """What the bodies do to the whole cylinder, (frames, 3) N, and what is to be said of it."""
+    """Return what the bodies do to the whole cylinder, (frames, 3) N, and notes on it."""
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
         raise SolverFailure(NO_REACTIONS, "marc")
@@ -284,11 +263,9 @@ def _forces(
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
-    """Inflation alone, to know where collar and supports touch; then all, up to a collapse.
+    """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse.
 
-    Raises
-    ------
-    SolverFailure : a run that did not end well. InputError : as `bending_deck`.
+    SolverFailure: a run that did not end well. InputError: as `bending_deck`.
     """
     filling, bending = len(model.inflation), len(model.increments)
     deck = inflation_deck(model, law, settings)

@@ -1,4 +1,4 @@
-"""What the decks of all models have in common: law, schedule, supports."""
+"""Write what the decks of all models share: law, schedule, supports, sets, fabric."""
 
 from __future__ import annotations
 
@@ -32,12 +32,7 @@ ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
 
 
 def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
-    """What the templates are given of the law.
-
-    Raises
-    ------
-    InputError : a law that NLELAST does not carry.
-    """
+    """Return what the templates hold of the law; InputError: one that NLELAST does not carry."""
     if settings.law == "hypela2":
         kind = "thick shell" if settings.element == THICK else "membrane"
         return {"law": "hypoelastic", "state_variables": STATE_VARIABLES[kind]}
@@ -56,7 +51,7 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
 
 
 def _held(table: ModulusTable) -> list[list[float]]:
-    """Its points, and one more beyond each end: held whether or not Marc extrapolates."""
+    """Return its points, and one more beyond each end: held whether or not Marc extrapolates."""
     strain, modulus = (np.pad(values, 1, mode="edge") for values in (table.strain, table.modulus))
     strain[[0, -1]] += [-GUARD, GUARD]
     found: list[list[float]] = np.column_stack([strain, modulus]).tolist()
@@ -66,7 +61,7 @@ def _held(table: ModulusTable) -> list[list[float]]:
 def schedule(
     settings: MarcSettings, cases: Sequence[tuple[str, int, Sequence[str]]]
 ) -> dict[str, Any]:
-    """Load cases of so many increments of the model each, with the names of their conditions.
+    """Return load cases of so many increments of the model each, with their conditions.
 
     Every increment of the model is cut into as many as make `settings.increments` in all.
     """
@@ -90,7 +85,7 @@ def schedule(
 def fixed(
     name: str, members: str, dofs: Sequence[int], values: Sequence[float] = (), table: int = 0
 ) -> dict[str, Any]:
-    """One condition of FIXED DISP on a node set; `dofs` from 0, zero unless `values` are given."""
+    """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
     given = list(values) or [0.0] * len(dofs)
     return {
         "name": name,
@@ -102,7 +97,7 @@ def fixed(
 
 
 def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
-    """Conditions `fix_SET` from directions held at zero by node set."""
+    """Return conditions `fix_SET` from directions held at zero by node set."""
     return [
         fixed(f"fix_{name.lower()}", name.lower(), held_dofs(directions, element))
         for name, directions in held.items()
@@ -110,7 +105,7 @@ def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, 
 
 
 def held_dofs(directions: Sequence[int], element: int) -> tuple[int, ...]:
-    """Degrees of freedom of a node held where the membrane's `directions` are (from 0).
+    """Return degrees of freedom of a node held where the membrane's `directions` are (from 0).
 
     One direction: a plane of symmetry, where a shell does not turn about the other two axes.
     More: a pinned edge, which may turn.
@@ -121,7 +116,7 @@ def held_dofs(directions: Sequence[int], element: int) -> tuple[int, ...]:
 
 
 def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any]:
-    """A table over time: `values` at times 0, 1, 2, ..."""
+    """Return a table over time: `values` at times 0, 1, 2, ..."""
     points = [[float(time), float(value)] for time, value in enumerate(values)]
     return {"number": number, "name": name, "points": points}
 
@@ -132,12 +127,7 @@ def deck_text(
     settings: MarcSettings,
     context: Mapping[str, Any],
 ) -> str:
-    """The deck.
-
-    Raises
-    ------
-    InputError : a template or a file of the site's that cannot be used.
-    """
+    """Return the deck; InputError: a template or a file of the site's that cannot be used."""
     common = {
         "version": __version__,
         "title": f"{title}, {len(context['elements'])} elements {settings.element}",
@@ -161,10 +151,8 @@ SAME = 9
 
 
 def set_lines(numbers: Numbers) -> list[str]:
-    """Members of a set as Marc reads them: `a to b` for runs, ` c` where a line goes on.
-
-    numbers : from 0, sorted.
-    """
+    """Return members of a set (from 0, sorted) as Marc reads them: `a to b` for runs, ` c` to go
+    on."""
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
@@ -178,11 +166,9 @@ def set_lines(numbers: Numbers) -> list[str]:
 
 
 def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
-    """One `define` of the deck; kind "node" or "element".
+    """Return a `define` of the deck; kind "node" or "element".
 
-    Raises
-    ------
-    InputError : a name that Marc could not read, or a set of nothing.
+    InputError: a name that Marc could not read, or a set of nothing.
     """
     if not re.fullmatch(r"[a-z0-9_]{1,28}", name):
         problem = f"{name!r}: Marc takes at most 28 letters, digits and _; rename the set"
@@ -193,11 +179,9 @@ def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
 
 
 def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
-    """Unit vectors of warp and fill in the plane of each quad at its middle, (quads, 3) each.
+    """Return unit vectors of warp and fill in the plane of each quad, (quads, 3) each.
 
-    Raises
-    ------
-    InputError : a warp direction normal to a quad.
+    InputError: a warp direction normal to a quad.
     """
     corner = mesh.points[mesh.quads]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
@@ -212,13 +196,13 @@ def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
 
 
 def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[str, Any]:
-    """What the templates are given of mesh, frames and thicknesses; sets without the nodes'."""
+    """Return mesh, frames and thicknesses for the templates; sets without the nodes'."""
     quads = np.asarray(mesh.quads)
     everything = np.arange(len(quads))
     sets = [named_set("element", FABRIC, everything)]
 
     def groups(values: Array, name: str) -> list[tuple[str, int]]:
-        """Name of the set of elements with the same row of `values`, and one of them."""
+        """Return the set of elements with the same row of `values`, and one of them."""
         _, which = np.unique(values, axis=0, return_inverse=True)
         which = which.ravel()
         count = int(which.max()) + 1
@@ -253,7 +237,7 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
 
 
 def node_sets(mesh: Mesh, names: Mapping[str, Any] | list[str]) -> list[dict[str, Any]]:
-    """The `define`s of the mesh's node sets of these names."""
+    """Return the `define`s of the mesh's node sets of these names."""
     return [named_set("node", name.lower(), mesh.node_sets[name]) for name in names]
 
 
@@ -268,13 +252,7 @@ class Run(Protocol):
     def __call__(
         self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
     ) -> T:
-        """What `read` makes of the results, or `rescue` of those of a run that stopped early.
+        """Return what `read` makes of the results, or `rescue` of those of a bad end.
 
-        Parameters
-        ----------
-        units : total time at the end of the deck.
-
-        Raises
-        ------
-        SolverFailure : it did not end well.
+        units : total time at the end of the deck. SolverFailure: it did not end well.
         """

@@ -1,4 +1,4 @@
-"""How a site runs its Marc: `[solver.marc]` of a project file, or a file of the site's own."""
+"""Settings of a site's Marc: `[solver.marc]` of a project file, or a file of the site's own."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class MarcSettings(ExternalSettings):
     keep: bool = False
 
     def given(self, folder: Path) -> dict[str, Any]:
-        """What was given, None for the rest; paths from `folder` (of the file it was in)."""
+        """Return what was given, None for the rest; paths from `folder` (of the file it was in)."""
         values: dict[str, Any] = dict.fromkeys(type(self).model_fields)
         values |= self.model_dump(include=self.model_fields_set)
         for name in (*self.paths, *self.programs):
@@ -109,15 +109,10 @@ class MarcSettings(ExternalSettings):
 
 
 def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
-    """Settings from those `given` (None: not given), over the site's file, over the defaults.
+    """Return settings from those `given` (None: not), over the site's file, over the defaults.
 
-    Parameters
-    ----------
     named : the executable, or the site's file if it ends in .toml; BUBBLEFIT_MARC unless given.
-
-    Raises
-    ------
-    InputError : a file or a value that cannot be used.
+    InputError: a file or a value that cannot be used.
     """
     site = named or os.environ.get(VARIABLE, "")
     values: dict[str, Any] = {}
@@ -148,11 +143,9 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
 
 
 def site_settings(path: Path) -> dict[str, Any]:
-    """The keys of a site's file, with its paths made absolute.
+    """Return the keys of a site's file, with its paths made absolute.
 
-    Raises
-    ------
-    InputError : no such file, not TOML, a key that there is not.
+    InputError: no such file, not TOML, a key that there is not.
     """
     try:
         content = toml_of(path)

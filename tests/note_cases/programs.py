@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.notes import Note
-from bubblefit.solvers.calculix import cylinder_results as cylinder_analysis
-from bubblefit.solvers.calculix.cylinder import solid_mesh
-from bubblefit.solvers.calculix.cylinder_results import BentCylinder, volumes
+from bubblefit.solvers.calculix import cylinder as cylinder_analysis
+from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
 from bubblefit.solvers.marc.cylinder import may_touch
-from bubblefit.solvers.marc.results import bubble_history
+from bubblefit.solvers.marc.sheets import bubble_history
 from bubblefit.solvers.marc.solver import MarcSolver
 
 from ..identification.cases import MODEL

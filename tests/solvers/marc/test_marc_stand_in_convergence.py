@@ -9,8 +9,8 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.solvers.marc.deck import TOLERANCE
-from bubblefit.solvers.marc.plates import bubble_deck
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.sheets import bubble_deck
 from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -14,8 +14,8 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
-from bubblefit.solvers.marc.plates import bubble_deck, strip_deck
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.sheets import bubble_deck, strip_deck
 
 from ... import needs
 from ...fortran_build import LAWS
