@@ -74,14 +74,9 @@ def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float,
     variables = {**os.environ, "LD_LIBRARY_PATH": search, "OMP_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
-            [ccx, "bars"],
-            cwd=folder,
-            env=variables,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=timeout,
-        )
+            [ccx, "bars"], cwd=folder, env=variables, timeout=timeout, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise SolverFailure(f"{ccx}: four bars took more than {timeout:g} s", "calculix") from None
     except OSError as error:
