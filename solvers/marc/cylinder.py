@@ -21,9 +21,7 @@ from .deck import (
     deck_text,
     fabric_context,
     fixed,
-    law_context,
     node_sets,
-    schedule,
     supports,
     time_table,
 )
@@ -77,7 +75,6 @@ def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], li
     return support, collar
 
 
-TEMPLATE = "cylinder.dat.j2"
 HELD = "support_bottom"
 #: Increments between inflation and bending, in which the support comes up.
 APPROACH = 1
@@ -115,13 +112,11 @@ def _deck(
     bending: dict[str, Any] | None,
 ) -> str:
     mesh, filling, steps = model.mesh, len(model.inflation), len(model.increments)
-    warp = np.asarray(mesh.warp)
-    fabric = fabric_context(mesh, warp, model.thickness)
+    fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [one["name"] for one in guided]
-    hold = fixed("hold", HELD, (1,))
-    load = [0.0, *model.inflation]
-    tables = []
+    held = [*guided, fixed("hold", HELD, (1,))]
+    load, tables = [0.0, *model.inflation], []
     if bending is None:
         cases = [("inflation", filling, [*names, "hold", "pressure"])]
     else:
@@ -136,23 +131,10 @@ def _deck(
             time_table(SUPPORT_PATH, "support_path", support),
             time_table(COLLAR_PATH, "collar_path", collar),
         ]
-    return deck_text(
-        TEMPLATE,
-        "Cylinder",
-        settings,
-        {
-            **fabric,
-            "sets": [*fabric["sets"], *node_sets(mesh, [*model.guides, HELD])],
-            **law_context(law, settings),
-            **schedule(settings, cases),
-            "follower": True,
-            "time_tables": [time_table(1, "load", load), *tables],
-            "fixed": [*guided, hold],
-            "pressure": pressure_context(settings),
-            "start": {"name": "start", "conditions": [*names, "hold"]},
-            **(bending or {}),
-        },
-    )
+    tables.insert(0, time_table(1, "load", load))
+    sets = node_sets(mesh, [*model.guides, HELD])
+    deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held
+    return deck_text(*deck, pressure=pressure_context(settings), **(bending or {}))
 
 
 Numbers = NDArray[np.intp]

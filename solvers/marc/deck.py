@@ -125,20 +125,38 @@ def deck_text(
     template: str,
     title: str,
     settings: MarcSettings,
-    context: Mapping[str, Any],
+    law: HypoelasticLaw,
+    fabric: dict[str, Any],
+    sets: Sequence[dict[str, Any]],
+    cases: Sequence[tuple[str, int, Sequence[str]]],
+    tables: Sequence[dict[str, Any]],
+    held: Sequence[dict[str, Any]],
+    **context: Any,
 ) -> str:
-    """Return the deck; InputError: a template or a file of the site's that cannot be used."""
-    common = {
+    """Return the deck of a `fabric_context`, of node sets, load cases, tables over time, supports.
+
+    All supports hold before the first increment, too. context : what only this deck's template is
+    given. InputError: a template or a file of the site's that cannot be used, as `law_context`.
+    """
+    whole = {
         "version": __version__,
-        "title": f"{title}, {len(context['elements'])} elements {settings.element}",
+        "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
         "element": settings.element,
         "shell": settings.element != MEMBRANE,
-        "follower": False,
+        "follower": "pressure" in context,
         "gas": None,
+        **fabric,
+        "sets": [*fabric["sets"], *sets],
+        **law_context(law, settings),
+        **schedule(settings, cases),
+        "time_tables": tables,
+        "fixed": held,
+        "start": {"name": "start", "conditions": [one["name"] for one in held]},
+        **context,
     }
     folder = Path(settings.templates) if settings.templates is not None else None
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
-    return render("marc", template, {**common, **context}, folder, instead)
+    return render("marc", template, whole, folder, instead)
 
 
 Array = NDArray[np.float64]

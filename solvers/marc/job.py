@@ -27,6 +27,13 @@ ADVICE = (
     "see `bubblefit docs marc`"
 )
 SECONDS = 60.0
+log = logging.getLogger(__name__)
+
+NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
+#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
+WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
+T = TypeVar("T")
+Tell = Callable[[Progress], None]
 
 
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
@@ -246,42 +253,23 @@ def ending(
 def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
     """Return `*** error` lines, refusals of a licence, which element was inside out ("" unknown),
     and complaints of a full disk."""
-    errors: list[str] = []
-    full: list[str] = []
-    refusals: list[str] = []
+    errors, refusals, full = list[str](), list[str](), list[str]()
     turned: str | None = None
     for file in files:
-        try:
-            # The .out of a long job is large: line by line.
-            with file.open(encoding="latin-1") as text:
-                for line in text:
-                    found = _INSIDE_OUT.search(line)
-                    if found is not None and turned is None:
-                        turned = f" (element {found[1]})" if found[1] else ""
-                    if any(words.lower() in line.lower() for words in WORDS):
-                        _add(full, line)
-                    if _ERROR.search(line):
-                        _add(errors, line)
-                    if _LICENCE.search(line) and _REFUSED.search(line):
-                        _add(refusals, line)
-        except OSError:
-            continue
+        with suppress(OSError), file.open(encoding="latin-1") as text:
+            for line in text:  # the .out of a long job is large
+                found = _INSIDE_OUT.search(line)
+                if found is not None and turned is None:
+                    turned = f" (element {found[1]})" if found[1] else ""
+                said = " ".join(line.split())
+                for lines, meant in (
+                    (full, any(words.lower() in line.lower() for words in WORDS)),
+                    (errors, _ERROR.search(line)),
+                    (refusals, _LICENCE.search(line) and _REFUSED.search(line)),
+                ):
+                    if meant and said not in lines and len(lines) < MOST_LINES:
+                        lines.append(said)
     return errors, refusals, turned, full
-
-
-def _add(lines: list[str], line: str) -> None:
-    text = " ".join(line.split())
-    if text not in lines and len(lines) < MOST_LINES:
-        lines.append(text)
-
-
-log = logging.getLogger(__name__)
-
-NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
-#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
-WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
-T = TypeVar("T")
-Tell = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)

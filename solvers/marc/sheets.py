@@ -22,10 +22,8 @@ from .deck import (
     deck_text,
     fabric_context,
     fixed,
-    law_context,
     named_set,
     node_sets,
-    schedule,
     supports,
     time_table,
 )
@@ -68,26 +66,13 @@ def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings)
     """
     warp = WARP if model.mesh.warp is None else model.mesh.warp
     fabric = fabric_context(model.mesh, warp, model.thickness)
-    held = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
-    fixed = supports(held, settings.element)
-    names = [one["name"] for one in fixed]
-    cases = [("inflation", len(model.increments), [*names, "pressure"])]
-    return deck_text(
-        "bubble.dat.j2",
-        "Bubble",
-        settings,
-        {
-            **fabric,
-            "sets": [*fabric["sets"], *node_sets(model.mesh, list(held))],
-            **law_context(law, settings),
-            **schedule(settings, cases),
-            "follower": True,
-            "time_tables": [time_table(1, "load", (0.0, *model.increments))],
-            "fixed": fixed,
-            "pressure": pressure_context(settings),
-            "start": {"name": "start", "conditions": names},
-        },
-    )
+    sets = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
+    held = supports(sets, settings.element)
+    cases = [("inflation", len(model.increments), [*(one["name"] for one in held), "pressure"])]
+    tables = [time_table(1, "load", (0.0, *model.increments))]
+    named, pressure = node_sets(model.mesh, list(sets)), pressure_context(settings)
+    return deck_text("bubble.dat.j2", "Bubble", settings, law, fabric, named, cases, tables, held,
+                     pressure=pressure)  # fmt: skip
 
 
 def pressure_context(settings: MarcSettings) -> dict[str, float]:
@@ -125,23 +110,13 @@ def strip_deck(
     # In its plane a strip neither bends nor twists.
     flat = (2,) if settings.element == MEMBRANE else (2, 3, 4, 5)
     held = [*supports(model.supports, MEMBRANE), fixed("flat", FLAT, flat)]
-    names = [one["name"] for one in held]
     pull = fixed("pull", model.pulled.lower(), (1,), (-1.0,), table=1)
     sets = node_sets(mesh, list(dict.fromkeys([*model.supports, model.pulled])))
-    return deck_text(
-        "uniaxial.dat.j2",
-        "Strip",
-        settings,
-        {
-            **fabric,
-            "sets": [*fabric["sets"], *sets, named_set("node", FLAT, np.arange(len(mesh.points)))],
-            **law_context(law, settings),
-            **schedule(settings, [("pull", len(pulls), [*names, "pull"])]),
-            "time_tables": [time_table(1, "load", (0.0, *pulls.tolist()))],
-            "fixed": [*held, pull],
-            "start": {"name": "start", "conditions": names},
-        },
-    )
+    sets.append(named_set("node", FLAT, np.arange(len(mesh.points))))
+    cases = [("pull", len(pulls), [*(one["name"] for one in held), "pull"])]
+    tables = [time_table(1, "load", (0.0, *pulls.tolist()))]
+    deck = "uniaxial.dat.j2", "Strip", settings, law, fabric, sets, cases, tables, held
+    return deck_text(*deck, fixed=[*held, pull])
 
 
 def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:

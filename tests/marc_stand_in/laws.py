@@ -92,7 +92,7 @@ class Piecewise:
 def piecewise_law(
     e1: ArrayLike, e2: ArrayLike, g12: ArrayLike, nu12: float = 0.24, thickness: str = "constant"
 ) -> HypoelasticLaw:
-    """Return the law of three moduli (n, 5), MPa: the upper end of each piece and its coefficients."""
+    """Return the law of three moduli (n, 5), MPa: upper end and coefficients of each piece."""
     curves = [np.asarray(curve, dtype=float) for curve in (e1, e2, g12)]
     form = Piecewise(tuple(tuple(curve[:-1, 0].tolist()) for curve in curves))  # type: ignore[arg-type]
     beta = np.concatenate([curve[:, 1:].ravel() for curve in curves])
@@ -204,7 +204,7 @@ class Point:
         self.strain, self.stress, self.states = np.zeros(3), np.zeros(3), np.zeros(states)
 
     def step(self, increment: Array) -> Array | None:
-        """Return the stress after an increment of strain; None where the subroutine ends the job."""
+        """Return the stress after an increment of strain; None if the subroutine ends the job."""
         d, g, zero = np.zeros((3, 3), order="F"), np.zeros(3), np.zeros(99)
         e, de = self.strain.copy(), np.array(increment, dtype=float)
         s, t = self.stress.copy(), self.states.copy()

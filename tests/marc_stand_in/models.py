@@ -51,7 +51,7 @@ def schedule_of(content: Content) -> Schedule:
 
 
 def pressures(content: Content, schedule: Schedule, cases: int = 1) -> list[float]:
-    """Return the MPa that inflates, at the end of every increment of the first `cases` load cases."""
+    """Return the MPa that inflates, at the increments of the first `cases` load cases."""
     loads = [content.conditions[name] for name in schedule.first]
     loads = [c for c in loads if c.kind != "fixed"]
     if len(loads) != 1 or loads[0].tables == [0]:
@@ -115,7 +115,7 @@ def model_of(
 
 
 def _strip(content: Content, schedule: Schedule, thickness: float, warp: Array) -> UniaxialModel:
-    """Return the strip; its gauge is a line from a pulled node to one that is held, along the pull."""
+    """Return the strip; its gauge is a line along the pull, from a pulled node to a held one."""
     conditions = [content.conditions[name] for name in schedule.first]
     moved = [c for c in conditions if any(c.values)]
     if len(moved) != 1 or moved[0].dofs != [2] or moved[0].values != [-1.0]:
@@ -180,7 +180,7 @@ def _as_expected(content: Content) -> None:
 def _bodies(
     content: Content, schedule: Schedule, position: Array
 ) -> tuple[list[RigidCylinder], RigidCylinder, Array]:
-    """Return support, collar, and mm that the collar has gone down from touching, after inflation."""
+    """Return support, collar, and mm of the collar below touching, after inflation."""
     support, collar = content.bodies[1:]
     post, ring = support_of(support), collar_of(collar)
     later = schedule.times[schedule.case > 0]
