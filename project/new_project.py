@@ -55,6 +55,7 @@ def project_text(
 ) -> str:
     """Return the text of a project file, see `write_project`."""
     values = {**USUAL, **{key: value for key, value in said.items() if value is not None}}
+    values["deflection"] = 1.6 * values["diameter"]
     asked = [kind for kind, count in tests.items() if count]
     if not asked:
         known = ", ".join(f"--{kind}" for kind in writable_kinds())
@@ -62,8 +63,8 @@ def project_text(
     if form not in form_names():
         raise InputError(None, "--form", f"{form!r} is not one of: {', '.join(form_names())}")
     fitted = [kind for kind in asked if kind_named(kind).fitted]
-    return _render(
-        "project",
+    return render(
+        "project/project.toml.j2",
         name=_quoted(name),
         version=__version__,
         thickness=thickness,
@@ -73,22 +74,16 @@ def project_text(
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,
         tests=[
-            _render(kind, number=n, count=tests[kind], name=f"{kind}{n}", **_of(values))
+            render(
+                f"project/{kind}.toml.j2", number=n, count=tests[kind], name=f"{kind}{n}", **values
+            )
             for kind in asked
             for n in range(1, tests[kind] + 1)
         ],
     )
 
 
-def _of(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {**values, "deflection": 1.6 * values["diameter"]}
-
-
 def _quoted(text: str) -> str:
     """Return text as it may stand between TOML's quotation marks."""
     plain = "".join(c for c in text if c.isprintable())
     return plain.replace("\\", "\\\\").replace('"', '\\"')
-
-
-def _render(template: str, /, **context: Any) -> str:
-    return render(f"project/{template}.toml.j2", **context)

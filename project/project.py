@@ -15,12 +15,7 @@ from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.registry import form_settings
-from ..readers.sections import (
-    LENGTH_UNITS,
-    MODULUS_UNITS,
-    PRESSURE_UNITS,
-    beside,
-)
+from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
 from ..reading import content_of, is_file
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
@@ -29,6 +24,9 @@ from .cards import FITTED, Cards, NamedCard, read_cards, usual_folder
 from .schema import FitSection, LawSection, ProjectFile, parse
 
 Settings = dict[str, Any]
+#: Data folders: of all tests, or by the name of a test.
+Folders = Path | Mapping[str, Path]
+NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
 HEAD = "# As it was run: what the project says, with the options of the command.\n"
 
 
@@ -68,20 +66,19 @@ def section_as_run(
         if not isinstance(table, dict):
             return whole  # its data are of another sort
     given = base / os.path.expanduser(table.get(key, "")) if folder is None else folder
-    table[key] = os.path.abspath(given)
-    beside: Settings = _beside_project(whole, base, Path(table[key]))
-    return beside
+    data = table[key] = os.path.abspath(given)
 
+    def beside_project(value: Any) -> Any:
+        """Return full paths of files that are not in the data's folder, but beside the project."""
+        if isinstance(value, dict):
+            return {key: beside_project(own) for key, own in value.items()}
+        if isinstance(value, list):
+            return [beside_project(own) for own in value]
+        if isinstance(value, str) and Path(value).suffix and not os.path.exists(Path(data, value)):
+            return os.path.abspath(base / value) if is_file(base / value) else value
+        return value
 
-def _beside_project(value: Any, base: Path, folder: Path) -> Any:
-    """Return full paths of files that are not in the data's folder and lie beside the project."""
-    if isinstance(value, dict):
-        return {key: _beside_project(own, base, folder) for key, own in value.items()}
-    if isinstance(value, list):
-        return [_beside_project(own, base, folder) for own in value]
-    if isinstance(value, str) and Path(value).suffix and not os.path.exists(folder / value):
-        return os.path.abspath(base / value) if is_file(base / value) else value
-    return value
+    return {key: beside_project(own) for key, own in whole.items()}
 
 
 def settings_of(project: Project, tests: Sequence[str]) -> Settings:
@@ -91,7 +88,6 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     """
     written = project.written
     assert written is not None
-    solver = project.fit.solver
     settings: Settings = {
         **written.common,
         "law": plain(project.law.model_dump()),
@@ -99,13 +95,11 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     }
     if isinstance(folder := settings["fit"].get("cache"), str):
         settings["fit"]["cache"] = os.path.abspath(beside(project.path.parent, folder))
-    options = _solver_options(project)
-    if options:
-        settings["solver"] = {solver: options}
+    if options := _solver_options(project):
+        settings["solver"] = {project.fit.solver: options}
     for name in tests:
-        if name not in written.tests:  # made from Python, beside the file
-            continue
-        settings.setdefault(written.kinds[name], []).append(written.tests[name])
+        if name in written.tests:  # the others were made from Python, beside the file
+            settings.setdefault(written.kinds[name], []).append(written.tests[name])
     return settings
 
 
@@ -161,13 +155,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
     return str(value) if isinstance(value, Path) else value
-
-
-#: Data folders: of all tests, or by the name of a test.
-Folders = Path | Mapping[str, Path]
-
-
-NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -269,10 +256,8 @@ class Project:
         if not tests:
             kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
             of = "" if names is None else f" among {', '.join(names)}"
-            what = " or ".join(
-                f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)
-            )
-            problem = f"the project has no test{kind}{of}; add {what}"
+            able_kinds = [f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)]
+            problem = f"the project has no test{kind}{of}; add {' or '.join(able_kinds)}"
             raise InputError(self.path, "", problem)
         return tests
 
@@ -287,20 +272,10 @@ def read_project(path: Path | str, data: Folders | None = None, need_data: bool 
     """
     path = Path(path)
     file = parse(path)
-    units = file.units
-    fabric = Fabric(
-        file.fabric.name,
-        file.fabric.thickness * LENGTH_UNITS[units.length],
-        file.fabric.thickness_change,
-    )
-    scales = Scales(
-        MODULUS_UNITS[units.modulus],
-        PRESSURE_UNITS[units.pressure],
-        LENGTH_UNITS[units.length],
-        units.modulus,
-        units.pressure,
-        units.length,
-    )
+    said, units = file.fabric, file.units
+    length, names = LENGTH_UNITS[units.length], (units.modulus, units.pressure, units.length)
+    fabric = Fabric(said.name, said.thickness * length, said.thickness_change)
+    scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
     tests = _tests(file, place, data)
     return Project(

@@ -196,9 +196,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
     whole, defaults = dict(content), content.get("defaults")
-    if not isinstance(defaults, dict):
-        return whole
-    for kind, common in defaults.items():
+    for kind, common in defaults.items() if isinstance(defaults, dict) else ():
         tests = whole.get(kind)
         if isinstance(common, dict) and isinstance(tests, list):
             whole[kind] = [_merged(common, t) if isinstance(t, dict) else t for t in tests]
@@ -214,12 +212,9 @@ def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]
     return merged
 
 
-#: As it is shipped: of the kinds of test and solvers that come with bubblefit.
+#: The one that is shipped: of the kinds of test and solvers that come with bubblefit.
 SHIPPED = Path(__file__).resolve().parent.parent / "templates" / "project" / "project.schema.json"
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
-#: Where a table of one solver's settings is listed by its name.
-SOLVER = "Settings of solvers, by name: [solver.membrane] and so on."
-REFERENCE = "#/$defs/"
+DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
@@ -230,11 +225,10 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     """
     schema = project_file().model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
-    theirs = {plug_in.name for plug_in in plug_ins("bubblefit.tests")}
-    own = [name for name in kinds() if with_plug_ins or name not in theirs]
-    for name in kinds():
-        if name not in own:
-            del properties[name]
+    theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}
+    own = [name for name in kinds() if name not in theirs]
+    for name in kinds().keys() & theirs:
+        del properties[name]
     for name in own:
         for used in _used(properties[name], definitions):
             definitions[used].pop("required", None)
@@ -248,7 +242,7 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     for section in sections.values():
         definitions.update(section.pop("$defs", {}))
     properties["solver"] = {
-        "description": SOLVER,
+        "description": "Settings of solvers, by name: [solver.membrane] and so on.",
         "type": "object",
         "properties": sections,
         # Those of plug-ins check their own settings.
@@ -256,8 +250,7 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     }
     needed = _used(properties, definitions)
     schema["$defs"] = {name: definitions[name] for name in sorted(needed)}
-    plain: dict[str, Any] = _plain(schema)
-    return plain | {"$schema": DRAFT, "title": "bubblefit project"}
+    return {**_plain(schema), "$schema": DRAFT, "title": "bubblefit project"}
 
 
 def schema_text(with_plug_ins: bool = True) -> str:

@@ -152,7 +152,7 @@ class CalculixSolver:
             environment = dict.fromkeys(counts, str(self.threads))
             environment["LD_LIBRARY_PATH"] = str(library.parent)
             watch = None if self.progress is None else Watch(lambda: increments(sta), self.progress)
-            command = [program, "-i", JOB]
+            command: list[str | Path] = [program, "-i", JOB]
             outcome = run_process(command, folder, log_file, timeout, environment, watch)
             problem, done = reason(folder, JOB, outcome, timeout), increments(sta)
             iterations = sum(i.iterations for i in done)
