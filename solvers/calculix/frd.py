@@ -98,7 +98,7 @@ class FrdFile:
             if line.startswith("    1PSTEP"):
                 increment, step = self._int(line[36:48]), self._int(line[48:60])
             elif line.startswith("  100C"):
-                time = self._float(line[12:24])
+                time = self._number(line[12:24], float, "a number")
                 if frame is None or (frame.step, frame.increment) != (step, increment):
                     if frame is not None:
                         yield frame
@@ -232,16 +232,13 @@ class FrdFile:
         return line
 
     def _int(self, text: str) -> int:
-        try:
-            return int(text)
-        except ValueError:
-            raise self._wrong(f"expected a whole number, got {text.strip()!r}") from None
+        return int(self._number(text, int, "a whole number"))
 
-    def _float(self, text: str) -> float:
+    def _number(self, text: str, kind: type, expected: str) -> float:
         try:
-            return float(text)
+            return float(text) if kind is float else int(text)
         except ValueError:
-            raise self._wrong(f"expected a number, got {text.strip()!r}") from None
+            raise self._wrong(f"expected {expected}, got {text.strip()!r}") from None
 
     def _wrong(self, problem: str) -> InputError:
         return InputError(self.path, f"byte {self._at}", problem)

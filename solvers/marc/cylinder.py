@@ -50,17 +50,10 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
     radius = float(np.abs(mesh.points[:, 1]).max())
     support = support_body(model.supports, radius, float(at[under, 1].min()) + INTO)
     collar = collar_body(model.collar, at, ABOVE)
+    bodies = (("support", SUPPORT_PATH, support), ("collar", COLLAR_PATH, collar))
     return [
-        {
-            "name": name,
-            "path": path,
-            "direction": UP,
-            "patches": body.faces.reshape(-1, 12).tolist(),
-        }
-        for name, path, body in (
-            ("support", SUPPORT_PATH, support),
-            ("collar", COLLAR_PATH, collar),
-        )
+        {"name": n, "path": path, "direction": UP, "patches": body.faces.reshape(-1, 12).tolist()}
+        for n, path, body in bodies
     ]
 
 
@@ -96,12 +89,8 @@ def bending_deck(
 
     inflated : (nodes, 3) mm of displacement. InputError: as `inflation_deck`; a whole cylinder.
     """
-    gas = model.gas
-    cavity = {
-        "pressure": gas.ambient,
-        "temperature": gas.temperature,
-        "density": TONNES * gas.density,
-    }
+    gas, density = model.gas, TONNES * model.gas.density
+    cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
     return _deck(model, law, settings, {"gas": cavity, "bodies": contact_bodies(model, inflated)})
 
 
@@ -127,10 +116,8 @@ def _deck(
         ]
         load += [model.pressure] * (APPROACH + steps)
         support, collar = paths(filling, model.increments)
-        tables = [
-            time_table(SUPPORT_PATH, "support_path", support),
-            time_table(COLLAR_PATH, "collar_path", collar),
-        ]
+        tables.append(time_table(SUPPORT_PATH, "support_path", support))
+        tables.append(time_table(COLLAR_PATH, "collar_path", collar))
     tables.insert(0, time_table(1, "load", load))
     sets = node_sets(mesh, [*model.guides, HELD])
     deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held

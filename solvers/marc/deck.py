@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...files import __version__
 from ...materials.exports.marc import STATE_VARIABLES
 from ...materials.law import HypoelasticLaw
-from ...materials.tables import ModulusTable, modulus_tables
+from ...materials.tables import modulus_tables
 from ...meshes.mesh import Mesh
 from ..decks import render
 from .settings import MarcSettings
@@ -37,25 +37,17 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
         kind = "thick shell" if settings.element == THICK else "membrane"
         return {"law": "hypoelastic", "state_variables": STATE_VARIABLES[kind]}
     if law.thickness_change != "constant":
-        problem = (
-            "'incompressible' is nothing that NLELAST knows; use 'constant', or [solver.marc] "
-            "law = 'hypela2'"
-        )
+        problem = "'incompressible' is nothing that NLELAST knows; use 'constant', or "
+        problem += "[solver.marc] law = 'hypela2'"
         raise InputError(None, "material.thickness_change", problem)
-    tables = modulus_tables(law)
-    moduli = [
-        {"name": name, "number": number, "points": _held(tables[modulus])}
-        for modulus, name, number in TABLES
-    ]
+    tables, moduli = modulus_tables(law), []
+    for modulus, name, number in TABLES:
+        # One point more beyond each end: held whether or not Marc extrapolates.
+        columns = np.column_stack([tables[modulus].strain, tables[modulus].modulus])
+        points = np.pad(columns, ((1, 1), (0, 0)), "edge")
+        points[[0, -1], 0] += [-GUARD, GUARD]
+        moduli.append({"name": name, "number": number, "points": points.tolist()})
     return {"law": "nlelast", "state_variables": 0, "moduli": moduli, "nu12": law.nu12}
-
-
-def _held(table: ModulusTable) -> list[list[float]]:
-    """Return its points, and one more beyond each end: held whether or not Marc extrapolates."""
-    strain, modulus = (np.pad(values, 1, mode="edge") for values in (table.strain, table.modulus))
-    strain[[0, -1]] += [-GUARD, GUARD]
-    found: list[list[float]] = np.column_stack([strain, modulus]).tolist()
-    return found
 
 
 def schedule(
@@ -72,12 +64,12 @@ def schedule(
         "tolerance": TOLERANCE,
         "cases": [
             {
-                "name": name,
+                "name": n,
                 "increments": cuts * count,
                 "step": 1 / cuts,
                 "conditions": list(conditions),
             }
-            for name, count, conditions in cases
+            for n, count, conditions in cases
         ],
     }
 
@@ -234,10 +226,8 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         return found
 
     layer = np.broadcast_to(np.asarray(thickness, float), len(quads))
-    layers = [
-        {"set": name, "thickness": float(layer[one])}
-        for name, one in groups(layer[:, None], "layer")
-    ]
+    thick = groups(layer[:, None], "layer")
+    layers = [{"set": name, "thickness": float(layer[one])} for name, one in thick]
     along, across = fabric_frames(mesh, warp)
     # Adding zero turns -0 into 0.
     rows = np.asarray(np.round(np.hstack([along, across]), SAME) + 0.0, float)
@@ -245,13 +235,9 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         {"set": name, "warp": rows[one, :3].tolist(), "fill": rows[one, 3:].tolist()}
         for name, one in groups(rows, "frame")
     ]
-    return {
-        "points": np.asarray(mesh.points, float).tolist(),
-        "elements": (quads + 1).tolist(),
-        "sets": sets,
-        "layers": layers,
-        "frames": frames,
-    }
+    points, elements = np.asarray(mesh.points, float).tolist(), (quads + 1).tolist()
+    return {"points": points, "elements": elements, "sets": sets, "layers": layers,
+            "frames": frames}  # fmt: skip
 
 
 def node_sets(mesh: Mesh, names: Mapping[str, Any] | list[str]) -> list[dict[str, Any]]:

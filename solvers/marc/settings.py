@@ -17,19 +17,9 @@ from ..settings import ExternalSettings, Offer, Override
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
 BLOCKS = (
-    "cavity",
-    "cavity_parameter",
-    "contact",
-    "control",
-    "fixed_disp",
-    "geometry",
-    "hypoelastic",
-    "nlelast",
-    "orientation",
-    "post",
-    "pressure",
-    "stepping",
-)
+    "cavity", "cavity_parameter", "contact", "control", "fixed_disp", "geometry", "hypoelastic",
+    "nlelast", "orientation", "post", "pressure", "stepping",
+)  # fmt: skip
 
 Seconds = Annotated[float, Field(gt=0, le=1e9)]
 Count = Annotated[int, Field(ge=1, le=1024)]
@@ -121,11 +111,8 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
     elif site:
         values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
     # The command line gives paths as such.
-    mine: dict[str, Any] = {
-        name: str(value) if isinstance(value, Path) else value
-        for name, value in given.items()
-        if value is not None
-    }
+    mine: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    mine |= {name: str(value) for name, value in mine.items() if isinstance(value, Path)}
     if named is not None:
         mine.pop("executable", None)
     both = {**values, **mine}

@@ -3,8 +3,6 @@
 A run of Marc goes wrong in many ways at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

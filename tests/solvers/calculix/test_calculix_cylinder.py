@@ -1,7 +1,5 @@
 """The inflated cylinder on CalculiX: solids, deck, and the tube's middle against closed forms."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from dataclasses import replace

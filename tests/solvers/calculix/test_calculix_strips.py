@@ -1,7 +1,5 @@
 """The three strips on CalculiX: agreement with the membrane and closed forms, the gauge, faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The Marc deck: columns, counts, names; blocks that a site replaces."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Our decks and post files by a reader that is not ours: meshioplusplus."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw

@@ -1,7 +1,5 @@
 """Runs of Marc, each with a small program in its place: what ends well, and all that does not."""
 
-from __future__ import annotations
-
 import pickle
 import re
 import time

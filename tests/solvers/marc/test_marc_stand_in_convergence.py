@@ -1,7 +1,5 @@
 """The stand-in converges as far as the deck's control block says, and no further."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

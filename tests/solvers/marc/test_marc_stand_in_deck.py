@@ -1,7 +1,5 @@
 """The stand-in for Marc refuses decks that Marc would refuse, and takes every deck of ours."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
