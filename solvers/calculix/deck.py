@@ -1,4 +1,4 @@
-"""What the decks of all models share: shells, material, control of Newton's method.
+"""Write what the decks of all models share: shells, material, control of Newton's method.
 
 CalculiX counts displacements from the nodes of the deck, which are where the sheet is without
 stress; the model counts them from its reference surface. The two differ by the sheet's slack.
@@ -155,7 +155,7 @@ class Run(Protocol):
 
 @dataclass(frozen=True)
 class Setup:
-    """How decks are written: element "S8R" or "S4", the user's templates, shells of a mesh of
+    """The settings of decks: element "S8R" or "S4", the user's templates, shells of a mesh of
     quads."""
 
     element: str
