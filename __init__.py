@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 # meshio.read("job.frd") and "job.t19" work in whoever imports us. By full names: pytest imports
 # this file a second time, as a module without a package.
-import bubblefit.solvers.calculix.frd_format
-import bubblefit.solvers.marc.t19_format  # noqa: F401
+import bubblefit.solvers.calculix.frd
+import bubblefit.solvers.marc.t19  # noqa: F401
 
 from .files import __version__ as __version__
 

@@ -14,12 +14,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
 from bubblefit.runs.refinement import refine
 from bubblefit.solvers.base import History
-from bubblefit.solvers.calculix import (
-    cylinder as cylinder_bending,
-)
-from bubblefit.solvers.calculix import (
-    cylinder_results as cylinder_analysis,
-)
+from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -35,7 +30,7 @@ NAME, SIZE, DEFLECTION, FRAMES = "150 mm, 140 kPa", 46.8, 120.0, 30
 
 def calculix(
     size: float = 30.0, *cases: str, to: float = 240.0, increment: float = 4.0,
-    contact: float = cylinder_bending.STIFFNESS, constant_pressure: bool = False,
+    contact: float = cylinder.STIFFNESS, constant_pressure: bool = False,
 ) -> None:  # fmt: skip
     """Compare both solvers; SIZE: mm of an element, CASE: DIAMETER/KPA, contact in MPa/mm.
 
@@ -43,9 +38,9 @@ def calculix(
     its band. Cost is CPU time on one core. With elements of 25 mm some ten minutes to 240 mm.
     `--constant-pressure`: CalculiX runs once, the membrane has gas.
     """
-    cylinder_bending.STIFFNESS = contact
+    cylinder.STIFFNESS = contact
     if constant_pressure:
-        cylinder_analysis.PASSES = 1
+        cylinder.PASSES = 1
     # Compiled before the clock runs.
     MembraneSolver().run(inflated_cylinder(150, 0.14, THICKNESS, 60.0, deflections=[2.0]), LAW_4_2)
     for case in cases or ("150/140", "200/100", "250/85"):

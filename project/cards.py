@@ -1,11 +1,11 @@
-"""Cards that predictions run with: [[card]] of a project, files, or the one just fitted."""
+"""Read the cards that predictions run with: [[card]] of a project, files, or the last fit's."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -16,9 +16,6 @@ from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import Name, Number, Positive, Section, StrainTriple
-
-if TYPE_CHECKING:
-    pass
 
 #: Keys that a card's own file says.
 OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_range")
@@ -47,7 +44,7 @@ class CardSection(Section):
 
 
 def usual_folder(project: Path) -> Path:
-    """out/NAME below the current folder, after the project's folder and file."""
+    """Return out/NAME below the current folder, after the project's folder and file."""
     name = project.resolve().parent.name
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
 
@@ -61,12 +58,10 @@ class NamedCard:
 
 
 def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:
-    """The cards by name, in the order of the file.
+    """Return the cards by name, in the order of the file.
 
-    Raises
-    ------
-    InputError : naming the project and the key, or the card's file: a card with file and
-        coefficients or neither, no name, the same name twice, what is no law.
+    InputError: a card with file and coefficients or neither, no name, the same name twice, what is
+    no law; naming the project and the key, or the card's file.
     """
     cards: dict[str, NamedCard] = {}
     for i, section in enumerate(sections):

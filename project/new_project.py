@@ -1,4 +1,4 @@
-"""A commented project file for tests of one's own."""
+"""Write a commented project file for tests of one's own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ USUAL: Mapping[str, Any] = {
 
 
 def writable_kinds() -> list[str]:
-    """Kinds of test that a project file can be written for: those with a template."""
+    """Return the kinds of test that a project file can be written for: those with a template."""
     folder = TEMPLATES / "project"
     return [name for name in kinds() if (folder / f"{name}.toml.j2").is_file()]
 
@@ -38,15 +38,9 @@ def write_project(
 ) -> None:
     """Write a project file and see that it can be read.
 
-    Parameters
-    ----------
     tests : how many there are of each kind. name, thickness : of the fabric, mm. form : of the
-        moduli. said : `USUAL` things that are otherwise: `radius` and `pressures` of bubbles,
-        `diameter` and `pressure` of cylinders; mm and kPa.
-
-    Raises
-    ------
-    InputError : what is said makes no project. OutputError : the file cannot be written.
+    moduli. said : `USUAL` values that are otherwise; mm and kPa. InputError: what is said makes no
+    project. OutputError: the file cannot be written.
     """
     write_text(path, project_text(tests, name, thickness, form, **said))
     try:
@@ -59,8 +53,9 @@ def write_project(
 def project_text(
     tests: Mapping[str, int], name: str, thickness: float, form: str, **said: Any
 ) -> str:
-    """The text of a project file, see `write_project`."""
+    """Return the text of a project file, see `write_project`."""
     values = {**USUAL, **{key: value for key, value in said.items() if value is not None}}
+    values["deflection"] = 1.6 * values["diameter"]
     asked = [kind for kind, count in tests.items() if count]
     if not asked:
         known = ", ".join(f"--{kind}" for kind in writable_kinds())
@@ -68,8 +63,8 @@ def project_text(
     if form not in form_names():
         raise InputError(None, "--form", f"{form!r} is not one of: {', '.join(form_names())}")
     fitted = [kind for kind in asked if kind_named(kind).fitted]
-    return _render(
-        "project",
+    return render(
+        "project/project.toml.j2",
         name=_quoted(name),
         version=__version__,
         thickness=thickness,
@@ -80,22 +75,16 @@ def project_text(
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,
         tests=[
-            _render(kind, number=n, count=tests[kind], name=f"{kind}{n}", **_of(values))
+            render(
+                f"project/{kind}.toml.j2", number=n, count=tests[kind], name=f"{kind}{n}", **values
+            )
             for kind in asked
             for n in range(1, tests[kind] + 1)
         ],
     )
 
 
-def _of(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {**values, "deflection": 1.6 * values["diameter"]}
-
-
 def _quoted(text: str) -> str:
-    """Text as it may stand between TOML's quotation marks."""
+    """Return text as it may stand between TOML's quotation marks."""
     plain = "".join(c for c in text if c.isprintable())
     return plain.replace("\\", "\\\\").replace('"', '\\"')
-
-
-def _render(template: str, /, **context: Any) -> str:
-    return render(f"project/{template}.toml.j2", **context)

@@ -1,4 +1,4 @@
-"""A project: one fabric, its tests, its law, and how it is fitted; read from a TOML file."""
+"""Read a project: one fabric, its tests, its law, and how it is fitted, from a TOML file."""
 
 from __future__ import annotations
 
@@ -30,12 +30,15 @@ from .cards import FITTED, Cards, NamedCard, read_cards, usual_folder
 from .schema import FitSection, LawSection, ProjectFile, parse
 
 Settings = dict[str, Any]
+#: Data folders: of all tests, or by the name of a test.
+Folders = Path | Mapping[str, Path]
+NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
 HEAD = "# As it was run: what the project says, with the options of the command.\n"
 
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a project file says, in its own units.
+    """The words of a project file, in its own units.
 
     text : the file's own. common : [fabric] and [units]. tests : the section of each test by its
     name, with the folder that its data were taken from; without what it leaves to defaults, which
@@ -54,12 +57,10 @@ class Written:
 def section_as_run(
     said: Mapping[str, Any], name: str, folder_key: str | None, base: Path, folder: Path | None
 ) -> Settings:
-    """A test's section with its name, and with the folder of its files in full.
+    """Return a test's section with its name, and with the folder of its files in full.
 
-    Parameters
-    ----------
     folder_key : dotted key of the folder; None where the kind has none. base : the project's
-        folder. folder : what the command says instead of the section.
+    folder. folder : what the command says instead of the section.
     """
     whole = {**plain(said), "name": name}
     if folder_key is None:
@@ -71,30 +72,28 @@ def section_as_run(
         if not isinstance(table, dict):
             return whole  # its data are of another sort
     given = base / os.path.expanduser(table.get(key, "")) if folder is None else folder
-    table[key] = os.path.abspath(given)
-    beside: Settings = _beside_project(whole, base, Path(table[key]))
-    return beside
+    data = table[key] = os.path.abspath(given)
 
+    def beside_project(value: Any) -> Any:
+        """Return full paths of files that are not in the data's folder, but beside the project."""
+        if isinstance(value, dict):
+            return {key: beside_project(own) for key, own in value.items()}
+        if isinstance(value, list):
+            return [beside_project(own) for own in value]
+        if isinstance(value, str) and Path(value).suffix and not os.path.exists(Path(data, value)):
+            return os.path.abspath(base / value) if is_file(base / value) else value
+        return value
 
-def _beside_project(value: Any, base: Path, folder: Path) -> Any:
-    """With the full path of files that are not in the data's folder and lie beside the project."""
-    if isinstance(value, dict):
-        return {key: _beside_project(own, base, folder) for key, own in value.items()}
-    if isinstance(value, list):
-        return [_beside_project(own, base, folder) for own in value]
-    if isinstance(value, str) and Path(value).suffix and not os.path.exists(folder / value):
-        return os.path.abspath(base / value) if is_file(base / value) else value
-    return value
+    return {key: beside_project(own) for key, own in whole.items()}
 
 
 def settings_of(project: Project, tests: Sequence[str]) -> Settings:
-    """What a run of these tests is told, as a project file would say it: without cards.
+    """Return what a run of these tests is given, as a project file would say it, without cards.
 
     Options of the command that change the project are in it; the tests are in the project's order.
     """
     written = project.written
     assert written is not None
-    solver = project.fit.solver
     settings: Settings = {
         **written.common,
         "law": plain(project.law.model_dump()),
@@ -102,20 +101,18 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     }
     if isinstance(folder := settings["fit"].get("cache"), str):
         settings["fit"]["cache"] = os.path.abspath(beside(project.path.parent, folder))
-    options = _solver_options(project)
-    if options:
-        settings["solver"] = {solver: options}
+    if options := _solver_options(project):
+        settings["solver"] = {project.fit.solver: options}
     for name in tests:
-        if name not in written.tests:  # made from Python, beside the file
-            continue
-        settings.setdefault(written.kinds[name], []).append(written.tests[name])
+        if name in written.tests:  # the others were made from Python, beside the file
+            settings.setdefault(written.kinds[name], []).append(written.tests[name])
     return settings
 
 
 def settings_of_predictions(
     project: Project, tests: Sequence[str], cards: Sequence[str | Path]
 ) -> Settings:
-    """What a run of predictions is told, as a project file would say it, cards by their files.
+    """Return what a run of predictions is given, as a project file would say it.
 
     cards : names of the project's cards, and files.
     """
@@ -134,12 +131,12 @@ def settings_of_predictions(
 
 
 def project_text(settings: Mapping[str, Any]) -> str:
-    """Settings as a project file (TOML)."""
+    """Return settings as a project file (TOML)."""
     return HEAD + "\n" + tomli_w.dumps(settings)
 
 
 def _solver_options(project: Project) -> Settings:
-    """Of the solver that runs, those that its table may hold; what is there with its full path."""
+    """Return the options that the table of the solver that runs may hold, paths in full."""
     name = project.fit.solver
     section = solver_sections().get(name)
     return {
@@ -158,7 +155,7 @@ def _in_full(value: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """What TOML and JSON can say: without what is not said, tuples as lists, paths as text."""
+    """Return what TOML and JSON can say: without None, tuples as lists, paths as text."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple)):
@@ -166,27 +163,15 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-#: Data folders: of all tests, or by the name of a test.
-Folders = Path | Mapping[str, Path]
-
-
-NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Project:
-    """Everything that a project file says, in mm, N and MPa where it is not a section.
+    """A whole project file, in mm, N and MPa where it is not a section.
 
-    Parameters
-    ----------
     path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
     law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
-        of a solver, what it is made with. written : what the file says; None without one.
+    of a solver, what it is made with. written : what the file says; None without one.
     scheduler : address of the Dask scheduler whose workers do the runs; None: this machine does.
-
-    Raises
-    ------
-    InputError : settings that contradict each other (also after `with_fit`).
+    InputError: settings that contradict each other (also after `with_fit`).
     """
 
     path: Path
@@ -211,12 +196,12 @@ class Project:
 
     @property
     def title(self) -> str:
-        """The fabric's name, else that of the folder."""
+        """Return the fabric's name, else that of the folder."""
         return self.fabric.name or self.path.parent.resolve().name
 
     @property
     def run_cache(self) -> RunCache | None:
-        """Where runs of another program are kept, for this project and all others; None: nowhere.
+        """Return where runs of another program are kept, for all projects; None: nowhere.
 
         A folder that the project names is beside its file.
         """
@@ -224,27 +209,24 @@ class Project:
         return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
 
     def options_of(self, solver: str) -> dict[str, Any]:
-        """What a solver is made with; a cluster counts its licences."""
+        """Return what a solver is made with; a cluster counts its licences."""
         counted = {} if self.scheduler is None else {SCHEDULER: self.scheduler}
         return {**self.solver_options.get(solver, {}), **counted}
 
     def with_scheduler(self, address: str | None) -> Project:
-        """The project, run by the workers of a Dask scheduler; as it is without an address."""
+        """Return the project, run by the workers of a Dask scheduler if there is an address."""
         return self if address is None else replace(self, scheduler=address)
 
     def with_fit(self, **changes: Any) -> Project:
-        """The project with other settings of its fit; None leaves a setting as it is."""
+        """Return the project with other settings of its fit; None leaves a setting as it is."""
         given = {key: value for key, value in changes.items() if value is not None}
         return replace(self, fit=self.fit.model_copy(update=given))
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
-        """The project with another form of the moduli.
+        """Return the project with another form of the moduli.
 
         settings : of the form; those that the project has for it stay unless they are given.
-
-        Raises
-        ------
-        InputError : no such form, or a setting that it does not know.
+        InputError: no such form, or a setting that it does not know.
         """
         known, own = form_settings(form), self.law.model_extra or {}
         said = self.law.model_dump(exclude=set(own), exclude_unset=True)
@@ -255,16 +237,10 @@ class Project:
     def with_solver(
         self, name: str | None, options: Mapping[str, Any], settings: Sequence[str] = ()
     ) -> Project:
-        """The project with another solver, or with more options for the one that it has.
+        """Return the project with another solver, or with more options for the one that it has.
 
-        Parameters
-        ----------
         options : by name; None leaves an option as it is. settings : each "KEY=VALUE", as in
-            [solver.NAME].
-
-        Raises
-        ------
-        InputError : an option that means nothing to the solver that runs.
+        [solver.NAME]. InputError: an option that means nothing to the solver that runs.
         """
         solver = name or self.fit.solver
         changed = overridden(solver, self.solver_options.get(solver, {}), options, settings)
@@ -274,13 +250,10 @@ class Project:
     def chosen(
         self, which: str | Sequence[str] | None, fitted: bool | None = None
     ) -> tuple[Test, ...]:
-        """Tests by name or by kind, in the project's order; all of them where none is named.
+        """Return tests by name or by kind, in the project's order; all of them where none is named.
 
-        fitted : only those that a fit can match, or only those that are predicted.
-
-        Raises
-        ------
-        InputError : a name that is none, or nothing to choose from.
+        fitted : only those that a fit can match, or only those that are predicted. InputError: a
+        name that is none, or nothing to choose from.
         """
         known = kinds()
         names = None if which is None else [which] if isinstance(which, str) else list(which)
@@ -293,10 +266,8 @@ class Project:
         if not tests:
             kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
             of = "" if names is None else f" among {', '.join(names)}"
-            what = " or ".join(
-                f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)
-            )
-            problem = f"the project has no test{kind}{of}; add {what}"
+            able_kinds = [f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)]
+            problem = f"the project has no test{kind}{of}; add {' or '.join(able_kinds)}"
             raise InputError(self.path, "", problem)
         return tests
 
@@ -304,34 +275,17 @@ class Project:
 def read_project(path: Path | str, data: Folders | None = None, need_data: bool = True) -> Project:
     """Read a project file (TOML).
 
-    Parameters
-    ----------
-    path : the file.
     data : where measured files lie, instead of what the sections say: one folder for all tests, or
-        one by the name of a test.
-    need_data : whether measured files must be there (a forward analysis does without).
-
-    Raises
-    ------
-    InputError : one line naming the file and the dotted key: TOML syntax, missing or unknown
-        keys, wrong units, values out of order, missing data.
+    one by the name of a test. need_data : whether measured files must be there (a forward analysis
+    does without). InputError: TOML syntax, missing or unknown keys, wrong units, values out of
+    order, missing data; one line naming the file and the dotted key.
     """
     path = Path(path)
     file = parse(path)
-    units = file.units
-    fabric = Fabric(
-        file.fabric.name,
-        file.fabric.thickness * LENGTH_UNITS[units.length],
-        file.fabric.thickness_change,
-    )
-    scales = Scales(
-        MODULUS_UNITS[units.modulus],
-        PRESSURE_UNITS[units.pressure],
-        LENGTH_UNITS[units.length],
-        units.modulus,
-        units.pressure,
-        units.length,
-    )
+    said, units = file.fabric, file.units
+    length, names = LENGTH_UNITS[units.length], (units.modulus, units.pressure, units.length)
+    fabric = Fabric(said.name, said.thickness * length, said.thickness_change)
+    scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
     tests = _tests(file, place, data)
     return Project(
@@ -395,17 +349,15 @@ def _reads(test: Test) -> bool:
 
 
 def _names(kind: str, sections: Sequence[Any]) -> list[str]:
-    """A test without a name is called by its kind, with a number where there are several."""
+    """Return the names of tests: else their kind, with a number where there are several."""
     alone = len(sections) == 1
     return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
 
 
 def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Cards by name: those given, else the project's, else the one that its fit left.
+    """Return cards by name: those given, else the project's, else the one that its fit left.
 
-    Raises
-    ------
-    InputError : a name that the project does not have, a file that is no card; none at all.
+    InputError: a name that the project does not have, a file that is no card; none at all.
     """
     if isinstance(cards, Mapping):
         return dict(cards)
@@ -436,7 +388,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
-    """The project's names, and the files, of the cards that `chosen_cards` gives.
+    """Return the project's names, and the files, of the cards that `chosen_cards` gives.
 
     None where they were handed over as they are, by Python: they have neither.
     """

@@ -1,4 +1,4 @@
-"""The project file as it is written: what all tests share, in the file's own units."""
+"""Describe the project file as it is written: what all tests share, in the file's own units."""
 
 from __future__ import annotations
 
@@ -139,13 +139,13 @@ class ProjectFile(CommonSections):
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 
     def tests(self, kind: str) -> Sequence[Any]:
-        """The sections of a kind, in the file's order."""
+        """Return the sections of a kind, in the file's order."""
         return cast(Sequence[Any], getattr(self, kind))
 
 
 @functools.cache
 def project_file() -> type[ProjectFile]:
-    """The model with the sections of all kinds that are there."""
+    """Return the model with the sections of all kinds that are there."""
     tests: dict[str, Any] = {
         name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
         for name, kind in kinds().items()
@@ -162,11 +162,9 @@ def _list_of(section: type[BaseModel]) -> Any:
 def parse(path: Path) -> ProjectFile:
     """Parse a project file; tests have the keys of [defaults.KIND] that they do not say.
 
-    Raises
-    ------
-    InputError : one line naming the file and the dotted key: TOML syntax, a file of version 0.1,
-        missing or unknown keys, values that cannot be meant. PlugInFailure : a kind of test that
-        a plug-in offers, and that does not work.
+    InputError: TOML syntax, a file of version 0.1, missing or unknown keys, values that cannot be
+    meant; one line naming the file and the dotted key. PlugInFailure: a kind of test that a plug-in
+    offers, and that does not work.
     """
     content = _content(path)
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
@@ -197,9 +195,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
     whole, defaults = dict(content), content.get("defaults")
-    if not isinstance(defaults, dict):
-        return whole
-    for kind, common in defaults.items():
+    for kind, common in defaults.items() if isinstance(defaults, dict) else ():
         tests = whole.get(kind)
         if isinstance(common, dict) and isinstance(tests, list):
             whole[kind] = [_merged(common, t) if isinstance(t, dict) else t for t in tests]
@@ -207,7 +203,7 @@ def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said in `own`, and in `common` where it is not; tables key by key."""
+    """Return what is said in `own`, and in `common` where it is not; tables key by key."""
     merged = {**common, **own}
     for key in common.keys() & own.keys():
         if isinstance(common[key], dict) and isinstance(own[key], dict):
@@ -215,31 +211,23 @@ def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]
     return merged
 
 
-#: As it is shipped: of the kinds of test and solvers that come with bubblefit.
+#: The one that is shipped: of the kinds of test and solvers that come with bubblefit.
 SHIPPED = Path(__file__).resolve().parent.parent / "templates" / "project" / "project.schema.json"
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
-#: Where a table of one solver's settings is listed by its name.
-SOLVER = "Settings of solvers, by name: [solver.membrane] and so on."
-REFERENCE = "#/$defs/"
+DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
-    """The schema of a whole file, as plain data.
+    """Return the schema of a whole file, as plain data, kinds of plug-ins included or not.
 
     A test may have its keys from [defaults.KIND], so that none is required here; bubblefit itself
     says which are missing.
-
-    Parameters
-    ----------
-    with_plug_ins : whether kinds of test that other distributions add are in it.
     """
     schema = project_file().model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
-    theirs = {plug_in.name for plug_in in plug_ins("bubblefit.tests")}
-    own = [name for name in kinds() if with_plug_ins or name not in theirs]
-    for name in kinds():
-        if name not in own:
-            del properties[name]
+    theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}
+    own = [name for name in kinds() if name not in theirs]
+    for name in kinds().keys() & theirs:
+        del properties[name]
     for name in own:
         for used in _used(properties[name], definitions):
             definitions[used].pop("required", None)
@@ -253,7 +241,7 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     for section in sections.values():
         definitions.update(section.pop("$defs", {}))
     properties["solver"] = {
-        "description": SOLVER,
+        "description": "Settings of solvers, by name: [solver.membrane] and so on.",
         "type": "object",
         "properties": sections,
         # Those of plug-ins check their own settings.
@@ -261,17 +249,16 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     }
     needed = _used(properties, definitions)
     schema["$defs"] = {name: definitions[name] for name in sorted(needed)}
-    plain: dict[str, Any] = _plain(schema)
-    return plain | {"$schema": DRAFT, "title": "bubblefit project"}
+    return {**_plain(schema), "$schema": DRAFT, "title": "bubblefit project"}
 
 
 def schema_text(with_plug_ins: bool = True) -> str:
-    """The schema as a file."""
+    """Return the schema as a file."""
     return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
 
 
 def _plain(part: Any) -> Any:
-    """Without null, which TOML does not have, and without the titles that only repeat the keys."""
+    """Return it without null, which TOML does not have, and without titles that repeat the keys."""
     if isinstance(part, list):
         return [_plain(one) for one in part]
     if not isinstance(part, dict):
@@ -290,7 +277,7 @@ def _plain(part: Any) -> Any:
 
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
-    """Names of the definitions that a part of the schema leads to."""
+    """Return the names of the definitions that a part of the schema leads to."""
     used: set[str] = set()
     waiting = [part]
     while waiting:

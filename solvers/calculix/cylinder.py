@@ -1,34 +1,74 @@
-"""The inflated cylinder as a CalculiX deck: what its templates are given."""
+"""The inflated and bent cylinder in CalculiX: solids, decks, gas, results.
+
+Mesh: one layer of solids, and on the seam another, twice as thick, outside. The seam's layers all
+lie outside because the gas must meet a surface without steps: on the faces of a step inside,
+unloaded, the pressure would be out of balance by enough to bend the cylinder. Shells will not do:
+where they meet at an angle, at the edge of a cap, CalculiX ties rotations together, and Newton's
+method stalls as soon as contact comes in.
+
+Bending: total time of the step is the collar's way in mm (`REST` later), in increments as contact
+allows. CalculiX knows no gas: `analyse` runs the deck again with better pressures over the way.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import logging
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
-from ...errors import InputError
+from ...errors import InputError, SolverFailure
 from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
+from ...meshes.mesh import enclosed_volume
+from ...notes import Note, NoteKind
 from .. import rigid
+from ..base import History, extremes, log_strain
 from ..decks import render
-from .deck import MESH_FILE
+from .deck import MESH_FILE, Converged, Run, Setup, mesh_text
+from .frd import FrdFile
 from .library import MATERIAL, STATE_VARIABLES, constants
-
-# The cylinder as one layer of solids, and on the seam another, twice as thick, outside.
-#
-# The seam's layers all lie outside because the gas must meet a surface without steps: on the faces
-# of a step inside, unloaded, the pressure would be out of balance by enough to bend the cylinder.
-#
-# Shells will not do: where they meet at an angle, at the edge of a cap, CalculiX ties rotations
-# together, and Newton's method stalls as soon as contact comes in.
+from .sheets import NEAR, whole_times
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+log = logging.getLogger(__name__)
+
+DECK, MESH = "cylinder.inp.j2", "solids.inp.j2"
+#: Incompatible modes: flat solids lock without.
+ELEMENT = "C3D8I"
+#: Largest residual force and correction, of inflation and of bending: CalculiX' own, and more than
+#: enough, since the load is a sum over many nodes.
+TOLERANCES, TOLERANCES_BENDING = (1e-4, 1e-3), (5e-3, 1e-2)
+#: Newton's method gets more iterations than CalculiX gives it by default: contact needs them.
+TIME_INCREMENTATION = "6, 10, 9, 30, 14, 6, , 8"
+#: First and least increment of inflation as parts of one of the law: at first the flat caps have
+#: no stiffness but bending.
+FIRST, LEAST = 0.1, 1e-5
+MOST_INCREMENTS = 1000
+#: Contact, MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md, *Contact*.
+STIFFNESS = 5.0
+#: mm that the support begins inside the cylinder, so that it touches, and that the collar begins
+#: above the inflated cylinder, so that it does not.
+INTO, ABOVE = 0.02, 0.5
+#: Quads that may touch: mm to either side of a support and beyond the collar's edge, and how low
+#: or high they lie, in radii.
+BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
+#: Time that the collar stands still, and of the first increment, which must end before it moves.
+REST, FIRST_BENDING = 1.5, 1.0
+#: mm of the collar's way: longest increment (its effect: docs/how-to/calculix.md), and the one
+#: at which contact is given up.
+LONGEST, LEAST_BENDING = 5.0, 1e-4
+#: Most passes at the pressures that the last one's volumes give, and what may be left between the
+#: gas and the deck, over absolute pressure: p V is constant to that.
+PASSES, SETTLED = 4, 3e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,16 +90,14 @@ class SolidMesh:
     node_sets: Mapping[str, Numbers]
 
     def middle(self, values: Array) -> Array:
-        """Values (..., nodes of the surface mesh, k) on the middle surface from nodal ones."""
+        """Return nodal values on the middle surface, (..., nodes of the surface mesh, k)."""
         return np.asarray(0.5 * (values[..., self.inner, :] + values[..., self.outer, :]))
 
 
 def solid_mesh(model: CylinderModel) -> SolidMesh:
-    """Solids on both sides of the model's middle surface.
+    """Return the solids on both sides of the model's middle surface.
 
-    Raises
-    ------
-    InputError : the rest is not of one thickness, or the seam not three times as thick.
+    InputError: the rest is not of one thickness, or the seam not three times as thick.
     """
     mesh = model.mesh
     count, quads = len(mesh.points), np.asarray(mesh.quads)
@@ -85,12 +123,8 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
     elements = np.concatenate([base, upon])
     outside = numbers.copy()
     outside[seam] = len(quads) + np.arange(len(seam))
-    sets = {
-        "tube": np.setdiff1d(np.arange(len(elements)), caps),
-        "caps": caps,
-        "inside": numbers,
-        "outside": outside,
-    }
+    tube = np.setdiff1d(np.arange(len(elements)), caps)
+    sets = {"tube": tube, "caps": caps, "inside": numbers, "outside": outside}
     through = np.stack([inner, outer, last])
     node_sets = {
         name: np.unique(through[:, nodes][through[:, nodes] >= 0])
@@ -100,7 +134,7 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
 
 
 def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
-    """(n, 3) from the middle to the outside: unit normals; at the ends the sum of both."""
+    """Return unit normals (n, 3) from the middle to the outside; at the ends the sum of both."""
     tube = np.unique(np.delete(quads, caps, axis=0))
     cap = np.unique(quads[caps])
     outward = np.zeros_like(points, dtype=float)
@@ -110,18 +144,6 @@ def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
     return outward
 
 
-DECK, MESH = "cylinder.inp.j2", "solids.inp.j2"
-#: Incompatible modes: flat solids lock without.
-ELEMENT = "C3D8I"
-TOLERANCES = (1e-4, 1e-3)
-#: Newton's method gets more iterations than CalculiX gives it by default: contact needs them.
-TIME_INCREMENTATION = "6, 10, 9, 30, 14, 6, , 8"
-#: First and least increment of CalculiX as parts of one of the law: at first the flat caps have
-#: no stiffness but bending. Bending has its own.
-FIRST, LEAST = 0.1, 1e-5
-MOST_INCREMENTS = 1000
-
-
 def cylinder_decks(
     model: CylinderModel,
     law: HypoelasticLaw,
@@ -129,16 +151,9 @@ def cylinder_decks(
     bending: Mapping[str, Any] | None = None,
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Text of each input file by name.
+    """Return the text of each input file by name; InputError: a template that cannot be used.
 
-    Parameters
-    ----------
-    bending : what `bending_context` makes; inflation alone unless given.
-    folder : the user's templates.
-
-    Raises
-    ------
-    InputError : a template that cannot be used.
+    bending : of `bending_context`; inflation alone unless given. folder : the user's templates.
     """
     mesh: dict[str, Any] = {
         "element": ELEMENT,
@@ -151,6 +166,8 @@ def cylinder_decks(
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
     angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
     until = len(model.inflation)
+    tube = constants(law, normal_axis=1, whole_until=until)
+    caps = constants(law, angle=angle, whole_until=until)
     context: dict[str, Any] = {
         "version": __version__,
         "title": f"Cylinder, {len(solids.elements)} solids {ELEMENT}",
@@ -160,16 +177,8 @@ def cylinder_decks(
         "state_variables": STATE_VARIABLES,
         "element": ELEMENT,
         "sections": [
-            {
-                "set": "TUBE",
-                "constants": constants(law, normal_axis=1, whole_until=until),
-                "around": True,
-            },
-            {
-                "set": "CAPS",
-                "constants": constants(law, angle=angle, whole_until=until),
-                "around": False,
-            },
+            {"set": "TUBE", "constants": tube, "around": True},
+            {"set": "CAPS", "constants": caps, "around": False},
         ],
         "supports": [
             {"set": name.upper(), "dof": direction + 1}
@@ -185,10 +194,9 @@ def cylinder_decks(
         "correction_tolerance": TOLERANCES[1],
         "time_incrementation": TIME_INCREMENTATION,
     }
-    ours = folder if folder is not None and (folder / MESH).is_file() else None
     return {
         "job.inp": render("calculix", DECK, context, folder),
-        MESH_FILE: render("calculix", MESH, mesh, ours),
+        MESH_FILE: mesh_text(MESH, mesh, folder),
     }
 
 
@@ -204,23 +212,23 @@ class GasCurve:
     pressure: Array
 
     def at(self, deflection: Array) -> Array:
-        """Gauge pressure in MPa at deflections in mm."""
+        """Return the gauge pressure in MPa at deflections in mm."""
         return np.interp(deflection, self.deflection, self.pressure)
 
 
 def compliance(pressures: Array, volumes: Array) -> float:
-    """dV/dp (mm^3/MPa) at the end of inflation, from (n,) MPa and mm^3; n > 1."""
+    """Return dV/dp (mm^3/MPa) at the end of inflation, from (n,) MPa and mm^3; n > 1."""
     order: Literal[1, 2] = 2 if len(volumes) > 2 else 1
     return float(np.gradient(volumes, pressures, edge_order=order)[-1])
 
 
 def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
-    """Gauge pressure (n,) MPa of the gas in volumes (n,) mm^3."""
+    """Return the gauge pressure (n,) MPa of the gas in volumes (n,) mm^3."""
     return np.array([gas.pressure(float(v)) for v in volumes])
 
 
 def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) -> Array:
-    """Gauge pressure (n,) MPa for the next pass, from the volumes found at the `given` ones.
+    """Return gauge pressures (n,) MPa for the next pass, from the volumes at the `given` ones.
 
     One step of Newton's method on gas(V(p)) = p, the cylinder at any deflection as compliant as
     the inflated one (`slope`, dV/dp in mm^3/MPa). With the gas' own pressure instead the error
@@ -230,49 +238,21 @@ def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) 
     return np.asarray(given + (gas_pressure(gas, volumes) - given) / (1.0 + stiffness * slope))
 
 
-# Bending the inflated cylinder on CalculiX: rigid bodies, contact, the way of the collar.
-#
-# Total time of the step is the collar's way in mm (`REST` later), in increments as contact allows.
-
-#: MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md, *Contact*.
-STIFFNESS = 5.0
-#: CalculiX' own, and more than enough: the load is a sum over many nodes.
-TOLERANCES_CYLINDER_BENDING = (5e-3, 1e-2)
-#: mm that the support begins inside the cylinder, so that it touches, and that the collar begins
-#: above the inflated cylinder, so that it does not.
-INTO, ABOVE = 0.02, 0.5
-#: Quads that may touch: mm to either side of a support and beyond the collar's edge, and how low
-#: or high they lie, in radii.
-BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
-#: Time that the collar stands still, and of the first increment, which must end before it moves.
-REST, FIRST_CYLINDER_BENDING = 1.5, 1.0
-#: mm of the collar's way: longest increment (its effect: docs/how-to/calculix.md), and the one
-#: at which contact is given up.
-LONGEST, LEAST_CYLINDER_BENDING = 5.0, 1e-4
-
-
 def bending_context(
     model: CylinderModel, solids: SolidMesh, inflated: Array, gas: GasCurve | None = None
 ) -> dict[str, Any]:
-    """What the template is given for step 2.
+    """Return what the template is given for step 2.
 
-    Parameters
-    ----------
-    inflated : (nodes of the solids, 3) mm of displacement of the inflated cylinder.
-    gas : gauge pressure over deflection; that of inflation unless given.
-
-    Raises
-    ------
-    InputError : a whole cylinder, whose bodies this does not make.
+    inflated : (nodes of the solids, 3) mm of displacement of the inflated cylinder. gas : pressure
+    over deflection; that of inflation unless given. InputError: a whole cylinder.
     """
     if model.copies != 4:
         raise InputError(None, "symmetry", "CalculiX bends a quarter; mesh it as 'quarter'")
     radius = float(np.abs(model.mesh.points[:, 1]).max())
     at, under = solids.points + inflated, solids.node_sets["support_bottom"]
+    low = float(at[under, 1].min()) + INTO
     bodies = {
-        "SUPPORT_BODY": rigid.support_body(
-            model.supports, radius, float(at[under, 1].min()) + INTO
-        ),
+        "SUPPORT_BODY": rigid.support_body(model.supports, radius, low),
         "COLLAR_BODY": rigid.collar_body(model.collar, at, ABOVE),
     }
     may_touch = _may_touch(model, radius)
@@ -300,24 +280,24 @@ def bending_context(
         "stiffness": STIFFNESS,
         "path": [[0.0, 0.0], [REST, 0.0], [REST + way, way]],
         "pressures": pressures,
-        "first": FIRST_CYLINDER_BENDING,
-        "least": LEAST_CYLINDER_BENDING,
+        "first": FIRST_BENDING,
+        "least": LEAST_BENDING,
         "longest": min(LONGEST, float(np.diff(model.increments, prepend=0.0).max())),
         "duration": REST + way,
-        "force_tolerance": TOLERANCES_CYLINDER_BENDING[0],
-        "correction_tolerance": TOLERANCES_CYLINDER_BENDING[1],
+        "force_tolerance": TOLERANCES_BENDING[0],
+        "correction_tolerance": TOLERANCES_BENDING[1],
     }
 
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
-    """Nodes of the support and of the collar in a result, after those of the `solids` (count)."""
+    """Return the nodes of support and collar in a result, after those of the `solids` (count)."""
     around, across = rigid.SUPPORT_COUNTS
     support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
 
 
 def _may_touch(model: CylinderModel, radius: float) -> dict[str, NDArray[np.bool_]]:
-    """Which quads may meet which body, so that contact is not looked for everywhere."""
+    """Return which quads may meet which body, so that contact is not looked for everywhere."""
     mesh = model.mesh
     middle = mesh.points[mesh.quads].mean(axis=1)
     beside = np.abs(middle[:, 2] - 0.5 * model.supports.span) < BESIDE_SUPPORT
@@ -327,3 +307,184 @@ def _may_touch(model: CylinderModel, radius: float) -> dict[str, NDArray[np.bool
         "SUPPORT_BODY": tube & beside & (middle[:, 1] < LOW * radius),
         "COLLAR_BODY": tube & under & (middle[:, 1] > HIGH * radius),
     }
+
+
+def volumes(model: CylinderModel, displacements: Array) -> Array:
+    """Return (frames,) mm^3 inside the middle surface of the whole cylinder."""
+    mesh = model.mesh
+    inside = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
+    return model.copies * np.array(inside)
+
+
+def inflation_history(
+    path: Path, model: CylinderModel, solids: SolidMesh, iterations: int
+) -> History:
+    """Return the middle surface and the whole volume at every pressure; `load` is the pressure.
+
+    SolverFailure: the file is not there, damaged, or does not hold every increment.
+    """
+    displacement, _ = whole_times(path, len(model.inflation), len(solids.points))
+    middle = np.ascontiguousarray(solids.middle(displacement))
+    pressure = np.array(model.inflation)
+    return History(
+        pressure,
+        middle,
+        *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
+        cavity_pressure=pressure,
+        cavity_volume=volumes(model, middle),
+        iterations=iterations,
+        path=middle,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BentCylinder:
+    """The inflated state, then every increment of bending that converged.
+
+    deflection (n,) mm that the collar has gone down since it met the inflated cylinder;
+    displacement (n, nodes, 3) mm of the middle surface; forces of the cylinder's contacts on
+    the whole (n, 3) N, `supports` and `collar`; volume (n,) mm^3 of the whole; iterations of the
+    run; whether it stopped early, and why.
+    """
+
+    deflection: Array
+    displacement: Array
+    reactions: Mapping[str, Array]
+    volume: Array
+    iterations: int
+    stopped: bool
+    why: str = ""
+
+
+def bent_cylinder(
+    path: Path,
+    model: CylinderModel,
+    solids: SolidMesh,
+    iterations: int,
+    converged: Collection[tuple[int, int]] | None = None,
+    why: str = "",
+) -> BentCylinder:
+    """Read what the result file of a deck with both steps holds of bending.
+
+    converged : steps and increments that converged, of a run that stopped early, and `why`; None:
+    it ended well. SolverFailure: the file is not there or damaged, or holds nothing of bending; or
+    the run ended and the last deflection is missing.
+    """
+    ended, inflated = converged is None, float(len(model.inflation))
+    count = len(solids.points)
+    support, collar = body_nodes(count)
+    deflections, shapes = list[float](), list[Array]()
+    forces: dict[str, list[Array]] = {"supports": [], "collar": []}
+    damage = ""
+    try:
+        for frame in FrdFile(path).frames(ended):
+            # A run that fails adds a frame of its best guess and residuals: not a result.
+            if converged is not None and (frame.step, frame.increment) not in converged:
+                continue
+            if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
+                continue
+            moved, force = frame.fields["DISP"], frame.fields["FORC"]
+            down = -float(moved[collar, 1].mean()) - ABOVE
+            if frame.step > 1 and down <= 0:
+                continue  # not on the cylinder yet
+            deflections.append(max(down, 0.0))
+            shapes.append(solids.middle(moved[:count]))
+            # What holds the bodies in place is what the cylinder does to them, turned round. Along
+            # x and z a quarter's forces cancel against those of the other quarters.
+            for name, nodes in (("supports", support), ("collar", collar)):
+                forces[name].append(np.array([0.0, model.copies * force[nodes][:, 1].sum(), 0.0]))
+    except InputError as error:
+        damage = str(error)
+    last = model.deflections[-1]
+    reached = deflections[-1] if len(deflections) > 1 else 0.0
+    if not reached or (ended and (damage or reached < last * (1 - NEAR))):
+        problem = damage or f"{path}: ends at {reached:g} of {last:g} mm of deflection"
+        raise SolverFailure(f"no usable results: {problem}", "calculix")
+    middle = np.ascontiguousarray(shapes)
+    reactions = {name: np.array(values) for name, values in forces.items()}
+    for values in reactions.values():
+        values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
+    deflection, volume = np.array(deflections), volumes(model, middle)
+    return BentCylinder(deflection, middle, reactions, volume, iterations, not ended, why)
+
+
+def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
+    """Return inflated state and reported deflections, interpolated by cubics; `load` in N.
+
+    gas : the pressure that the deck had. SolverFailure: it stopped before the first deflection.
+    """
+    reached = float(bent.deflection[-1])
+    wanted = np.array([0.0, *model.deflections])
+    wanted = np.minimum(wanted[wanted <= reached * (1 + NEAR)], reached)
+    if len(wanted) < 2:
+        problem = f"bending stopped at {reached:g} mm, before the first reported deflection"
+        raise SolverFailure(problem, "calculix")
+    at = partial(_between, bent.deflection, wanted=wanted)
+    reactions = {name: at(values) for name, values in bent.reactions.items()}
+    early = ""
+    if bent.stopped:
+        early = f"the run stopped early; the last increment is at {reached:.4g} mm"
+        early += f": {bent.why}" if bent.why else ""
+    return History(
+        -reactions["collar"][:, 1],
+        at(bent.displacement),
+        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)),
+        reactions,
+        cavity_pressure=gas.at(wanted),
+        cavity_volume=at(bent.volume),
+        iterations=bent.iterations,
+        path=bent.displacement,
+        remarks=(Note(NoteKind.EARLY, early),) if early else (),
+        early=early if len(wanted) <= len(model.deflections) else "",
+    )
+
+
+def _between(x: Array, values: Array, wanted: Array) -> Array:
+    """Interpolate values (n, ...) at x (n,), n > 1, at the `wanted` places.
+
+    Cubics with slopes from neighbours only: linear in the values, so that forces in balance stay
+    so, and what happens at one increment (a wrinkle) spreads no further than the next.
+    """
+    slopes = np.gradient(values, x, axis=0)
+    return np.asarray(CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
+
+
+def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+    """Inflate and bend a cylinder with a constant mass of gas.
+
+    The deck has the gas' pressure over the collar's way, and the volumes found give that for the
+    next pass. The history's is the one the deck had; a remark says how far it is from the gas'. A
+    run that stops early is reported up to there. SolverFailure: inflation did not end well, or
+    bending not even its first reported deflection.
+    """
+    solids, folder = solid_mesh(model), setup.templates
+
+    def blown(frd: Path, iterations: int) -> tuple[Array, Array]:
+        start = whole_times(frd, len(model.inflation), len(solids.points))[0]
+        return start[-1], volumes(model, solids.middle(start))
+
+    def bent(
+        frd: Path, iterations: int, stopped: Converged | None = None, why: str = ""
+    ) -> BentCylinder:
+        return bent_cylinder(frd, model, solids, iterations, stopped, why)
+
+    start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown)
+    rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
+    slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
+    gas = GasCurve(np.zeros(1), np.full(1, model.pressure))
+    for number in range(1, PASSES + 1):
+        context = bending_context(model, solids, start, gas)
+        found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, bent)
+        given = gas.at(found.deflection)
+        closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
+        gap = gas_pressure(closed, found.volume) - given
+        left = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
+        log.info("pass %d to %.4g mm: p V within %.1e", number, found.deflection[-1], left)
+        if left <= SETTLED or number == PASSES:
+            break
+        gas = GasCurve(found.deflection, better_pressure(closed, found.volume, given, slope))
+    history = bending_history(model, found, gas)
+    rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)
+    words = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
+    words += f"pressure {rise:+.3g} kPa at the end"
+    return replace(history, remarks=(*history.remarks, Note(NoteKind.GAS, words)))

@@ -1,4 +1,8 @@
-"""What the decks of all models have in common: shells, material, control of Newton's method."""
+"""Write what the decks of all models share: shells, material, control of Newton's method.
+
+CalculiX counts displacements from the nodes of the deck, which are where the sheet is without
+stress; the model counts them from its reference surface. The two differ by the sheet's slack.
+"""
 
 from __future__ import annotations
 
@@ -37,14 +41,10 @@ class ShellMesh:
 
 
 def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
-    """The mesh as S4, or as S8R with a midside node on every edge.
+    """Return the mesh as S4, or as S8R with a midside node on every edge.
 
     A midside between two rim nodes is moved out onto the rim's circle or ellipse; a midside whose
-    two ends are in a set is in the set when the edge bounds the mesh.
-
-    Raises
-    ------
-    InputError : another element.
+    two ends are in a set is in the set when the edge bounds the mesh. InputError: another element.
     """
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
     if element == "S4":
@@ -86,19 +86,11 @@ def deck_files(
     context: Mapping[str, Any],
     folder: Path | None = None,
 ) -> dict[str, str]:
-    """Text of each input file by name, `job.inp` and the mesh.
+    """Return the text of `job.inp`, of template `deck`, and of the mesh.
 
-    Parameters
-    ----------
-    deck : template of `job.inp`. name : of the test, for its title.
-    tolerances : largest residual force over the mean force, and largest correction over the
-        largest change, at which an increment has converged.
-    context : what only this deck's template is given.
-    folder : the user's templates.
-
-    Raises
-    ------
-    InputError : a template that cannot be used.
+    name : of the test, for its title. tolerances : largest residual force over the mean force, and
+    largest correction over the largest change, of a converged increment. context : what only this
+    deck's template is given. folder : the user's templates; InputError: one that cannot be used.
     """
     mesh = {
         "element": element,
@@ -122,21 +114,22 @@ def deck_files(
     }
     return {
         "job.inp": render("calculix", deck, {**common, **context}, folder),
-        MESH_FILE: render("calculix", MESH, mesh, _holding(folder, MESH)),
+        MESH_FILE: mesh_text(MESH, mesh, folder),
     }
 
 
+def mesh_text(template: str, mesh: Mapping[str, Any], folder: Path | None) -> str:
+    """Return the mesh's file, by our template where the user's decks do not have it too."""
+    own = folder if folder is not None and (folder / template).is_file() else None
+    return render("calculix", template, mesh, own)
+
+
 def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:
-    """What the templates hold: each set of nodes and its directions, numbered from 1."""
+    """Return each set of nodes and its directions, numbered from 1, for the templates."""
     return [
         {"set": name.upper(), "dofs": [d + 1 for d in directions]}
         for name, directions in supports.items()
     ]
-
-
-def _holding(folder: Path | None, name: str) -> Path | None:
-    """The user's folder when it has this template too: a deck of one's own can do with our mesh."""
-    return folder if folder is not None and (folder / name).is_file() else None
 
 
 T = TypeVar("T")
@@ -149,30 +142,21 @@ Rescue = Callable[[Path, int, Converged, str], T]
 
 
 class Run(Protocol):
-    """Runs a deck in a scratch folder of its own."""
+    """Runs decks, each in a scratch folder of its own."""
 
     def __call__(
         self, files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None
     ) -> T:
-        """What `read` makes of the results, or `rescue` of those of a run that stopped early.
+        """Return what `read` makes of the results, or `rescue` of those of a bad end.
 
-        Parameters
-        ----------
-        files : text of each input file by name.
-
-        Raises
-        ------
-        SolverFailure : it did not end well.
+        files : text of each input file by name. SolverFailure: it did not end well.
         """
 
 
 @dataclass(frozen=True)
 class Setup:
-    """How decks are written.
-
-    element : "S8R" or "S4". templates : the user's own folder. shells : the mesh of shells of a
-    mesh of quads, made once.
-    """
+    """The settings of decks: element "S8R" or "S4", the user's templates, shells of a mesh of
+    quads."""
 
     element: str
     templates: Path | None
@@ -187,7 +171,7 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def pressure_forces(points: Array, elements: NDArray[np.intp], pressure: float) -> Array:
-    """Forces (n, 3) N of `pressure` (MPa) along the normals of elements (m, 4 or 8) at `points`."""
+    """Return the forces (n, 3) N of `pressure` (MPa) along the normals of elements (m, 4 or 8)."""
     forces = np.zeros_like(points)
     corner = points[elements]
     for a, wa in zip(_GAUSS, _WEIGHTS, strict=True):
@@ -201,7 +185,7 @@ def pressure_forces(points: Array, elements: NDArray[np.intp], pressure: float) 
 
 
 def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
-    """Shape functions (nodes,) and their derivatives (2, nodes) at x (2,)."""
+    """Return shape functions (nodes,) and their derivatives (2, nodes) at x (2,)."""
     s = _NATURAL[:4] * x
     values = 0.25 * (1 + s[:, 0]) * (1 + s[:, 1])
     slopes = 0.25 * np.stack([_NATURAL[:4, 0] * (1 + s[:, 1]), _NATURAL[:4, 1] * (1 + s[:, 0])])
@@ -222,11 +206,6 @@ def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
     )
 
 
-# A sheet that is not flat, or not taut, and a rim that moves, as shells of CalculiX.
-#
-# CalculiX counts displacements from the nodes of the deck, which are where the sheet is without
-# stress; the model counts them from its reference surface. The two differ by the sheet's slack.
-
 #: Longest first increment of a step in which the rim moves, and how long it stays for it.
 FIRST_OF_STEP = 0.01
 #: Slope of a shell that lowers its stiffness by 2 %.
@@ -234,23 +213,19 @@ STEEP = 0.1
 
 
 def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
-    """The shells where the sheet is without stress; of those on the reference surface."""
+    """Return the shells where the sheet is without stress, from those on the reference surface."""
     warp, fill = model.slack
     return replace(shells, points=shells.points * (1.0 + warp, 1.0 + fill, 1.0))
 
 
 def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
-    """Node and direction (from 1) of the rim's unknowns, and their paths; none if it stays.
+    """Return node and direction (from 1) of the rim's unknowns, and their paths; none if it stays.
 
     A path is a list of (total time, displacement in mm from the node without stress). A step is 1
     long, and its first increment (`FIRST_OF_STEP`) has to leave the rim where it is: where a
     prescribed displacement changes in it, CalculiX begins with a linear iteration, from which a
-    membrane under pressure does not recover.
-
-    Raises
-    ------
-    SolverFailure : the mesh has lines of symmetry; a rim that is moved where shells must not turn
-        crashes CalculiX 2.20.
+    membrane under pressure does not recover. SolverFailure: the mesh has lines of symmetry; a rim
+    that is moved where shells must not turn crashes CalculiX 2.20.
     """
     if model.rim_motion is None and not any(model.slack):
         return []
@@ -278,7 +253,7 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
 
 
 def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:
-    """(nodes, 3) mm: a midside of the rim moves as the middle of its two ends does."""
+    """Return (nodes, 3) mm: a midside of the rim moves as the middle of its two ends does."""
     moved = np.zeros_like(shells.points)
     moved[model.mesh.node_sets["rim"]] = motion
     if shells.elements.shape[1] == 8:
@@ -288,7 +263,7 @@ def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Arra
 
 
 def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
-    """What the tilt of the sheet does to the law, where that is worth a word.
+    """Return a note where the tilt of the sheet lowers its stiffness by more than 2 %.
 
     Warp and fill are x and y of the deck, not laid onto every shell: where a shell stands at a
     slope s, its stiffness along the slope is lower by 2 s^2.

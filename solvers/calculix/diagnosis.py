@@ -1,4 +1,4 @@
-"""Every ccx on this machine, tried on the bars."""
+"""Try every ccx of this machine on the bars."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 
 
 def bar_deck() -> str:
-    """The deck: every bar pulled along x, the fabric turned so that its direction lies there."""
+    """Return the deck: every bar pulled along x, the fabric turned so that its direction lies
+    there."""
     bars = [
         {
             "index": index,
@@ -43,12 +44,10 @@ def bar_deck() -> str:
 
 
 def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> tuple[float, ...]:
-    """End stresses (MPa) of BARS by this ccx, each within TOLERANCE of Marc's.
+    """Return the end stresses (MPa) of BARS by this ccx, each within TOLERANCE of Marc's.
 
-    Raises
-    ------
-    SolverFailure : no compiler, ccx does not end well, or a stress is wrong.
-    OutputError : no temporary folder.
+    SolverFailure: no compiler, ccx does not end well, or a stress is wrong. OutputError: no
+    temporary folder.
     """
     library = material_library() if library is None else library
     try:
@@ -75,14 +74,9 @@ def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float,
     variables = {**os.environ, "LD_LIBRARY_PATH": search, "OMP_NUM_THREADS": "1"}
     try:
         done = subprocess.run(
-            [ccx, "bars"],
-            cwd=folder,
-            env=variables,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=timeout,
-        )
+            [ccx, "bars"], cwd=folder, env=variables, timeout=timeout, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise SolverFailure(f"{ccx}: four bars took more than {timeout:g} s", "calculix") from None
     except OSError as error:
@@ -99,7 +93,7 @@ def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float,
 
 
 def _end_stresses(text: str) -> tuple[float, ...]:
-    """sxx (MPa) of the bars from a .dat file at the end of the step; empty when it is not there."""
+    """Return sxx (MPa) of the bars from a .dat file at the end of the step; empty without it."""
     found: dict[int, float] = {}
     for block in re.split(r"(?m)^\s*stresses ", text)[1:]:
         head, *rows = block.splitlines()
@@ -115,7 +109,7 @@ def _end_stresses(text: str) -> tuple[float, ...]:
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """All there are (`named`: one more, by path).
+    """Return all there are (`named`: one more, by path).
 
     One that is not there at all is an entry without a path, expected only if it was named.
     """

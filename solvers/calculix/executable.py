@@ -1,4 +1,4 @@
-"""Which ccx to run, and whether it can load material libraries."""
+"""Find the ccx to run, see if it can load material libraries, and judge how its run ended."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SECONDS = 30.0
 
 @dataclass(frozen=True)
 class Executable:
-    """A ccx: where, version ("?" when it does not tell), how it was found.
+    """A ccx: path, version ("?" when it does not tell), how it was found.
 
     external: it can load material libraries; None when that cannot be seen (a wrapper script).
     """
@@ -39,15 +39,11 @@ class Executable:
 
 
 def find_ccx(named: Path | str | None = None) -> Executable:
-    """The ccx to run: `named`, else BUBBLEFIT_CCX, else the one `make calculix` built, else PATH.
+    """Return `named`, else BUBBLEFIT_CCX, else the one `make calculix` built, else one on the PATH.
 
     Of those on the PATH, the first one that can load material libraries. What somebody named is
-    taken or refused, never passed over.
-
-    Raises
-    ------
-    InputError : the ccx that was named is not there or is no program.
-    SolverFailure : there is none, or it cannot load material libraries.
+    taken or refused, never passed over. InputError: it is not there or is no program.
+    SolverFailure: there is none, or it cannot load material libraries.
     """
     without = None
     for candidate in every_ccx(named):
@@ -64,12 +60,7 @@ def find_ccx(named: Path | str | None = None) -> Executable:
 
 
 def every_ccx(named: Path | str | None = None) -> list[Executable]:
-    """All there are, in the order in which `find_ccx` prefers them, each once.
-
-    Raises
-    ------
-    InputError : as for `find_ccx`.
-    """
+    """Return all there are, each once, in the order in which `find_ccx` prefers them."""
     seen: set[Path] = set()
     found = []
     for path, origin in _places(named):
@@ -82,7 +73,7 @@ def every_ccx(named: Path | str | None = None) -> list[Executable]:
 
 
 def carries_external(path: Path) -> bool | None:
-    """Whether a ccx can load material libraries; None when it is no binary of ours to look into."""
+    """Return whether a ccx can load material libraries; None when it is no binary to look into."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -93,7 +84,7 @@ def carries_external(path: Path) -> bool | None:
 
 
 def version_of(path: Path) -> str:
-    """What `ccx -v` says, "?" when it says nothing of the kind."""
+    """Return what `ccx -v` says, "?" when it says nothing of the kind."""
     with suppress(OSError, subprocess.SubprocessError):
         done = subprocess.run(
             [path, "-v"], capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
@@ -125,7 +116,7 @@ def _places(named: Path | str | None) -> Iterator[tuple[Path, str]]:
 
 
 def _program(path: Path | str, field: str) -> Path:
-    """The path of a program that somebody named; a bare name is looked up on the PATH."""
+    """Return the path of a program that somebody named; a bare name is looked up on the PATH."""
     given = Path(os.path.expanduser(path))
     if os.sep not in str(path):
         for folder in os.environ.get("PATH", "").split(os.pathsep):
@@ -146,17 +137,14 @@ def _runs(path: Path) -> bool:
 FINISHED = "Job finished"
 _ERROR = re.compile(r"^\s*\*ERROR\b:?\s*(.*(?:\n {6,}\S.*)*)", re.MULTILINE)
 _JACOBIAN = re.compile(r"nonpositive jacobian.*?element\s*(\d*)", re.IGNORECASE | re.DOTALL)
-_TOO_SMALL = re.compile(
-    r"increment size smaller than minimum|max\. # of increments|too many cutbacks", re.IGNORECASE
-)
-
 #: CalculiX' own word for an increment that it cannot make any smaller.
 _GAVE_UP = re.compile(r"increment size smaller than minimum|too many cutbacks", re.IGNORECASE)
+_TOO_SMALL = re.compile(rf"{_GAVE_UP.pattern}|max\. # of increments", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Increment:
-    """One line of the .sta file: step and increment, its attempt, iterations, total time."""
+    """A line of the .sta file: step and increment, its attempt, iterations, total time."""
 
     step: int
     increment: int
@@ -166,7 +154,7 @@ class Increment:
 
 
 def increments(sta: Path) -> list[Increment]:
-    """Increments that converged so far; half a line at the end is left for the next look.
+    """Read the increments that converged so far; half a line at the end is left for the next look.
 
     Attempts that were given up are marked with a U in the file and left out here.
     """
@@ -186,7 +174,7 @@ def increments(sta: Path) -> list[Increment]:
 
 
 def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> str | None:
-    """One line on why a run did not end well; None when it says that it did."""
+    """Return one line on why a run did not end well; None when it says that it did."""
     log = folder / f"{job}.log"
     text = log_tail(log, 400)
     done = increments(folder / f"{job}.sta")
@@ -216,7 +204,7 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
 
 
 def collapsed(folder: Path, job: str, outcome: Outcome) -> bool:
-    """Whether CalculiX itself gave up, its increment as small as it may be.
+    """Return whether CalculiX itself gave up, its increment as small as it may be.
 
     What converged until then is a result that ends early. After any other bad end (killed, out of
     time, disk full, an element inside out, an error) there is none.

@@ -4,8 +4,7 @@ Records are told by their first columns (cgx manual, "Result Format"): 1C, 1U, 1
 nodes, 3C elements, 100C one result of one increment, 9999 the end. Data lines of the text form
 have fixed columns without separators; the binary forms (flag 2: float32, flag 3: float64) have
 fixed records. Either way a block's size follows from its header, and a file that does not hold
-what its headers announce, or stops before 9999, is refused: an analysis that was killed leaves
-such a file.
+what its headers announce, or stops before 9999, is refused: a killed analysis leaves such a file.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import meshio
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +27,26 @@ ROOM = 2**28
 #: Nodes of each element type of the format.
 NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
 
+#: meshio's name of each element type of the format, and its node order where it differs.
+CELLS: dict[int, tuple[str, tuple[int, ...] | None]] = {
+    1: ("hexahedron", None),
+    2: ("wedge", None),
+    3: ("tetra", None),
+    4: ("hexahedron20", (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)),
+    5: ("wedge15", (*range(9), 12, 13, 14, 9, 10, 11)),
+    6: ("tetra10", None),
+    7: ("triangle", None),
+    8: ("triangle6", None),
+    9: ("quad", None),
+    10: ("quad8", None),
+    11: ("line", None),
+    12: ("line3", (0, 2, 1)),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class FrdMesh:
-    """numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
+    """Numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
 
     numbers: NDArray[np.int64]
     points: Array
@@ -39,7 +55,7 @@ class FrdMesh:
 
 @dataclass(eq=False)
 class FrdFrame:
-    """One increment: total time, step and increment, and fields by name (nodes of the mesh, c).
+    """An increment: total time, step and increment, and fields by name (nodes of the mesh, c).
 
     NaN where a field has no value at a node.
     """
@@ -53,9 +69,7 @@ class FrdFrame:
 class FrdFile:
     """A result file, checked as it is read: `mesh`, then `frames()` one by one.
 
-    Raises
-    ------
-    InputError : no such file, not a result file, truncated or corrupt (which byte).
+    InputError: no such file, not a result file, truncated or corrupt (which byte).
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -69,10 +83,10 @@ class FrdFile:
         self._first = self._at
 
     def frames(self, ended: bool = True) -> Iterator[FrdFrame]:
-        """Every increment, in the file's order; steps may be missing or repeated.
+        """Yield every increment, in the file's order; steps may be missing or repeated.
 
         ended : the analysis ended, and the file with its mark. If it did not, the file may stop
-            after any whole result, and the increment that this one belongs to is the last.
+        after any whole result, and the increment that this one belongs to is the last.
         """
         self._at, self._held = self._first, 0
         frame: FrdFrame | None = None
@@ -84,7 +98,7 @@ class FrdFile:
             if line.startswith("    1PSTEP"):
                 increment, step = self._int(line[36:48]), self._int(line[48:60])
             elif line.startswith("  100C"):
-                time = self._float(line[12:24])
+                time = self._number(line[12:24], float, "a number")
                 if frame is None or (frame.step, frame.increment) != (step, increment):
                     if frame is not None:
                         yield frame
@@ -142,7 +156,7 @@ class FrdFile:
         frame.fields[name] = whole
 
     def _rows(self, count: int, width: int, flag: int) -> tuple[NDArray[np.int64], Array]:
-        """Node numbers (count,) and values (count, width) of one block."""
+        """Return node numbers (count,) and values (count, width) of one block."""
         if flag in (FLOAT, DOUBLE):
             kind = np.dtype([("node", "<i4"), ("values", "<f4" if flag == FLOAT else "<f8", width)])
             table = np.frombuffer(self._take(count * kind.itemsize), kind)
@@ -218,16 +232,34 @@ class FrdFile:
         return line
 
     def _int(self, text: str) -> int:
-        try:
-            return int(text)
-        except ValueError:
-            raise self._wrong(f"expected a whole number, got {text.strip()!r}") from None
+        return int(self._number(text, int, "a whole number"))
 
-    def _float(self, text: str) -> float:
+    def _number(self, text: str, kind: type, expected: str) -> float:
         try:
-            return float(text)
+            return float(text) if kind is float else int(text)
         except ValueError:
-            raise self._wrong(f"expected a number, got {text.strip()!r}") from None
+            raise self._wrong(f"expected {expected}, got {text.strip()!r}") from None
 
     def _wrong(self, problem: str) -> InputError:
         return InputError(self.path, f"byte {self._at}", problem)
+
+
+def read(filename: Path | str) -> meshio.Mesh:
+    """Return mesh and last increment for `meshio.read("job.frd")`; NaN where a node has no value.
+
+    `field_data` holds time, step and increment. InputError: truncated or corrupt. (meshio itself
+    would end the program on a ReadError.)
+    """
+    from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
+
+    file = FrdFile(filename)
+    cells = cell_blocks(file.path, file.mesh.numbers, file.mesh.elements, CELLS)
+    mesh = meshio.Mesh(file.mesh.points, cells)
+    for frame in file.frames():
+        mesh.point_data = dict(frame.fields)
+        names = ("time", "step", "increment")
+        mesh.field_data = {name: np.array([getattr(frame, name)]) for name in names}
+    return mesh
+
+
+meshio.register_format("frd", [".frd"], read, {})

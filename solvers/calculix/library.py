@@ -1,4 +1,9 @@
-"""The law as a material library: `law.c`, compiled on first use and kept by content."""
+"""The law as a material library: `law.c`, compiled on first use and kept by content.
+
+A file carries a law's moduli into it, whatever their number. A deck cannot: CalculiX copies the
+constants of a material into a field of 21 numbers (2.20; 2.21 makes it as long as it must be) and
+writes on beyond its end without a word.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +34,12 @@ TITLE = "bubblefit law"
 
 
 def law_number(law: HypoelasticLaw) -> int:
-    """What a deck calls the law's moduli: made of all their digits, below 1.1e12."""
+    """Return what a deck calls the law's moduli: made of all their digits, below 1.1e12."""
     return int.from_bytes(hashlib.sha256(_numbers(law).encode()).digest()[:5], "big")
 
 
 def law_text(law: HypoelasticLaw) -> str:
-    """Text of the file: title and number; how many pieces E1, E2 and G12 have; a line a piece.
+    """Return the file: title and number; how many pieces E1, E2 and G12 have; a line a piece.
 
     A piece is the strain up to which it holds and four coefficients (MPa, highest power of the
     strain first), those of E1 before those of E2 and of G12.
@@ -43,7 +48,7 @@ def law_text(law: HypoelasticLaw) -> str:
 
 
 def law_files(law: HypoelasticLaw) -> dict[str, str]:
-    """The file by its name, to lie where ccx runs: the library reads every *.law there."""
+    """Return the file by its name, to lie where ccx runs: the library reads every *.law there."""
     return {f"bubblefit-{law_number(law)}{SUFFIX}": law_text(law)}
 
 
@@ -78,29 +83,20 @@ def constants(
     whole_times: bool = False,
     whole_until: int = 0,
 ) -> tuple[float, ...]:
-    """The constants of `*USER MATERIAL`, (9,), as `law.c` has them.
+    """Return the constants (9,) of `*USER MATERIAL`, as `law.c` has them.
 
     nu12, area power, normal modulus (MPa), transverse shear modulus (MPa), angle (degrees), normal
-    axis, whole times; the number of the law in `law_files` and how many pieces its moduli have.
-    Their number is never a multiple of 8, of which CalculiX reads one more line, and never above
-    21, of which it writes beyond a field.
+    axis, whole times; number of the law in `law_files`, pieces of its moduli. No multiple of 8, of
+    which CalculiX reads one more line, and never above 21, of which it writes beyond a field.
 
-    Parameters
-    ----------
-    law : what to carry over.
-    normal_modulus : through the thickness, MPa; the larger of E1 and E2 at no strain unless given.
-    transverse_shear : MPa; G12 at no strain unless given.
-    angle : from the first in-plane axis to the warp, degrees, turning about the normal.
+    normal_modulus, transverse_shear : MPa; the larger of E1 and E2, and G12, at no strain unless
+        given. angle : from the first in-plane axis to the warp, degrees, turning about the normal.
     normal_axis : 3 without `*ORIENTATION` (warp from global x, fill from y) or with a rectangular
         one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is
         axial and fill hoop at angle 0.
-    whole_times : commit strain and stress only where the total time is a whole number, so that
-        the law's increments are the deck's steps of length 1, whatever increments they took.
+    whole_times : commit strain and stress only where the total time is a whole number, so that the
+        law's increments are the deck's steps of length 1, whatever increments they took.
     whole_until : instead: so up to this total time, and from there on at every increment.
-
-    Raises
-    ------
-    InputError : a modulus or an axis that cannot be.
     """
     if normal_modulus is None:
         normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
@@ -121,12 +117,7 @@ def constants(
 
 
 def compiler() -> list[str]:
-    """The system's C compiler as a command: $CC, else cc or gcc.
-
-    Raises
-    ------
-    SolverFailure : there is none.
-    """
+    """Return the C compiler as a command: $CC, else cc or gcc; SolverFailure: there is none."""
     named = shlex.split(os.environ.get("CC", ""))
     for command in [named] if named else [["cc"], ["gcc"]]:
         found = shutil.which(command[0])
@@ -139,14 +130,10 @@ def compiler() -> list[str]:
 
 
 def material_library(cache: Path | None = None) -> Path:
-    """Path of libBUBBLEFIT.so, compiled when it is not in the cache yet.
+    """Return the path of libBUBBLEFIT.so, compiled when it is not in the cache yet.
 
-    Put its folder into LD_LIBRARY_PATH for ccx. `cache` is bubblefit's own unless given.
-
-    Raises
-    ------
-    SolverFailure : no compiler, or it does not accept the source.
-    OutputError : the cache cannot be written.
+    Its folder belongs into LD_LIBRARY_PATH for ccx. SolverFailure: no compiler, or it does not
+    accept the source. OutputError: the cache cannot be written.
     """
     command = compiler()
     source = SOURCE.read_bytes()
@@ -181,7 +168,7 @@ def _compile(command: list[str]) -> None:
 
 
 def calculix(card: MaterialCard, options: NoOptions) -> Export:
-    """*MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, and its moduli."""
+    """Export *MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, its moduli."""
     says = Says(
         carries=(
             "the whole law: tangent moduli of log strain in any form, nu12, the range in which "

@@ -11,7 +11,7 @@ from ..settings import ExternalSettings, Offer, Override
 
 
 class CalculixSettings(ExternalSettings):
-    """How CalculiX is run; `CalculixSolver` says what each key means."""
+    """The settings of CalculiX; `CalculixSolver` says what each key means."""
 
     paths = ("templates", "scratch", "licence_folder")
     programs = started = ("ccx",)

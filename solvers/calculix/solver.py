@@ -17,9 +17,7 @@ from ..base import History, Progress, SolverCheck, analysis_of
 from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder
-from . import bubble, strip
-from . import cylinder_results as cylinder_analysis
-from . import strip as patch
+from . import cylinder, sheets
 from .deck import ELEMENTS, Reader, Rescue, Run, Setup, ShellMesh, shell_mesh
 from .executable import ADVICE, Executable, collapsed, find_ccx, increments, reason
 from .library import law_files, material_library
@@ -31,10 +29,10 @@ TIMEOUT_S = 3600.0
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
-    BubbleModel: bubble.analyse,
-    UniaxialModel: strip.analyse,
-    CylinderModel: cylinder_analysis.analyse,
-    PatchModel: patch.analyse_patch,
+    BubbleModel: sheets.analyse_bubble,
+    UniaxialModel: sheets.analyse_strip,
+    CylinderModel: cylinder.analyse,
+    PatchModel: sheets.analyse_patch,
 }
 
 
@@ -84,25 +82,21 @@ class CalculixSolver:
 
     @property
     def identity(self) -> str:
-        """The version of ccx, the element, and the user's templates by what is in them."""
+        """Return the version of ccx, the element, and the user's templates by what is in them."""
         try:
             version = self.executable().version
         except BubblefitError:
             version = ""  # whoever runs it is told
-        return in_words(
-            self.name,
-            version,
-            element=self.element,
-            templates=templates_mark(self.templates),
-        )
+        marks = {"element": self.element, "templates": templates_mark(self.templates)}
+        return in_words(self.name, version, **marks)
 
     @property
     def programs(self) -> tuple[Path, ...]:
-        """The ccx that runs, and the library that carries the law."""
+        """Return the ccx that runs, and the library that carries the law."""
         return self.executable().path, material_library()
 
     def check(self) -> SolverCheck:
-        """Whether there is a ccx that can load the law; its version."""
+        """Return whether there is a ccx that can load the law; its version."""
         try:
             found = self.executable()
         except SolverFailure as failure:
@@ -111,7 +105,7 @@ class CalculixSolver:
         return SolverCheck(self.name, True, found.version, carries, "" if carries else ADVICE)
 
     def executable(self) -> Executable:
-        """The ccx that runs, looked for once."""
+        """Return the ccx that runs, looked for once."""
         if self._found is None:
             self._found = find_ccx(self.ccx)
         return self._found
@@ -123,17 +117,10 @@ class CalculixSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate, pull or bend the model.
+        """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
 
-        Parameters
-        ----------
-        scratch : the folder below which the run's own is made.
-        timeout : s, of one run of ccx.
-
-        Raises
-        ------
-        SolverFailure : it did not end well; the scratch folder is kept and named.
-        InputError : a template that cannot be used, a ccx that cannot be started.
+        SolverFailure: it did not end well; the scratch folder is kept and named. InputError: a
+        template that cannot be used, a ccx that cannot be started.
         """
 
         place, seconds = scratch or self.scratch, timeout or self.timeout
@@ -152,57 +139,34 @@ class CalculixSolver:
         timeout: float,
         rescue: Rescue[T] | None = None,
     ) -> T:
-        """One run in a fresh scratch folder; what `read` makes of it, or `rescue` of a bad end."""
+        """Run in a fresh scratch folder; return what `read`, or `rescue` of a bad end, makes."""
         program, library = self.executable().path, material_library()
         with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
-            return self._in(folder, program, library, files, timeout, read, rescue)
-
-    def _in(
-        self,
-        folder: Path,
-        program: Path,
-        library: Path,
-        files: Mapping[str, str],
-        timeout: float,
-        read: Reader[T],
-        rescue: Rescue[T] | None,
-    ) -> T:
-        """One run in a folder that is empty at its start."""
-        try:
-            for name, text in files.items():
-                (folder / name).write_text(text, encoding="ascii", errors="replace")
-        except OSError as error:
-            raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
-        sta = folder / f"{JOB}.sta"
-        threads = str(self.threads)
-        environment = {
-            "LD_LIBRARY_PATH": str(library.parent),
-            "OMP_NUM_THREADS": threads,
-            "CCX_NPROC_STIFFNESS": threads,
-            "CCX_NPROC_EQUATION_SOLVER": threads,
-        }
-        outcome = run_process(
-            [program, "-i", JOB],
-            folder,
-            folder / f"{JOB}.log",
-            timeout,
-            environment,
-            None if self.progress is None else Watch(lambda: increments(sta), self.progress),
-        )
-        problem = reason(folder, JOB, outcome, timeout)
-        done = increments(sta)
-        iterations = sum(i.iterations for i in done)
-        if problem is not None:
-            log.info("stopped early: %s", problem)
             try:
-                if rescue is None or not collapsed(folder, JOB, outcome):
-                    raise SolverFailure(problem, self.name, outcome.exit_code)
-                converged = {(i.step, i.increment) for i in done}
-                return rescue(folder / f"{JOB}.frd", iterations, converged, problem)
+                for name, text in files.items():
+                    (folder / name).write_text(text, encoding="ascii", errors="replace")
+            except OSError as error:
+                raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
+            log_file, sta, frd = (folder / f"{JOB}.{end}" for end in ("log", "sta", "frd"))
+            counts = ("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "CCX_NPROC_EQUATION_SOLVER")
+            environment = dict.fromkeys(counts, str(self.threads))
+            environment["LD_LIBRARY_PATH"] = str(library.parent)
+            watch = None if self.progress is None else Watch(lambda: increments(sta), self.progress)
+            command: list[str | Path] = [program, "-i", JOB]
+            outcome = run_process(command, folder, log_file, timeout, environment, watch)
+            problem, done = reason(folder, JOB, outcome, timeout), increments(sta)
+            iterations = sum(i.iterations for i in done)
+            if problem is None:
+                return read(frd, iterations)
+            log.info("stopped early: %s", problem)
+            failure = SolverFailure(problem, self.name, outcome.exit_code)
+            if rescue is None or not collapsed(folder, JOB, outcome):
+                raise failure
+            try:
+                return rescue(frd, iterations, {(i.step, i.increment) for i in done}, problem)
             except SolverFailure:
                 # Why it stopped says more than what its results then lack.
-                raise SolverFailure(problem, self.name, outcome.exit_code) from None
-        return read(folder / f"{JOB}.frd", iterations)
+                raise failure from None
 
     def _shell_mesh(self, mesh: Mesh) -> ShellMesh:
         if self._shells is None or self._shells[0] is not mesh:

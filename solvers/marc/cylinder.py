@@ -21,15 +21,12 @@ from .deck import (
     deck_text,
     fabric_context,
     fixed,
-    law_context,
     node_sets,
-    schedule,
     supports,
     time_table,
 )
-from .plates import pressure_context
-from .results import NO_REACTIONS, REACTION, by_time, displacements, whole_times
 from .settings import MarcSettings
+from .sheets import NO_REACTIONS, REACTION, by_time, displacements, pressure_context, whole_times
 
 Array = NDArray[np.float64]
 
@@ -41,15 +38,9 @@ UP = [0.0, 1.0, 0.0]
 
 
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
-    """Support, then collar: name, table of the path, patches (n, 12) towards the cylinder.
+    """Return support and collar: name, table of the path, patches (n, 12) towards the cylinder.
 
-    Parameters
-    ----------
-    inflated : (nodes, 3) mm of displacement of the inflated cylinder.
-
-    Raises
-    ------
-    InputError : a whole cylinder, whose bodies this does not make.
+    inflated : (nodes, 3) mm of displacement. InputError: a whole cylinder.
     """
     if model.copies != 4:
         problem = "Marc's deck bends a quarter; mesh it as 'quarter'"
@@ -59,22 +50,15 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
     radius = float(np.abs(mesh.points[:, 1]).max())
     support = support_body(model.supports, radius, float(at[under, 1].min()) + INTO)
     collar = collar_body(model.collar, at, ABOVE)
+    bodies = (("support", SUPPORT_PATH, support), ("collar", COLLAR_PATH, collar))
     return [
-        {
-            "name": name,
-            "path": path,
-            "direction": UP,
-            "patches": body.faces.reshape(-1, 12).tolist(),
-        }
-        for name, path, body in (
-            ("support", SUPPORT_PATH, support),
-            ("collar", COLLAR_PATH, collar),
-        )
+        {"name": n, "path": path, "direction": UP, "patches": body.faces.reshape(-1, 12).tolist()}
+        for n, path, body in bodies
     ]
 
 
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Heights (mm) of support and collar over their places, at times 0, 1, 2, ...
+    """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ...
 
     inflation : increments of it; one more brings the support up, then the collar goes down.
     """
@@ -84,7 +68,6 @@ def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], li
     return support, collar
 
 
-TEMPLATE = "cylinder.dat.j2"
 HELD = "support_bottom"
 #: Increments between inflation and bending, in which the support comes up.
 APPROACH = 1
@@ -92,11 +75,9 @@ TONNES = 1e-12  # t/mm^3 in a kg/m^3
 
 
 def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Inflation by a pressure, the bottom held in height at the supports.
+    """Return the deck of inflation by a pressure, the bottom held in height at the supports.
 
-    Raises
-    ------
-    InputError : a template that cannot be used, a law that Marc's shells do not carry.
+    InputError: a template that cannot be used, a law that Marc's shells do not carry.
     """
     return _deck(model, law, settings, None)
 
@@ -104,22 +85,12 @@ def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSett
 def bending_deck(
     model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, inflated: Array
 ) -> str:
-    """Inflation of a cavity, the support brought up, and bending with a constant mass of gas.
+    """Return the deck of a cavity's inflation, and of bending with a constant mass of gas.
 
-    Parameters
-    ----------
-    inflated : (nodes, 3) mm of displacement of the inflated cylinder.
-
-    Raises
-    ------
-    InputError : as `inflation_deck`; a whole cylinder.
+    inflated : (nodes, 3) mm of displacement. InputError: as `inflation_deck`; a whole cylinder.
     """
-    gas = model.gas
-    cavity = {
-        "pressure": gas.ambient,
-        "temperature": gas.temperature,
-        "density": TONNES * gas.density,
-    }
+    gas, density = model.gas, TONNES * model.gas.density
+    cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
     return _deck(model, law, settings, {"gas": cavity, "bodies": contact_bodies(model, inflated)})
 
 
@@ -130,13 +101,11 @@ def _deck(
     bending: dict[str, Any] | None,
 ) -> str:
     mesh, filling, steps = model.mesh, len(model.inflation), len(model.increments)
-    warp = np.asarray(mesh.warp)
-    fabric = fabric_context(mesh, warp, model.thickness)
+    fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [one["name"] for one in guided]
-    hold = fixed("hold", HELD, (1,))
-    load = [0.0, *model.inflation]
-    tables = []
+    held = [*guided, fixed("hold", HELD, (1,))]
+    load, tables = [0.0, *model.inflation], []
     if bending is None:
         cases = [("inflation", filling, [*names, "hold", "pressure"])]
     else:
@@ -147,27 +116,12 @@ def _deck(
         ]
         load += [model.pressure] * (APPROACH + steps)
         support, collar = paths(filling, model.increments)
-        tables = [
-            time_table(SUPPORT_PATH, "support_path", support),
-            time_table(COLLAR_PATH, "collar_path", collar),
-        ]
-    return deck_text(
-        TEMPLATE,
-        "Cylinder",
-        settings,
-        {
-            **fabric,
-            "sets": [*fabric["sets"], *node_sets(mesh, [*model.guides, HELD])],
-            **law_context(law, settings),
-            **schedule(settings, cases),
-            "follower": True,
-            "time_tables": [time_table(1, "load", load), *tables],
-            "fixed": [*guided, hold],
-            "pressure": pressure_context(settings),
-            "start": {"name": "start", "conditions": [*names, "hold"]},
-            **(bending or {}),
-        },
-    )
+        tables.append(time_table(SUPPORT_PATH, "support_path", support))
+        tables.append(time_table(COLLAR_PATH, "collar_path", collar))
+    tables.insert(0, time_table(1, "load", load))
+    sets = node_sets(mesh, [*model.guides, HELD])
+    deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held
+    return deck_text(*deck, pressure=pressure_context(settings), **(bending or {}))
 
 
 Numbers = NDArray[np.intp]
@@ -182,26 +136,20 @@ UNBALANCED = 0.02
 
 
 def inflated(path: Path, model: CylinderModel) -> Array:
-    """Displacement (nodes, 3) mm at the end of inflation; SolverFailure as `whole_times`."""
+    """Return the displacement (nodes, 3) mm at the end of inflation; SolverFailure as
+    `whole_times`."""
     return displacements(whole_times(path, model.mesh, len(model.inflation)))[-1]
 
 
 def cylinder_history(
     path: Path, model: CylinderModel, iterations: int, ended: bool = True
 ) -> History:
-    """The inflated cylinder, then every reported deflection; `load` of the collar in N.
+    """Return the inflated cylinder, then every reported deflection; `load` of the collar in N.
 
     The cavity's pressure is not in the file: it is that of a constant mass in the volume found.
-
-    Parameters
-    ----------
     ended : the run ended well. If not, the history ends with the last increment that the file
-        holds whole, and a remark says so.
-
-    Raises
-    ------
-    SolverFailure : the file is not there or damaged, holds no forces or no increment of bending;
-        or the run ended and one is missing.
+    holds whole, and a remark says so. SolverFailure: the file is not there or damaged, holds no
+    forces or no increment of bending; or the run ended and one is missing.
     """
     filled = len(model.inflation)
     wanted = {filled: 0.0} | {
@@ -245,7 +193,7 @@ def cylinder_history(
 
 
 def may_touch(model: CylinderModel) -> dict[str, Numbers]:
-    """Nodes of the tube that collar and supports may touch."""
+    """Return the nodes of the tube that collar and supports may touch."""
     p, tube = model.mesh.points, np.ones(len(model.mesh.points), bool)
     # The rim where caps and tube meet is the tube's.
     caps = np.setdiff1d(model.mesh.node_sets["caps"], model.mesh.node_sets["ends"])
@@ -260,7 +208,7 @@ def may_touch(model: CylinderModel) -> dict[str, Numbers]:
 def _forces(
     model: CylinderModel, frames: list[dict[str, Array]]
 ) -> tuple[dict[str, Array], list[Note]]:
-    """What the bodies do to the whole cylinder, (frames, 3) N, and what is to be said of it."""
+    """Return what the bodies do to the whole cylinder, (frames, 3) N, and notes on it."""
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
         raise SolverFailure(NO_REACTIONS, "marc")
@@ -284,11 +232,9 @@ def _forces(
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
-    """Inflation alone, to know where collar and supports touch; then all, up to a collapse.
+    """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse.
 
-    Raises
-    ------
-    SolverFailure : a run that did not end well. InputError : as `bending_deck`.
+    SolverFailure: a run that did not end well. InputError: as `bending_deck`.
     """
     filling, bending = len(model.inflation), len(model.increments)
     deck = inflation_deck(model, law, settings)

@@ -1,4 +1,4 @@
-"""What the decks of all models have in common: law, schedule, supports."""
+"""Write what the decks of all models share: law, schedule, supports, sets, fabric."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...files import __version__
 from ...materials.exports.subroutines import STATE_VARIABLES
 from ...materials.law import HypoelasticLaw
-from ...materials.responses import ModulusTable, modulus_tables
+from ...materials.responses import modulus_tables
 from ...meshes.mesh import Mesh
 from ..decks import render
 from .settings import MarcSettings
@@ -32,41 +32,28 @@ ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
 
 
 def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
-    """What the templates are given of the law.
-
-    Raises
-    ------
-    InputError : a law that NLELAST does not carry.
-    """
+    """Return what the templates hold of the law; InputError: one that NLELAST does not carry."""
     if settings.law == "hypela2":
         kind = "thick shell" if settings.element == THICK else "membrane"
         return {"law": "hypoelastic", "state_variables": STATE_VARIABLES[kind]}
     if law.thickness_change != "constant":
-        problem = (
-            "'incompressible' is nothing that NLELAST knows; use 'constant', or [solver.marc] "
-            "law = 'hypela2'"
-        )
+        problem = "'incompressible' is nothing that NLELAST knows; use 'constant', or "
+        problem += "[solver.marc] law = 'hypela2'"
         raise InputError(None, "material.thickness_change", problem)
-    tables = modulus_tables(law)
-    moduli = [
-        {"name": name, "number": number, "points": _held(tables[modulus])}
-        for modulus, name, number in TABLES
-    ]
+    tables, moduli = modulus_tables(law), []
+    for modulus, name, number in TABLES:
+        # One point more beyond each end: held whether or not Marc extrapolates.
+        columns = np.column_stack([tables[modulus].strain, tables[modulus].modulus])
+        points = np.pad(columns, ((1, 1), (0, 0)), "edge")
+        points[[0, -1], 0] += [-GUARD, GUARD]
+        moduli.append({"name": name, "number": number, "points": points.tolist()})
     return {"law": "nlelast", "state_variables": 0, "moduli": moduli, "nu12": law.nu12}
-
-
-def _held(table: ModulusTable) -> list[list[float]]:
-    """Its points, and one more beyond each end: held whether or not Marc extrapolates."""
-    strain, modulus = (np.pad(values, 1, mode="edge") for values in (table.strain, table.modulus))
-    strain[[0, -1]] += [-GUARD, GUARD]
-    found: list[list[float]] = np.column_stack([strain, modulus]).tolist()
-    return found
 
 
 def schedule(
     settings: MarcSettings, cases: Sequence[tuple[str, int, Sequence[str]]]
 ) -> dict[str, Any]:
-    """Load cases of so many increments of the model each, with the names of their conditions.
+    """Return load cases of so many increments of the model each, with their conditions.
 
     Every increment of the model is cut into as many as make `settings.increments` in all.
     """
@@ -77,12 +64,12 @@ def schedule(
         "tolerance": TOLERANCE,
         "cases": [
             {
-                "name": name,
+                "name": n,
                 "increments": cuts * count,
                 "step": 1 / cuts,
                 "conditions": list(conditions),
             }
-            for name, count, conditions in cases
+            for n, count, conditions in cases
         ],
     }
 
@@ -90,7 +77,7 @@ def schedule(
 def fixed(
     name: str, members: str, dofs: Sequence[int], values: Sequence[float] = (), table: int = 0
 ) -> dict[str, Any]:
-    """One condition of FIXED DISP on a node set; `dofs` from 0, zero unless `values` are given."""
+    """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
     given = list(values) or [0.0] * len(dofs)
     return {
         "name": name,
@@ -102,7 +89,7 @@ def fixed(
 
 
 def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
-    """Conditions `fix_SET` from directions held at zero by node set."""
+    """Return conditions `fix_SET` from directions held at zero by node set."""
     return [
         fixed(f"fix_{name.lower()}", name.lower(), held_dofs(directions, element))
         for name, directions in held.items()
@@ -110,7 +97,7 @@ def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, 
 
 
 def held_dofs(directions: Sequence[int], element: int) -> tuple[int, ...]:
-    """Degrees of freedom of a node held where the membrane's `directions` are (from 0).
+    """Return degrees of freedom of a node held where the membrane's `directions` are (from 0).
 
     One direction: a plane of symmetry, where a shell does not turn about the other two axes.
     More: a pinned edge, which may turn.
@@ -121,7 +108,7 @@ def held_dofs(directions: Sequence[int], element: int) -> tuple[int, ...]:
 
 
 def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any]:
-    """A table over time: `values` at times 0, 1, 2, ..."""
+    """Return a table over time: `values` at times 0, 1, 2, ..."""
     points = [[float(time), float(value)] for time, value in enumerate(values)]
     return {"number": number, "name": name, "points": points}
 
@@ -130,25 +117,38 @@ def deck_text(
     template: str,
     title: str,
     settings: MarcSettings,
-    context: Mapping[str, Any],
+    law: HypoelasticLaw,
+    fabric: dict[str, Any],
+    sets: Sequence[dict[str, Any]],
+    cases: Sequence[tuple[str, int, Sequence[str]]],
+    tables: Sequence[dict[str, Any]],
+    held: Sequence[dict[str, Any]],
+    **context: Any,
 ) -> str:
-    """The deck.
+    """Return the deck of a `fabric_context`, of node sets, load cases, tables over time, supports.
 
-    Raises
-    ------
-    InputError : a template or a file of the site's that cannot be used.
+    All supports hold before the first increment, too. context : what only this deck's template is
+    given. InputError: a template or a file of the site's that cannot be used, as `law_context`.
     """
-    common = {
+    whole = {
         "version": __version__,
-        "title": f"{title}, {len(context['elements'])} elements {settings.element}",
+        "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
         "element": settings.element,
         "shell": settings.element != MEMBRANE,
-        "follower": False,
+        "follower": "pressure" in context,
         "gas": None,
+        **fabric,
+        "sets": [*fabric["sets"], *sets],
+        **law_context(law, settings),
+        **schedule(settings, cases),
+        "time_tables": tables,
+        "fixed": held,
+        "start": {"name": "start", "conditions": [one["name"] for one in held]},
+        **context,
     }
     folder = Path(settings.templates) if settings.templates is not None else None
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
-    return render("marc", template, {**common, **context}, folder, instead)
+    return render("marc", template, whole, folder, instead)
 
 
 Array = NDArray[np.float64]
@@ -161,10 +161,8 @@ SAME = 9
 
 
 def set_lines(numbers: Numbers) -> list[str]:
-    """Members of a set as Marc reads them: `a to b` for runs, ` c` where a line goes on.
-
-    numbers : from 0, sorted.
-    """
+    """Return members of a set (from 0, sorted) as Marc reads them: `a to b` for runs, ` c` to go
+    on."""
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
@@ -178,11 +176,9 @@ def set_lines(numbers: Numbers) -> list[str]:
 
 
 def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
-    """One `define` of the deck; kind "node" or "element".
+    """Return a `define` of the deck; kind "node" or "element".
 
-    Raises
-    ------
-    InputError : a name that Marc could not read, or a set of nothing.
+    InputError: a name that Marc could not read, or a set of nothing.
     """
     if not re.fullmatch(r"[a-z0-9_]{1,28}", name):
         problem = f"{name!r}: Marc takes at most 28 letters, digits and _; rename the set"
@@ -193,11 +189,9 @@ def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
 
 
 def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
-    """Unit vectors of warp and fill in the plane of each quad at its middle, (quads, 3) each.
+    """Return unit vectors of warp and fill in the plane of each quad, (quads, 3) each.
 
-    Raises
-    ------
-    InputError : a warp direction normal to a quad.
+    InputError: a warp direction normal to a quad.
     """
     corner = mesh.points[mesh.quads]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
@@ -212,13 +206,13 @@ def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
 
 
 def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[str, Any]:
-    """What the templates are given of mesh, frames and thicknesses; sets without the nodes'."""
+    """Return mesh, frames and thicknesses for the templates; sets without the nodes'."""
     quads = np.asarray(mesh.quads)
     everything = np.arange(len(quads))
     sets = [named_set("element", FABRIC, everything)]
 
     def groups(values: Array, name: str) -> list[tuple[str, int]]:
-        """Name of the set of elements with the same row of `values`, and one of them."""
+        """Return the set of elements with the same row of `values`, and one of them."""
         _, which = np.unique(values, axis=0, return_inverse=True)
         which = which.ravel()
         count = int(which.max()) + 1
@@ -232,10 +226,8 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         return found
 
     layer = np.broadcast_to(np.asarray(thickness, float), len(quads))
-    layers = [
-        {"set": name, "thickness": float(layer[one])}
-        for name, one in groups(layer[:, None], "layer")
-    ]
+    thick = groups(layer[:, None], "layer")
+    layers = [{"set": name, "thickness": float(layer[one])} for name, one in thick]
     along, across = fabric_frames(mesh, warp)
     # Adding zero turns -0 into 0.
     rows = np.asarray(np.round(np.hstack([along, across]), SAME) + 0.0, float)
@@ -243,17 +235,13 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         {"set": name, "warp": rows[one, :3].tolist(), "fill": rows[one, 3:].tolist()}
         for name, one in groups(rows, "frame")
     ]
-    return {
-        "points": np.asarray(mesh.points, float).tolist(),
-        "elements": (quads + 1).tolist(),
-        "sets": sets,
-        "layers": layers,
-        "frames": frames,
-    }
+    points, elements = np.asarray(mesh.points, float).tolist(), (quads + 1).tolist()
+    return {"points": points, "elements": elements, "sets": sets, "layers": layers,
+            "frames": frames}  # fmt: skip
 
 
 def node_sets(mesh: Mesh, names: Mapping[str, Any] | list[str]) -> list[dict[str, Any]]:
-    """The `define`s of the mesh's node sets of these names."""
+    """Return the `define`s of the mesh's node sets of these names."""
     return [named_set("node", name.lower(), mesh.node_sets[name]) for name in names]
 
 
@@ -268,13 +256,7 @@ class Run(Protocol):
     def __call__(
         self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
     ) -> T:
-        """What `read` makes of the results, or `rescue` of those of a run that stopped early.
+        """Return what `read` makes of the results, or `rescue` of those of a bad end.
 
-        Parameters
-        ----------
-        units : total time at the end of the deck.
-
-        Raises
-        ------
-        SolverFailure : it did not end well.
+        units : total time at the end of the deck. SolverFailure: it did not end well.
         """

@@ -1,4 +1,4 @@
-"""The Marc of this machine, tried on the bars."""
+"""Try the Marc of this machine on the bars."""
 
 from __future__ import annotations
 
@@ -19,11 +19,9 @@ SECONDS = 600.0
 
 
 def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
-    """End stresses (MPa) of BARS by this Marc, each within TOLERANCE of the published one.
+    """Return the end stresses (MPa) of BARS by this Marc, each within TOLERANCE of the published.
 
-    Raises
-    ------
-    SolverFailure : a bar did not end well, or its stress is wrong.
+    SolverFailure: a bar did not end well, or its stress is wrong.
     """
     stresses = tuple(end_stress(solver, bar, timeout) for bar in BARS)
     for bar, stress in zip(BARS, stresses, strict=True):
@@ -34,7 +32,7 @@ def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
 
 
 def end_stress(solver: MarcSolver, bar: Bar, timeout: float | None = None) -> float:
-    """Cauchy stress (MPa) at the end of one bar."""
+    """Return the Cauchy stress (MPa) at the end of one bar."""
     model, law = bar_model(bar), bar_law(bar.model)
     # The table of the modulus ends with the bar: to the reach of a law without a range its points
     # would lie so far apart that the warp bar is 2e-4 off.
@@ -47,7 +45,7 @@ NAMED, FOUND = "named", "PATH"
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """One entry (`named`: the one to look at), none where it is neither there nor was named."""
+    """Return one entry (`named`: the one to look at), none if it is neither there nor was named."""
     origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else FOUND
     expected = origin != FOUND
     path, stresses, off, advice, version = None, None, None, "", ""

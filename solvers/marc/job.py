@@ -1,4 +1,4 @@
-"""One run of Marc: a fresh folder, a deck in it, the program, the judgement, the results."""
+"""Run Marc once: a fresh folder, a deck in it, the program, the judgement, the results."""
 
 from __future__ import annotations
 
@@ -26,13 +26,18 @@ ADVICE = (
     "see `bubblefit docs marc`"
 )
 SECONDS = 60.0
+log = logging.getLogger(__name__)
+
+NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
+#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
+WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
+T = TypeVar("T")
+Tell = Callable[[Progress], None]
 
 
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
-    """Marc on `job`.dat in the current folder, in the foreground and asking nothing.
+    """Return the command of Marc on `job`.dat in the current folder, in the foreground.
 
-    Parameters
-    ----------
     subroutine : file name of user code, which Marc compiles, where the law needs it.
     """
     older = settings.options == "older"
@@ -51,7 +56,7 @@ def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> lis
 
 
 def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
-    """The command in a login shell that has loaded `modules`; as it is without any."""
+    """Return the command in a login shell that has loaded `modules`; as it is without any."""
     if not modules:
         return list(words)
     load = " && ".join(f"module load {shlex.quote(name)}" for name in modules)
@@ -60,12 +65,10 @@ def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
 
 
 def find_marc(settings: MarcSettings) -> Path | None:
-    """Where run_marc is; None where only the loaded modules know.
+    """Return where run_marc is; None where only the loaded modules know.
 
-    Raises
-    ------
-    InputError : the one that was named is not there or is no program.
-    SolverFailure : there is none on the PATH.
+    InputError: the one that was named is not there or is no program. SolverFailure: there is none
+    on the PATH.
     """
     given = Path(os.path.expanduser(settings.executable))
     if os.sep in settings.executable:
@@ -83,7 +86,7 @@ def find_marc(settings: MarcSettings) -> Path | None:
 
 
 def _in_modules(settings: MarcSettings) -> Path | None:
-    """As the shell sees it after `module load`."""
+    """Return run_marc as the shell sees it after `module load`."""
     ask = with_modules(settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh",
                                           settings.executable])  # fmt: skip
     said = None
@@ -105,7 +108,7 @@ COLUMNS = 13
 
 @dataclass(frozen=True)
 class Increment:
-    """One line of the .sts file: load case, increment, iterations, cut-backs, total time."""
+    """A line of the .sts file: load case, increment, iterations, cut-backs, total time."""
 
     case: int
     increment: int
@@ -115,7 +118,7 @@ class Increment:
 
 
 def increments(sts: Path) -> list[Increment]:
-    """Increments that ended so far, repeated ones as often as they are there.
+    """Read increments that ended so far, repeated ones as often as they are there.
 
     Half a line at the end is left for the next look; lines that are not of 13 numbers are the
     header and the end.
@@ -135,7 +138,7 @@ def increments(sts: Path) -> list[Increment]:
 
 
 def exit_number(*files: Path) -> int | None:
-    """The last exit number in the first of the files that has one; None: it never ended.
+    """Return the last exit number in the first of the files that has one; None: it never ended.
 
     Of nine digits at most: Marc's have four.
     """
@@ -147,7 +150,7 @@ def exit_number(*files: Path) -> int | None:
 
 
 def repeated(done: list[Increment]) -> int:
-    """How many increments were tried again after they did not converge."""
+    """Return how many increments were tried again after they did not converge."""
     numbers = [one.increment for one in done]
     return len(numbers) - len(set(numbers))
 
@@ -180,7 +183,7 @@ _REFUSED = re.compile(
 
 @dataclass(frozen=True)
 class Ending:
-    """How a job ended: `problem` in one line, None when well; what Marc said of it.
+    """The end of a job: `problem` in one line, None when well; what Marc said of it.
 
     licence: it never began, for want of a licence. iterations, repeated: of all increments.
     """
@@ -194,7 +197,7 @@ class Ending:
 
     @property
     def collapse(self) -> bool:
-        """Whether Marc itself gave up, its time step as small as it may be.
+        """Return whether Marc itself gave up, its time step as small as it may be.
 
         What it wrote until then is a result that ends early; after any other bad end (killed, out
         of time, an element inside out) there is none.
@@ -208,12 +211,9 @@ def ending(
 ) -> Ending:
     """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
 
-    Parameters
-    ----------
-    screen : name of the file with what run_marc printed.
-    timeout : s, that it had. time : total time at its end when it ends well.
-
-    The return code of run_marc is not asked: scripts around Marc give any.
+    screen : name of the file with what run_marc printed. timeout : s, that it had. time : total
+    time at its end when it ends well. The return code of run_marc is not asked: scripts around
+    Marc give any.
     """
     done = increments(folder / f"{job}.sts")
     number = exit_number(
@@ -250,50 +250,30 @@ def ending(
 
 
 def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
-    """`*** error` lines, refusals of a licence, which element was inside out ("" unknown), and
-    complaints of a full disk.
-    """
-    errors: list[str] = []
-    full: list[str] = []
-    refusals: list[str] = []
+    """Return `*** error` lines, refusals of a licence, which element was inside out ("" unknown),
+    and complaints of a full disk."""
+    errors, refusals, full = list[str](), list[str](), list[str]()
     turned: str | None = None
     for file in files:
-        try:
-            # The .out of a long job is large: line by line.
-            with file.open(encoding="latin-1") as text:
-                for line in text:
-                    found = _INSIDE_OUT.search(line)
-                    if found is not None and turned is None:
-                        turned = f" (element {found[1]})" if found[1] else ""
-                    if any(words.lower() in line.lower() for words in WORDS):
-                        _add(full, line)
-                    if _ERROR.search(line):
-                        _add(errors, line)
-                    if _LICENCE.search(line) and _REFUSED.search(line):
-                        _add(refusals, line)
-        except OSError:
-            continue
+        with suppress(OSError), file.open(encoding="latin-1") as text:
+            for line in text:  # the .out of a long job is large
+                found = _INSIDE_OUT.search(line)
+                if found is not None and turned is None:
+                    turned = f" (element {found[1]})" if found[1] else ""
+                said = " ".join(line.split())
+                for lines, meant in (
+                    (full, any(words.lower() in line.lower() for words in WORDS)),
+                    (errors, _ERROR.search(line)),
+                    (refusals, _LICENCE.search(line) and _REFUSED.search(line)),
+                ):
+                    if meant and said not in lines and len(lines) < MOST_LINES:
+                        lines.append(said)
     return errors, refusals, turned, full
-
-
-def _add(lines: list[str], line: str) -> None:
-    text = " ".join(line.split())
-    if text not in lines and len(lines) < MOST_LINES:
-        lines.append(text)
-
-
-log = logging.getLogger(__name__)
-
-NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
-#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
-WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
-T = TypeVar("T")
-Tell = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is run: the deck, total time at its end, source of a user subroutine or None."""
+    """A job: the deck, total time at its end, source of a user subroutine or None."""
 
     deck: str
     time: int
@@ -309,72 +289,51 @@ def run_job(
     timeout: float | None = None,
     tell: Tell | None = None,
 ) -> tuple[T, Ending]:
-    """Run it in a fresh scratch folder.
+    """Run a job in a fresh scratch folder below `parent`; return what `read` makes of its results.
 
-    Parameters
-    ----------
-    read : makes something of the results; rescue : of those of a run that stopped early.
-    parent : folder of the scratch folder.
-    timeout : s, of one run; the settings' unless given.
-    tell : called with every increment that ended while it runs.
-
-    Raises
-    ------
-    SolverFailure : it did not end well; the scratch folder is kept and named. LicenceDenied : it
-        never began, for want of a licence.
-    InputError : a Marc that is not there or cannot be started.
+    rescue : of those of a run that stopped early. timeout : s; the settings' unless given. tell :
+    called with every increment that ended. SolverFailure: it did not end well; the scratch folder
+    is kept and named. LicenceDenied: it never began, for want of a licence. InputError: a Marc that
+    is not there or cannot be started.
     """
     find_marc(settings)
-    with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-        return _in(folder, job, settings, read, rescue, timeout or settings.timeout, tell)
-
-
-def _in(
-    folder: Path,
-    job: Job,
-    settings: MarcSettings,
-    read: Reader[T],
-    rescue: Reader[T] | None,
-    timeout: float,
-    tell: Tell | None,
-) -> tuple[T, Ending]:
-    """One run in a folder that is empty at its start."""
-    try:
-        (folder / f"{JOB}.dat").write_text(job.deck, encoding="ascii", errors="replace")
-        if job.subroutine is not None:
-            (folder / SUBROUTINE).write_text(job.subroutine, encoding="ascii", errors="replace")
-    except OSError as error:
-        raise SolverFailure(f"the deck cannot be written: {error.strerror}", NAME) from None
-    sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
-    outcome = run_process(
-        run_command(settings, JOB, None if job.subroutine is None else SUBROUTINE),
-        folder,
-        folder / SCREEN,
-        timeout,
-        settings.environment,
-        None if tell is None else Watch(lambda: increments(sts), tell),
+    seconds, subroutine = (
+        timeout or settings.timeout,
+        None if job.subroutine is None else SUBROUTINE,
     )
-    set_earlier_aside(folder)
-    end = ending(folder, JOB, SCREEN, outcome, timeout, float(job.time))
-    if end.problem is None:
+    with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
+        sources = {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine}
         try:
-            return read(results, end.iterations), end
+            for name, text in sources.items():
+                if text is not None:
+                    (folder / name).write_text(text, encoding="ascii", errors="replace")
+        except OSError as error:
+            raise SolverFailure(f"the deck cannot be written: {error.strerror}", NAME) from None
+        sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
+        watch = None if tell is None else Watch(lambda: increments(sts), tell)
+        command, screen = run_command(settings, JOB, subroutine), folder / SCREEN
+        outcome = run_process(command, folder, screen, seconds, settings.environment, watch)
+        set_earlier_aside(folder)
+        end = ending(folder, JOB, SCREEN, outcome, seconds, float(job.time))
+        if end.problem is None:
+            try:
+                return read(results, end.iterations), end
+            except SolverFailure as failure:
+                number = end.number if failure.exit_number is None else failure.exit_number
+                raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
+        log.info("stopped early: %s", end.problem)
+        try:
+            if rescue is not None and end.collapse:
+                return rescue(results, end.iterations), end
         except SolverFailure as failure:
-            number = end.number if failure.exit_number is None else failure.exit_number
-            raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
-    log.info("stopped early: %s", end.problem)
-    kind = LicenceDenied if end.licence else SolverFailure
-    try:
-        if rescue is not None and end.collapse:
-            return rescue(results, end.iterations), end
-    except SolverFailure as failure:
-        # Why it stopped says more than what its results then lack.
-        log.info("%s", failure.reason)
-    raise kind(end.problem, NAME, end.number, end.said)
+            # Why it stopped says more than what its results then lack.
+            log.info("%s", failure.reason)
+        kind = LicenceDenied if end.licence else SolverFailure
+        raise kind(end.problem, NAME, end.number, end.said)
 
 
 def set_earlier_aside(folder: Path) -> None:
-    """What is older than the deck was left by an earlier job: it is not this one's answer.
+    """Rename what is older than the deck: it is not this job's answer.
 
     The folder is fresh, but a site's script may copy files into it, from a place of its own.
     """

@@ -1,4 +1,4 @@
-"""How a site runs its Marc: `[solver.marc]` of a project file, or a file of the site's own."""
+"""Settings of a site's Marc: `[solver.marc]` of a project file, or a file of the site's own."""
 
 from __future__ import annotations
 
@@ -17,19 +17,9 @@ from ..settings import ExternalSettings, Offer, Override
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
 BLOCKS = (
-    "cavity",
-    "cavity_parameter",
-    "contact",
-    "control",
-    "fixed_disp",
-    "geometry",
-    "hypoelastic",
-    "nlelast",
-    "orientation",
-    "post",
-    "pressure",
-    "stepping",
-)
+    "cavity", "cavity_parameter", "contact", "control", "fixed_disp", "geometry", "hypoelastic",
+    "nlelast", "orientation", "post", "pressure", "stepping",
+)  # fmt: skip
 
 Seconds = Annotated[float, Field(gt=0, le=1e9)]
 Count = Annotated[int, Field(ge=1, le=1024)]
@@ -96,7 +86,7 @@ class MarcSettings(ExternalSettings):
     keep: bool = False
 
     def given(self, folder: Path) -> dict[str, Any]:
-        """What was given, None for the rest; paths from `folder` (of the file it was in)."""
+        """Return what was given, None for the rest; paths from `folder` (of the file it was in)."""
         values: dict[str, Any] = dict.fromkeys(type(self).model_fields)
         values |= self.model_dump(include=self.model_fields_set)
         for name in (*self.paths, *self.programs):
@@ -109,15 +99,10 @@ class MarcSettings(ExternalSettings):
 
 
 def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
-    """Settings from those `given` (None: not given), over the site's file, over the defaults.
+    """Return settings from those `given` (None: not), over the site's file, over the defaults.
 
-    Parameters
-    ----------
     named : the executable, or the site's file if it ends in .toml; BUBBLEFIT_MARC unless given.
-
-    Raises
-    ------
-    InputError : a file or a value that cannot be used.
+    InputError: a file or a value that cannot be used.
     """
     site = named or os.environ.get(VARIABLE, "")
     values: dict[str, Any] = {}
@@ -126,11 +111,8 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
     elif site:
         values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
     # The command line gives paths as such.
-    mine: dict[str, Any] = {
-        name: str(value) if isinstance(value, Path) else value
-        for name, value in given.items()
-        if value is not None
-    }
+    mine: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    mine |= {name: str(value) for name, value in mine.items() if isinstance(value, Path)}
     if named is not None:
         mine.pop("executable", None)
     both = {**values, **mine}
@@ -148,11 +130,9 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
 
 
 def site_settings(path: Path) -> dict[str, Any]:
-    """The keys of a site's file, with its paths made absolute.
+    """Return the keys of a site's file, with its paths made absolute.
 
-    Raises
-    ------
-    InputError : no such file, not TOML, a key that there is not.
+    InputError: no such file, not TOML, a key that there is not.
     """
     try:
         content = toml_of(path)

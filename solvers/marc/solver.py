@@ -17,9 +17,7 @@ from ...notes import Note, NoteKind
 from ..base import History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark
 from ..settings import KEYS
-from . import cylinder as cylinder_analysis
-from . import plates as bubble
-from . import plates as strip
+from . import cylinder, sheets
 from .deck import Reader, Run
 from .job import Job, find_marc, run_job
 from .settings import MarcSettings, marc_settings
@@ -32,9 +30,9 @@ MATTERING = (
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
-    BubbleModel: bubble.analyse,
-    UniaxialModel: strip.analyse_strip,
-    CylinderModel: cylinder_analysis.analyse,
+    BubbleModel: sheets.analyse_bubble,
+    UniaxialModel: sheets.analyse_strip,
+    CylinderModel: cylinder.analyse,
 }
 
 
@@ -67,7 +65,7 @@ class MarcSolver:
 
     @property
     def identity(self) -> str:
-        """The settings of the deck; the site's templates and blocks by what is in them."""
+        """Return the settings of the deck; the site's templates and blocks by what is in them."""
         settings = self.settings
         return in_words(
             self.name,
@@ -81,23 +79,23 @@ class MarcSolver:
 
     @property
     def programs(self) -> tuple[Path, ...]:
-        """run_marc; none where only the site's modules know where it is."""
+        """Return run_marc; none where only the site's modules know where it is."""
         found = find_marc(self.settings)
         return () if found is None else (found,)
 
     @property
     def keep(self) -> bool:
-        """Whether the folders of runs that end well stay."""
+        """Return whether the folders of runs that end well stay."""
         return self.settings.keep
 
     @property
     def site_licences(self) -> dict[str, Any]:
-        """What the site's file says of licences; the project's own words count more."""
+        """Return what the site's file says of licences; the project's own words count more."""
         return {key: getattr(self.settings, key) for key in KEYS
                 if key in self.settings.model_fields_set}  # fmt: skip
 
     def check(self) -> SolverCheck:
-        """Whether there is a run_marc.
+        """Return whether there is a run_marc.
 
         That it carries the law, `doctor` and docs/how-to/marc.md show.
         """
@@ -114,18 +112,11 @@ class MarcSolver:
         scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:
-        """Inflate, pull or bend the model.
+        """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
 
-        Parameters
-        ----------
-        scratch : the folder below which the run's own is made.
-        timeout : s, of one run of Marc.
-
-        Raises
-        ------
-        SolverFailure : it did not end well; the scratch folder is kept and named. LicenceDenied :
-            it never began, for want of a licence.
-        InputError : a template or file that cannot be used, a Marc that cannot be started.
+        SolverFailure: it did not end well; the scratch folder is kept and named. LicenceDenied: it
+        never began, for want of a licence. InputError: a template or file that cannot be used, a
+        Marc that cannot be started.
         """
         settings, repeats, early = self.settings, 0, ""
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
@@ -149,7 +140,7 @@ class MarcSolver:
         return replace(history, remarks=tuple(remarks), early=why)
 
     def _subroutine(self, law: HypoelasticLaw) -> str | None:
-        """HYPELA2 with the law's constants, where it is the way that was chosen."""
+        """Return HYPELA2 with the law's constants, where it is the way that was chosen."""
         settings = self.settings
         if settings.law != "hypela2":
             return None

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import meshio
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,12 +27,10 @@ _BEGIN = re.compile(r"=beg=(\d{3})(\d{2})\b")
 
 
 class Records:
-    """A place in a file, and what stands there; every step is checked.
+    """A place in a file, and the reading from there; every step is checked.
 
-    Raises
-    ------
-    InputError : the file cannot be read, or ends where it must not, or holds what it must not;
-        which line.
+    InputError: the file cannot be read, or ends where it must not, or holds what it must not;
+    which line.
     """
 
     def __init__(self, path: Path) -> None:
@@ -45,11 +44,11 @@ class Records:
         return len(self._lines)
 
     def integers(self, count: int) -> list[int]:
-        """Whole numbers that begin on a line of their own."""
+        """Read whole numbers that begin on a line of their own."""
         return self.parse(self._records(count), count, int).tolist()
 
     def reals(self, count: int) -> Array:
-        """Finite numbers that begin on a line of their own, (count,)."""
+        """Read finite numbers that begin on a line of their own, (count,)."""
         return self.parse(self._records(count), count, float)
 
     def _records(self, count: int) -> list[bytes]:
@@ -59,7 +58,7 @@ class Records:
         return [self.raw() for _ in range(lines)]
 
     def integers_to_end(self) -> list[int]:
-        """All numbers of a block of whole numbers only."""
+        """Read all numbers of a block of whole numbers only."""
         first = self.at
         while not self._lines[self.at].startswith(b"=end="):
             self.raw()
@@ -69,7 +68,7 @@ class Records:
         return self.parse(rows, sum(-(-len(row) // WIDTH) for row in rows), int).tolist()
 
     def parse(self, rows: list[bytes], count: int, kind: type) -> NDArray:
-        """`count` fields in pieces of lines."""
+        """Return `count` fields in pieces of lines."""
         text = b"".join(row.rstrip() for row in rows)
         if len(text) != WIDTH * count:
             raise self.wrong("a data line that is too short or too long")
@@ -87,38 +86,38 @@ class Records:
         return values
 
     def begin(self) -> tuple[int, int]:
-        """Number and version of the block that begins here."""
+        """Return number and version of the block that begins here."""
         found = _BEGIN.match(self.line())
         if found is None:
             raise self.wrong("expected the beginning of a block (=beg=)")
         return int(found[1]), int(found[2])
 
     def skip(self) -> None:
-        """To the end of a block that is of no interest."""
+        """Go to the end of a block that is of no interest."""
         while (line := self.peek()) != "=end=":
             if line.startswith(("=beg=", "****", "----", "++++")):
                 raise self.wrong("a block without its end (=end=): truncated")
             self.at += 1
 
     def end(self) -> None:
-        """Of a block that was read."""
+        """Go past the end of a block that was read."""
         if self.line() != "=end=":
             raise self.wrong("a block longer than announced, or without its end (=end=)")
 
     def peek(self) -> str:
-        """The line here."""
+        """Return the line here."""
         if self.at >= len(self._lines) - 1:
             raise self.wrong("the file ends before its end mark (++++): truncated")
         return self._lines[self.at].decode("latin-1").rstrip()
 
     def line(self) -> str:
-        """The line here, and on."""
+        """Return the line here, and go on."""
         line = self.peek()
         self.at += 1
         return line
 
     def raw(self) -> bytes:
-        """A data line, and on."""
+        """Return a data line, and go on."""
         # The last piece has no line end after it: it may be half a line.
         if self.at >= len(self._lines) - 1:
             raise self.wrong("the file ends in the middle of a block: truncated")
@@ -126,17 +125,19 @@ class Records:
         return self._lines[self.at - 1]
 
     def wrong(self, problem: str) -> InputError:
-        """What to raise here."""
+        """Return what to raise here."""
         return InputError(self.path, f"line {self.at}", problem)
 
 
+#: meshio's name of the element types that public decks show.
+CELLS = {7: "hexahedron", 134: "tetra", 138: "triangle"} | dict.fromkeys((18, 75, 139, 140), "quad")
 #: Columns of a vector's name.
 NAME = 48
 
 
 @dataclass(frozen=True, eq=False)
 class T19Mesh:
-    """numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
+    """Numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
 
     numbers: NDArray[np.int64]
     points: Array
@@ -145,7 +146,7 @@ class T19Mesh:
 
 @dataclass(eq=False)
 class T19Frame:
-    """One increment: total time, its number, and vectors by name (nodes of the mesh, c)."""
+    """An increment: total time, its number, and vectors by name (nodes of the mesh, c)."""
 
     time: float = 0.0
     increment: int = 0
@@ -155,9 +156,7 @@ class T19Frame:
 class T19File:
     """A post file, checked as it is read: `mesh`, then `frames()` one by one.
 
-    Raises
-    ------
-    InputError : no such file, not a formatted post file, truncated or corrupt (which line).
+    InputError: no such file, not a formatted post file, truncated or corrupt (which line).
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -170,10 +169,10 @@ class T19File:
         self._first = self._file.at
 
     def frames(self, ended: bool = True) -> Iterator[T19Frame]:
-        """Every increment, in the file's order.
+        """Yield every increment, in the file's order.
 
         ended : the job ended, and the file with its mark. If it did not, the file may stop
-            anywhere, and the last whole increment is the last.
+        anywhere, and the last whole increment is the last.
         """
         self._file.at = self._first
         while True:
@@ -266,3 +265,24 @@ class T19File:
         if not (np.diff(numbers) > 0).all():
             raise self._file.wrong("node numbers do not increase")
         return numbers.astype(np.int64), np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
+
+
+def read(filename: Path | str) -> meshio.Mesh:
+    """Return mesh and last increment for `meshio.read("job.t19")`; `field_data`: time, increment.
+
+    InputError: truncated or corrupt, or an element type that is not known here. (meshio itself
+    would end the program on a ReadError.)
+    """
+    from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
+
+    file = T19File(filename)
+    kinds = {kind: (name, None) for kind, name in CELLS.items()}
+    cells = cell_blocks(file.path, file.mesh.numbers, file.mesh.elements, kinds)
+    mesh = meshio.Mesh(file.mesh.points, cells)
+    for frame in file.frames():
+        mesh.point_data = dict(frame.fields)
+        mesh.field_data = {name: np.array([getattr(frame, name)]) for name in ("time", "increment")}
+    return mesh
+
+
+meshio.register_format("t19", [".t19"], read, {})

@@ -1,7 +1,5 @@
 """The comparison with published biaxial constants, on computed paths: what is met and missed."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """A fit that is killed at random moments and gone on with: a few of the benchmark's kills."""
 
-from __future__ import annotations
-
 import random
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The thesis' statements on bending: checked on made-up runs, and on what the command writes."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

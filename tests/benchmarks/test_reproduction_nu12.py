@@ -1,7 +1,5 @@
 """The thesis' Fig. 4.2 as the reproduction script has it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

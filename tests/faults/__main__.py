@@ -5,8 +5,6 @@ Without names all of them; NAME is any part of a fault's name. Prints a line a f
 1 where one escapes its tests, or where a test does not pass without it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The list of faults, and what putting one in means."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The list of faults stays true: each can still be put in, and names tests that are there."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

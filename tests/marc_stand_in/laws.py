@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -54,68 +54,45 @@ class NotCompiled(Exception):
 
 @dataclass(frozen=True)
 class Piecewise:
-    """beta holds the coefficients of every piece of E1, then of E2 and of G12.
+    """The form of a law whose beta holds the coefficients of every piece of E1, E2 and G12.
 
     ends : the strains at which one piece of E1, E2, G12 gives way to the next.
     """
 
     ends: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
-
     name = "piecewise"
 
     @property
-    def counts(self) -> list[int]:
-        return [len(ends) + 1 for ends in self.ends]
-
-    @property
     def size(self) -> int:
-        return 4 * sum(self.counts)
+        return 4 * sum(len(ends) + 1 for ends in self.ends)
 
     @property
-    def labels(self) -> tuple[str, ...]:
-        return tuple(f"beta_{i}" for i in range(self.size))
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        return tuple(range(self.size))
-
-    @property
-    def modulus_of(self) -> tuple[str, ...]:
-        names = zip(("E1", "E2", "G12"), self.counts, strict=True)
-        return tuple(name for name, count in names for _ in range(4 * count))
+    def free(self) -> range:
+        return range(self.size)
 
     def piece_map(self) -> Array:
-        whole, first = np.zeros((3, max(self.counts), 4, self.size)), 0
-        for component, count in enumerate(self.counts):
-            for piece in range(max(self.counts)):
-                begin = first + 4 * min(piece, count - 1)
+        most = max(map(len, self.ends)) + 1
+        whole, first = np.zeros((3, most, 4, self.size)), 0
+        for component, ends in enumerate(self.ends):
+            for piece in range(most):
+                begin = first + 4 * min(piece, len(ends))
                 whole[component, piece, :, begin : begin + 4] = np.eye(4)
-            first += 4 * count
+            first += 4 * (len(ends) + 1)
         return whole
 
     def uppers(self) -> Array:
-        longest = max(self.counts) - 1
-        rows = [[*ends, *[UNLIMITED] * (longest - len(ends)), UNLIMITED] for ends in self.ends]
-        return np.array(rows, dtype=float)
+        most = max(map(len, self.ends)) + 1
+        return np.array([[*ends, *[UNLIMITED] * (most - len(ends))] for ends in self.ends], float)
 
     def grid(self, component: int, end: float) -> Array:
         knots = [0.0, *(at for at in self.ends[component] if at < end), end]
         return np.unique(np.concatenate([np.linspace(a, b, 31) for a, b in pairwise(knots)]))
 
-    def from_values(self, strain_range: Sequence[float]) -> Array:
-        return np.eye(self.size)
-
-    def to_card(self) -> dict[str, object]:
-        return {}
-
-    def describe(self) -> str:
-        return "beta: coefficients of the pieces of E1, E2, G12, highest power first."
-
 
 def piecewise_law(
     e1: ArrayLike, e2: ArrayLike, g12: ArrayLike, nu12: float = 0.24, thickness: str = "constant"
 ) -> HypoelasticLaw:
-    """The law of three moduli (n, 5), MPa: the upper end of each piece and its coefficients."""
+    """Return the law of three moduli (n, 5), MPa: upper end and coefficients of each piece."""
     curves = [np.asarray(curve, dtype=float) for curve in (e1, e2, g12)]
     form = Piecewise(tuple(tuple(curve[:-1, 0].tolist()) for curve in curves))  # type: ignore[arg-type]
     beta = np.concatenate([curve[:, 1:].ravel() for curve in curves])
@@ -124,7 +101,7 @@ def piecewise_law(
 
 
 def law_of_tables(content: Content) -> HypoelasticLaw:
-    """The law of a deck with NLELAST."""
+    """Return the law of a deck with NLELAST."""
     material = content.material
     if material.tables[2] != 0:
         raise DeckError("nlelast: nu12 with a table")
@@ -132,19 +109,14 @@ def law_of_tables(content: Content) -> HypoelasticLaw:
     for name, k in (("E1", 0), ("E2", 1), ("G12", 3)):
         factor, number = material.multipliers[k], material.tables[k]
         if number == 0:
-            curves.append(_held(factor))
+            curves.append([[1.0, 0.0, 0.0, 0.0, factor]])
             continue
         curves.append(_of_table(content.tables[number], name, factor))
     return piecewise_law(*curves, material.multipliers[2])
 
 
-def _held(value: float, end: float = 1.0) -> Array:
-    """(1, 5) one piece of a constant modulus; it is held beyond `end`."""
-    return np.array([[end, 0.0, 0.0, 0.0, value]])
-
-
 def _of_table(table: Table, name: str, factor: float) -> Array:
-    """Pieces (n, 5) of the modulus for strains from zero up, after a look at those below."""
+    """Return pieces (n, 5) of the modulus for strains from zero up, after a look at those below."""
     x, y = table.x, factor * table.y
     if not (y > 0).all():
         raise DeckError(f"table {table.number} of {name}: a modulus is not above 0")
@@ -157,7 +129,7 @@ def _of_table(table: Table, name: str, factor: float) -> Array:
     if x[0] != 0.0:
         raise DeckError(f"table {table.number} of {name} has no point at zero")
     if np.ptp(y) <= EXACT * y.max():
-        return _held(float(y[0]), float(x[-1]))
+        return np.array([[x[-1], 0.0, 0.0, 0.0, y[0]]])
     if y[-1] == y[-2]:  # the point that holds the end
         x, y = x[:-1], y[:-1]
     rows, i = [], 0
@@ -175,7 +147,7 @@ def _of_table(table: Table, name: str, factor: float) -> Array:
 
 
 def _stretch(x: Array, y: Array, first: int, powers: Powers) -> tuple[int, Array | None]:
-    """Last point of the longest stretch from `first` on that lies on one cubic, and the cubic.
+    """Return the last point of the longest stretch from `first` on one cubic, and the cubic.
 
     Equal values are one from two on; other cubics from FEWEST on.
     """
@@ -194,7 +166,7 @@ def _stretch(x: Array, y: Array, first: int, powers: Powers) -> tuple[int, Array
 
 
 def _cubic(x: Array, y: Array, powers: Powers, size: float) -> Array | None:
-    """(4,) of the one cubic through all points, to `size`; None where there is none."""
+    """Return the one cubic (4,) through all points, to `size`; None where there is none."""
     scale = float(np.abs(x).max())
     weights = scale ** np.arange(3, -1, -1)
     rows = powers(x) / weights
@@ -205,7 +177,7 @@ def _cubic(x: Array, y: Array, powers: Powers, size: float) -> Array | None:
 
 
 def compiled(source: Path, folder: Path) -> ctypes.CDLL:
-    """The subroutine as a library."""
+    """Return the subroutine as a library."""
     compiler = shutil.which("gfortran")
     if compiler is None:
         raise NotCompiled("gfortran: command not found")
@@ -232,7 +204,7 @@ class Point:
         self.strain, self.stress, self.states = np.zeros(3), np.zeros(3), np.zeros(states)
 
     def step(self, increment: Array) -> Array | None:
-        """Stress after an increment of strain; None where the subroutine ends the job."""
+        """Return the stress after an increment of strain; None if the subroutine ends the job."""
         d, g, zero = np.zeros((3, 3), order="F"), np.zeros(3), np.zeros(99)
         e, de = self.strain.copy(), np.array(increment, dtype=float)
         s, t = self.stress.copy(), self.states.copy()
@@ -249,12 +221,7 @@ class Point:
 
 
 def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
-    """The law that the subroutine carries.
-
-    Raises
-    ------
-    DeckError : its moduli are no cubics, piece by piece.
-    """
+    """Return the law that the subroutine carries; DeckError: its moduli are no cubics."""
     thickness = _thickness(library, states)
     thin = 1.0 if thickness == "incompressible" else 0.0
     # A modulus below zero strain is that at zero, so that a step down gives it exactly.
@@ -271,7 +238,7 @@ def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
 def _tangents(
     library: ctypes.CDLL, states: int, component: int, sign: int, thin: float, steps: int
 ) -> Array:
-    """(steps, 3) change of Cauchy stress over that of the strain, step by step."""
+    """Return the change of Cauchy stress over that of the strain, step by step, (steps, 3)."""
     point, increment = Point(library, states), np.zeros(3)
     increment[component] = sign * REACH / STEPS
     stress = [np.zeros(3)]
@@ -286,7 +253,7 @@ def _tangents(
 
 
 def _thickness(library: ctypes.CDLL, states: int) -> ThicknessChange:
-    """Whether a stress falls as the surface grows: shear stress does not know of eps1 otherwise."""
+    """Return "incompressible" if stress falls as the surface grows, by a shear stress over eps1."""
     point = Point(library, states)
     before = point.step(np.array([0.0, 0.0, 1e-3]))
     after = point.step(np.array([1e-3, 0.0, 0.0]))
@@ -301,7 +268,7 @@ def _thickness(library: ctypes.CDLL, states: int) -> ThicknessChange:
 
 
 def _pieces(y: Array) -> Array:
-    """Pieces (n, 5) of a modulus from its means over the steps; held beyond the last."""
+    """Return pieces (n, 5) of a modulus from its means over the steps; held beyond the last."""
     step = REACH / STEPS
     middle = step * (np.arange(len(y)) + 0.5)
     stretches, i = [], 0
@@ -322,14 +289,15 @@ def _pieces(y: Array) -> Array:
 
 
 def _mean_powers(middle: Array) -> Array:
-    """(n, 4) means of powers, highest first, over the steps with these middles."""
+    """Return means of powers (n, 4), highest first, over the steps with these middles."""
     a, b = middle - 0.5 * REACH / STEPS, middle + 0.5 * REACH / STEPS
     columns = [(a + b) * (a * a + b * b) / 4, (a * a + a * b + b * b) / 3, (a + b) / 2, 1 + 0 * a]
     return np.stack(columns, axis=1)
 
 
 def _place(mean: float, step: int, before: Array, after: Array) -> float:
-    """Where in a step one cubic gives way to another, when this is its mean over the step."""
+    """Return the strain in a step where one cubic gives way to another, from the mean over the
+    step."""
     start, end = REACH / STEPS * step, REACH / STEPS * (step + 1)
 
     def off(place: float) -> float:

@@ -26,7 +26,7 @@ NEAR = 0.2
 
 @dataclass
 class Schedule:
-    """times (increments,) at their ends; case (increments,) from 0; steps (increments,)."""
+    """The increments: times (n,) at their ends; case (n,) from 0; steps (n,)."""
 
     times: NDArray[np.float64]
     case: NDArray[np.int64]
@@ -36,7 +36,7 @@ class Schedule:
 
 
 def schedule_of(content: Content) -> Schedule:
-    """The increments; DeckError where a table ends before them."""
+    """Return the increments; DeckError where a table ends before them."""
     counts = [case.increments for case in content.cases]
     case = np.repeat(np.arange(len(counts)), counts)
     steps = np.array([content.cases[i].step for i in case])
@@ -51,7 +51,7 @@ def schedule_of(content: Content) -> Schedule:
 
 
 def pressures(content: Content, schedule: Schedule, cases: int = 1) -> list[float]:
-    """MPa that inflates, at the end of every increment of the first `cases` load cases."""
+    """Return the MPa that inflates, at the increments of the first `cases` load cases."""
     loads = [content.conditions[name] for name in schedule.first]
     loads = [c for c in loads if c.kind != "fixed"]
     if len(loads) != 1 or loads[0].tables == [0]:
@@ -66,7 +66,7 @@ def pressures(content: Content, schedule: Schedule, cases: int = 1) -> list[floa
 
 
 def held(content: Content, names: list[str]) -> dict[int, tuple[int, ...]]:
-    """By node (from 0): translations (0 to 2) that these conditions hold at zero."""
+    """Return by node (from 0) the translations (0 to 2) that these conditions hold at zero."""
     found: dict[int, set[int]] = {}
     for name in names:
         c = content.conditions[name]
@@ -82,7 +82,7 @@ def held(content: Content, names: list[str]) -> dict[int, tuple[int, ...]]:
 def supported(
     content: Content, nodes: dict[int, tuple[int, ...]], **sets: Any
 ) -> tuple[Mesh, dict[str, tuple[int, ...]]]:
-    """The mesh, with a node set for each way of being held, and what each holds."""
+    """Return the mesh, with a node set for each way of being held, and what each holds."""
     ways: dict[tuple[int, ...], list[int]] = {}
     for node, dofs in nodes.items():
         ways.setdefault(dofs, []).append(node)
@@ -95,11 +95,9 @@ def supported(
 def model_of(
     content: Content, schedule: Schedule, law: HypoelasticLaw
 ) -> tuple[Any, NDArray[np.bool_]]:
-    """Return the model, and in which increments (increments,) of the deck nothing moves.
+    """Return the model, and in which increments (n,) of the deck nothing moves.
 
-    Raises
-    ------
-    DeckError : Marc would run this, the stand-in cannot.
+    DeckError: Marc would run this, the stand-in cannot.
     """
     if content.gas is not None or np.ptp(content.coordinates[:, 2]) > 1e-9:
         return _closed_model(content, schedule, law)
@@ -117,7 +115,7 @@ def model_of(
 
 
 def _strip(content: Content, schedule: Schedule, thickness: float, warp: Array) -> UniaxialModel:
-    """Its gauge is a line from a pulled node to one that is held, along the pull."""
+    """Return the strip; its gauge is a line along the pull, from a pulled node to a held one."""
     conditions = [content.conditions[name] for name in schedule.first]
     moved = [c for c in conditions if any(c.values)]
     if len(moved) != 1 or moved[0].dofs != [2] or moved[0].values != [-1.0]:
@@ -168,7 +166,7 @@ def _closed_model(
 
 
 def _as_expected(content: Content) -> None:
-    """Three load cases with what each has to hold."""
+    """Raise DeckError unless there are three load cases with what each has to hold."""
     kinds = []
     for case in content.cases:
         conditions = [content.conditions[name] for name in case.conditions]
@@ -182,7 +180,7 @@ def _as_expected(content: Content) -> None:
 def _bodies(
     content: Content, schedule: Schedule, position: Array
 ) -> tuple[list[RigidCylinder], RigidCylinder, Array]:
-    """Support, collar, and mm that the collar has gone down from touching, after inflation."""
+    """Return support, collar, and mm of the collar below touching, after inflation."""
     support, collar = content.bodies[1:]
     post, ring = support_of(support), collar_of(collar)
     later = schedule.times[schedule.case > 0]
@@ -214,7 +212,7 @@ def _path(content: Content, body: Body, time: float) -> Array:
 
 
 def _sections(content: Content) -> tuple[Array, Array]:
-    """(elements,) thickness and (elements, 3) warp."""
+    """Return thickness (elements,) and warp (elements, 3)."""
     count = content.parameters.elements
     thickness, warp = np.zeros(count), np.zeros((count, 3))
     for value, name in content.thickness:
@@ -225,7 +223,7 @@ def _sections(content: Content) -> tuple[Array, Array]:
 
 
 def support_of(body: Body) -> RigidCylinder:
-    """A post along x: all corners on one circle, patches facing away from its axis."""
+    """Return a post along x: all corners on one circle, patches facing away from its axis."""
     corners = _corners(body)
     centre, radius = _circle(corners[:, 1:], body)
     _facing(body, np.array([0.0, *centre]), 0, outwards=True)
@@ -233,7 +231,7 @@ def support_of(body: Body) -> RigidCylinder:
 
 
 def collar_of(body: Body) -> RigidCylinder:
-    """A ring along z: its inner cylinder, and a mouth on a circle in the planes through the axis.
+    """Return a ring along z: its inner cylinder, and a mouth on a circle in planes of the axis.
 
     What is there has to be a part of the ring that is alike on both sides of z = 0.
     """
@@ -258,7 +256,7 @@ def collar_of(body: Body) -> RigidCylinder:
 
 
 def first_touch(body: Body, nodes: Array) -> float:
-    """mm that the patches of a ring go down until one of `nodes` (n, 3) lies on one of them.
+    """Return mm that the patches of a ring go down until one of `nodes` (n, 3) lies on one of them.
 
     Straight down from each patch: a node above its plane, and between its ends along z, is met.
     """
@@ -283,7 +281,7 @@ def _corners(body: Body) -> Array:
 
 
 def _circle(points: Array, body: Body) -> tuple[Array, float]:
-    """Centre (2,) and radius of the circle through all points (n, 2)."""
+    """Return centre (2,) and radius of the circle through all points (n, 2)."""
     middle = points.mean(axis=0)
     arm = points - middle
     rows = np.column_stack([2.0 * arm, np.ones(len(arm))])
@@ -295,7 +293,7 @@ def _circle(points: Array, body: Body) -> tuple[Array, float]:
 
 
 def _facing(body: Body, centre: Array, axis: int, outwards: bool) -> None:
-    """Corners counter-clockwise seen from the fabric: normals point to it."""
+    """Raise DeckError unless corners are counter-clockwise seen from the fabric."""
     normal = np.cross(
         body.patches[:, 2] - body.patches[:, 0], body.patches[:, 3] - body.patches[:, 1]
     )

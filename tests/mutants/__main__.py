@@ -1,101 +1,150 @@
-"""`make mutants`: small faults put into the code; the ones that no test notices are listed."""
+"""`make mutants`: run cosmic-ray over a copy of the code, and list the faults no test notices."""
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import suppress
 from pathlib import Path
 from random import Random
-from subprocess import TimeoutExpired
+from tempfile import TemporaryDirectory
 
 import click
+import psutil
+from cosmic_ray.config import serialize_config
+from cosmic_ray.work_db import WorkDB, use_db
+from cosmic_ray.work_item import TestOutcome, WorkItem, WorkResult
 
-from . import house, judging, listing, rooms
-from .drawing import Mutant, draw
-from .judging import Verdict
-from .measured import Measured, measure, near
+ROOT = Path(__file__).resolve().parents[2]
+#: Code that reports, resumes, validates and converts units; numerics have other tests.
+MUTATED = (
+    "readers/**/*.py", "experiments/**/*.py", "project/*.py", "inference/assessment.py",
+    "inference/comparison.py", "inference/search.py", "inference/resampling.py",
+    "materials/card.py", "reports/*.py", "runs/*.py", "writing.py",
+)  # fmt: skip
+#: Operators that leave code which does not load, or change annotations alone.
+LEFT_OUT = re.compile(r".*(RemoveDecorator|NoOp|Bit(Or|And|Xor)|Shift|Invert|_Is(Not)?(_|$))")
+
+
+def git(*arguments: str) -> list[str]:
+    """Return the lines that git prints; none where it fails."""
+    done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True)
+    return done.stdout.splitlines() if done.returncode == 0 else []
+
+
+def files_of(changed: str | None) -> list[str]:
+    """Return the mutated modules that differ from a commit (1: where origin/main was left)."""
+    paths = {str(path.relative_to(ROOT)) for one in MUTATED for path in ROOT.glob(one)}
+    if changed == "1":
+        base = git("merge-base", "HEAD", "origin/main")
+        changed = base[0] if base and base != git("rev-parse", "HEAD") else "HEAD~1"
+    if changed:
+        untracked = git("ls-files", "--others", "--exclude-standard")
+        paths &= {*git("diff", "--name-only", changed), *untracked}
+    return sorted(path for path in paths if (ROOT / path).stat().st_size)
+
+
+def copied(place: Path) -> Path:
+    """Return a copy of the working tree, `bubblefit`, with the measured data beside it."""
+    copy = place / "bubblefit"
+    for name in git("ls-files", "--cached", "--others", "--exclude-standard"):
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    if (ROOT.parent / "shared").is_dir():
+        (place / "shared").symlink_to((ROOT.parent / "shared").resolve())
+    return copy
+
+
+def tests_near(file: str) -> list[str]:
+    """Return the test files in the folder that mirrors a module's, or that import it; own first."""
+    module = "bubblefit." + file.removesuffix(".py").replace("/", ".")
+    package, _, name = module.removesuffix(".__init__").rpartition(".")
+    imports = re.compile(rf"{re.escape(package)}(\.| import .*\b){name}\b")
+    folder = ROOT / "tests" / (Path(file).parent if "/" in file else "none")
+    every = sorted((ROOT / "tests").rglob("test_*.py"))
+    every.sort(key=lambda at: at.stem != f"test_{name}")
+    near = [at for at in every if at.parent == folder or imports.search(at.read_text())]
+    return [str(at.relative_to(ROOT)) for at in near]
+
+
+def cosmic_ray(arguments: Sequence[str], copy: Path, end: float) -> bool:
+    """Run cosmic-ray until `end` at most, with all that it has started; True if it ended well."""
+    # In CI, a test that lacks its tools would fail.
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("CI", "PYTEST", "COV"))}
+    environment |= {"PYTHONPATH": str(copy.parent), "MPLBACKEND": "Agg"}
+    command = [sys.executable, "-m", "cosmic_ray.cli", *arguments]
+    with (copy.parent / "log").open("w") as log:
+        child = psutil.Popen(command, cwd=copy, env=environment, stdout=log, stderr=log)
+        try:
+            return bool(child.wait(max(0.1, min(end - time.monotonic(), 1e6))) == 0)
+        except psutil.TimeoutExpired:
+            with suppress(psutil.NoSuchProcess):
+                for process in [child, *child.children(recursive=True)]:
+                    process.kill()
+            return False
+
+
+def drawn(items: Sequence[WorkItem], seed: int, number: int | None) -> dict[str, list[WorkItem]]:
+    """Return `number` mutants by file, in random order: one of a place in the code at most."""
+    places = {}
+    for item in Random(seed).sample(items, len(items)):
+        mutation = item.mutations[0]
+        if not LEFT_OUT.match(mutation.operator_name):
+            places.setdefault((str(mutation.module_path), mutation.start_pos), item)
+    files: dict[str, list[WorkItem]] = {}
+    for (file, _), item in list(places.items())[:number]:
+        files.setdefault(file, []).append(item)
+    return files
 
 
 @click.command()
 @click.argument("files", nargs=-1)
 @click.option("--changed", help="only files that differ from this commit (1: from origin/main)")
 @click.option("--number", type=int, help="how many mutants are drawn  [one of every place]")
-@click.option("--seed", type=int, help="of what is drawn  [of the commit]")
+@click.option("--seed", type=int, default=1, show_default=True, help="of what is drawn")
 @click.option("--minutes", type=float, help="end after this long, with what was tried so far")
 @click.option("--also", multiple=True, help="tests beside those near a module: a file or folder")
-@click.option("--limit", type=float, default=60.0, show_default=True, help="tests' s a mutant")
-@click.option("--processes", type=int, default=2, show_default=True, help="at a time")
+@click.option("--limit", type=float, default=120.0, show_default=True, help="tests' s a mutant")
 @click.option("--out", type=Path, default=Path("out/mutants"), show_default=True)
-def main(
-    files: Sequence[str],
-    changed: str | None,
-    number: int | None,
-    seed: int | None,
-    minutes: float | None,
-    also: Sequence[str],
-    limit: float,
-    processes: int,
-    out: Path,
-) -> None:
-    """Mutants of FILES (of all rooms that assess, report, resume, validate and convert units)."""
-    end = time.monotonic() + 60.0 * minutes if minutes else float("inf")
-    # A sixth of the time at most for one mutant.
-    limit = min(limit, 10.0 * minutes) if minutes else limit
-    chosen = list(files) or (rooms.changed(changed) if changed else rooms.files())
-    if not chosen:
-        click.echo("nothing to mutate: no file of these rooms was changed")
-        return
-    seed = rooms.commit_number() if seed is None else seed
-    click.echo(f"drawing from {len(chosen)} files, seed {seed}")
-    out.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as stack:
-        copies = [stack.enter_context(house.copy()) for _ in range(processes)]
-        # Within a time limit, file by file: there is a list of survivors whatever the limit.
-        groups = [chosen] if minutes is None else [[file] for file in _mixed(chosen, seed)]
-        verdicts: list[Verdict] = []
-        for group in groups:
+def main(files: Sequence[str], changed: str | None, number: int | None, seed: int,
+         minutes: float | None, also: Sequence[str], limit: float, out: Path) -> None:  # fmt: skip
+    """Try mutants of FILES (of all that assesses, reports, resumes, validates, converts units)."""
+    end = time.monotonic() + 60.0 * (minutes or 1e6)
+    results: list[WorkResult] = []
+    with TemporaryDirectory(prefix="bubblefit-mutants-", ignore_cleanup_errors=True) as place:
+        copy, config, session = copied(Path(place)), f"{place}/config", f"{place}/session"
+        settings = {"module-path": list(files) or files_of(changed), "timeout": limit}
+        settings |= {"distributor": {"name": "local"}, "test-command": ""}
+        Path(config).write_text(serialize_config(settings))
+        cosmic_ray(["init", config, session], copy, end)
+        with use_db(session) as database:
+            mutants = drawn(database.work_items, seed, number)
+        for file, items in mutants.items():
             if time.monotonic() >= end:
                 break
-            mutants = _drawn(copies[0], group, seed, number)
-            if not mutants:
+            pytest = f"{sys.executable} -m pytest -q -x -p no:cacheprovider -m 'not slow'"
+            settings["test-command"] = " ".join([pytest, *(tests_near(file) or ["none"]), *also])
+            Path(config).write_text(serialize_config(settings))
+            if not cosmic_ray(["baseline", config], copy, min(end, time.monotonic() + limit)):
+                click.echo(f"{file}: no time for its tests, or there are none that pass")
                 continue
-            try:
-                measured = _measured(copies[0], mutants, also, processes, _left(end))
-            except TimeoutExpired:
-                click.echo(f"no time for {' '.join(group)}: its tests take longer than is left")
-                continue
-            for verdict in judging.verdicts(copies, mutants, measured, limit, end):
-                verdicts.append(verdict)
-                mutant = verdict.mutant
-                click.echo(f"{verdict.outcome:9s} {mutant.file}:{mutant.line}", err=True)
-    for name, text in (("survivors", listing.survivors), ("caught", listing.caught)):
-        (out / f"{name}.txt").write_text(f"{listing.summary(verdicts)}\n\n{text(verdicts)}\n")
-    click.echo(f"{listing.survivors(verdicts)}\n\n{listing.summary(verdicts)}")
-    click.echo(f"listed in {out}/survivors.txt")
-
-
-def _drawn(copy: Path, group: Sequence[str], seed: int, number: int | None) -> list[Mutant]:
-    return list(draw({file: (copy / file).read_text() for file in group}, seed, number))
-
-
-def _measured(
-    copy: Path, mutants: Sequence[Mutant], also: Sequence[str], processes: int, left: float | None
-) -> Measured:
-    """The files that were drawn from, by the tests near them."""
-    files = sorted({mutant.file for mutant in mutants})
-    tests = {*also, *(test for file in files for test in near(copy, file))}
-    return measure(copy, files, sorted(tests), copy.parent / "run", processes, left)
-
-
-def _mixed(files: Sequence[str], seed: int) -> list[str]:
-    order = list(files)
-    Random(seed).shuffle(order)
-    return order
-
-
-def _left(end: float) -> float | None:
-    return None if end == float("inf") else end - time.monotonic()
+            with use_db(session, WorkDB.Mode.open) as database:
+                database.clear()
+                database.add_work_items(items)
+            cosmic_ray(["exec", config, session], copy, end)
+            with use_db(session, WorkDB.Mode.open) as database:
+                results += [result for _, result in database.results]
+    out.mkdir(parents=True, exist_ok=True)
+    for name, outcome in (("caught", TestOutcome.KILLED), ("survivors", TestOutcome.SURVIVED)):
+        found = [one.diff for one in results if one.test_outcome is outcome]
+        click.echo(f"{len(found)} of {len(results)} mutants: {out}/{name}.txt")
+        (out / f"{name}.txt").write_text("\n\n".join(found) + "\n")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,6 @@
 The fit, which is costly, is run once: it goes wrong in many ways at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Notes of the membrane's analyses, provoked."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 A run of Marc goes wrong in many ways at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -15,12 +13,11 @@ import numpy as np
 import pytest
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.notes import Note
-from bubblefit.solvers.calculix import cylinder_results as cylinder_analysis
-from bubblefit.solvers.calculix.cylinder import solid_mesh
-from bubblefit.solvers.calculix.cylinder_results import BentCylinder, volumes
+from bubblefit.solvers.calculix import cylinder as cylinder_analysis
+from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
 from bubblefit.solvers.marc.cylinder import may_touch
-from bubblefit.solvers.marc.results import bubble_history
+from bubblefit.solvers.marc.sheets import bubble_history
 from bubblefit.solvers.marc.solver import MarcSolver
 
 from ..inference.cases import MODEL

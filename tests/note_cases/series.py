@@ -1,7 +1,5 @@
 """Notes of simulations and studies of bars, of gauges and of exports, provoked."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

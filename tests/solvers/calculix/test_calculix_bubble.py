@@ -14,7 +14,6 @@ from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
 from bubblefit.runs.verification.published import cases, shapes
 from bubblefit.solvers.base import Solver
-from bubblefit.solvers.calculix.bubble import decks
 from bubblefit.solvers.calculix.deck import (
     pressure_forces,
     rim_paths,
@@ -22,6 +21,7 @@ from bubblefit.solvers.calculix.deck import (
     tilt_remarks,
     without_stress,
 )
+from bubblefit.solvers.calculix.sheets import bubble_decks
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -141,7 +141,7 @@ def test_a_rim_stays_through_the_first_increment_of_a_step():
     np.testing.assert_allclose(times, [0, 0.01, 1, 1.01, 2, 2.01, 3, 3.01, 4])
     assert heights[0] == heights[1] and heights[2] == heights[3]
     np.testing.assert_allclose(heights[2::2], model.rim_motion[:, 1, 2])
-    text = decks(model, LINEAR, shell_mesh(model.mesh, "S8R"), "S8R")["job.inp"]
+    text = bubble_decks(model, LINEAR, shell_mesh(model.mesh, "S8R"), "S8R")["job.inp"]
     firsts = [float(f) for f in re.findall(r"STATIC, SOLVER=SPOOLES\n([^,]+),", text)]
     assert max(firsts) <= 0.01 and text.count("TIME=TOTAL TIME") == len(paths)
     assert not rim_paths(shell_mesh(bubble(64).mesh, "S8R"), bubble(64))
@@ -229,7 +229,7 @@ def test_pressure_on_a_tilted_surface_is_pressure_times_area(element):
 
 def test_the_deck_reads_as_written_by_hand():
     model = bubble(64)
-    text = decks(model, CUBIC, shell_mesh(model.mesh, "S8R"), "S8R")["job.inp"]
+    text = bubble_decks(model, CUBIC, shell_mesh(model.mesh, "S8R"), "S8R")["job.inp"]
     assert "S8R" in text and "*SHELL SECTION, ELSET=MEMBRANE" in text
     assert text.count("*STEP") == len(model.increments)
     assert "MEMBRANE, P, 0.022\n" in text

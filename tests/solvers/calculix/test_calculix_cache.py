@@ -1,7 +1,5 @@
 """The same fit with CalculiX a second time: no CalculiX runs, and it says so."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The inflated cylinder on CalculiX: solids, deck, and the tube's middle against closed forms."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from dataclasses import replace
@@ -17,20 +15,18 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (
     ABOVE,
+    BentCylinder,
     GasCurve,
     bending_context,
+    bending_history,
+    bent_cylinder,
     better_pressure,
     body_nodes,
     compliance,
     cylinder_decks,
     gas_pressure,
-    solid_mesh,
-)
-from bubblefit.solvers.calculix.cylinder_results import (
-    BentCylinder,
-    bending_history,
-    bent_cylinder,
     inflation_history,
+    solid_mesh,
 )
 from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.frd import FrdFile

@@ -118,22 +118,20 @@ def test_its_exit_code_counts_whatever_it_says(fake):
     assert found.exit_number == 3
 
 
-def test_killed_in_the_middle(fake):
-    found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\nkill -9 $$"))
-    assert found.reason == "killed by SIGKILL after step 1, increment 2"
-
-
-def test_negative_jacobian(fake):
-    text = "*ERROR in e_c3d: nonpositive jacobian\\n         determinant in element          17\\n"
-    assert failure(fake(f"printf '{text}'; exit 201")).reason.startswith(
-        "negative Jacobian in element 17"
-    )
-
-
-def test_too_many_increments_is_no_convergence(fake):
-    text = " *ERROR in nonlingeo: max. # of increments reached"
-    found = failure(fake(f"cat > job.sta <<'.'\n{STA}.\necho '{text}'; exit 201"))
-    assert "did not converge at step 1, increment 3" in found.reason
+@pytest.mark.parametrize(
+    ("script", "reason"),
+    [
+        (f"cat > job.sta <<'.'\n{STA}.\nkill -9 $$", "killed by SIGKILL after step 1, increment 2"),
+        ("echo '*ERROR in e_c3d: nonpositive jacobian'; "
+         "echo '         determinant in element          17'; exit 201",
+         "negative Jacobian in element 17 at once"),
+        (f"cat > job.sta <<'.'\n{STA}.\n"
+         "echo ' *ERROR in nonlingeo: max. # of increments reached'; exit 201",
+         "did not converge at step 1, increment 3: the increments became too small or too many"),
+    ],
+)  # fmt: skip
+def test_a_bad_end_has_its_reason(fake, script, reason):
+    assert failure(fake(script)).reason == reason
 
 
 @pytest.mark.parametrize(

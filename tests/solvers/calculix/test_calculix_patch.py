@@ -1,7 +1,5 @@
 """A patch under biaxial loads on CalculiX: the strains of the law itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bubblefit.materials.responses import biaxial_response

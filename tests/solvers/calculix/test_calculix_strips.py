@@ -1,7 +1,5 @@
 """The three strips on CalculiX: agreement with the membrane and closed forms, the gauge, faults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,10 +11,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
-from bubblefit.solvers.calculix import strip
+from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import shell_mesh
+from bubblefit.solvers.calculix.sheets import StripRun, strip_history
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.calculix.strip import StripRun, strip_history
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.pulls import corrected
 
@@ -224,7 +222,7 @@ def test_the_deck(name, angle):
     coarse = model(name, 5)
     shells = shell_mesh(coarse.mesh, "S8R")
     pulls = np.array([1.0, 2.0, 3.0, 4.0, 5.1])
-    files = strip.strip_decks(coarse, LAW, shells, "S8R", pulls)
+    files = sheets.strip_decks(coarse, LAW, shells, "S8R", pulls)
     lines = files["job.inp"].splitlines()
     constants = ", ".join(lines[lines.index("*USER MATERIAL, CONSTANTS=9") + 1 :][:2]).split(", ")
     assert float(constants[4]) == pytest.approx(angle, abs=1e-12)

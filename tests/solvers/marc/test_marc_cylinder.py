@@ -1,7 +1,5 @@
 """The cylinder on Marc: cavity, contact, load cases; forces, volume and pressure of the results."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure

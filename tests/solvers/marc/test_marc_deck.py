@@ -1,7 +1,5 @@
 """The Marc deck: columns, counts, names; blocks that a site replaces."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -13,8 +11,8 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.meshes.tube import Refinement, cylinder_mesh
 from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set, set_lines
-from bubblefit.solvers.marc.plates import analyse, bubble_deck, strip_deck
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
+from bubblefit.solvers.marc.sheets import analyse_bubble, bubble_deck, strip_deck
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -416,4 +414,4 @@ def test_a_slack_sheet_and_a_rim_that_moves_are_refused(key) -> None:
     what = {"slack": (0.001, 0.0), "rim_motion": np.zeros((1, rim, 3))}[key]
     model = BubbleModel(mesh, 0.81, (0.1,), **{key: what})
     with pytest.raises(SolverFailure, match="no slack sheet and no rim that moves"):
-        analyse(model, HypoelasticLaw.linear(500.0, 250.0, 12.0), MarcSettings(), None)
+        analyse_bubble(model, HypoelasticLaw.linear(500.0, 250.0, 12.0), MarcSettings(), None)

@@ -1,7 +1,5 @@
 """Our decks and post files by a reader that is not ours: meshioplusplus."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
@@ -9,8 +7,8 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.marc.cylinder import bending_deck
-from bubblefit.solvers.marc.plates import bubble_deck
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.sheets import bubble_deck
 from bubblefit.solvers.marc.t19 import T19File
 
 from ... import needs

@@ -1,7 +1,5 @@
 """Where a site says how its Marc runs: project file, site file, environment, command line."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

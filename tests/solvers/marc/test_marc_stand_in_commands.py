@@ -1,7 +1,5 @@
 """Commands with the stand-in for Marc, from end to end."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

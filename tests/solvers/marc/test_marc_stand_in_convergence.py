@@ -1,7 +1,5 @@
 """The stand-in converges as far as the deck's control block says, and no further."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +7,8 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.solvers.marc.deck import TOLERANCE
-from bubblefit.solvers.marc.plates import bubble_deck
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.sheets import bubble_deck
 from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -1,7 +1,5 @@
 """The stand-in for Marc refuses decks that Marc would refuse, and takes every deck of ours."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -14,8 +12,8 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
-from bubblefit.solvers.marc.plates import bubble_deck, strip_deck
 from bubblefit.solvers.marc.settings import MarcSettings
+from bubblefit.solvers.marc.sheets import bubble_deck, strip_deck
 
 from ... import needs
 from ...fortran_build import LAWS

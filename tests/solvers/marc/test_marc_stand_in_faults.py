@@ -1,7 +1,5 @@
 """Every way in which the stand-in fails as Marc fails, and what the user is told of it."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

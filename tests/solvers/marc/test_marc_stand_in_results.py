@@ -1,7 +1,5 @@
 """Through deck, stand-in and .t19 come the membrane's results, to six digits."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,0 +1,285 @@
+"""Bubble, strip and patch in CalculiX: their decks of shells, and their results."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.strip_models import (
+    PULLED,
+    ROLLERS_PATCH,
+    SIDE,
+    PatchModel,
+    UniaxialModel,
+    elongations,
+)
+from ..base import History, extremes, log_strain
+from ..pulls import at_elongations, grip_pulls
+from .deck import (
+    FIRST_OF_STEP,
+    Run,
+    Setup,
+    ShellMesh,
+    deck_files,
+    pressure_forces,
+    rim_paths,
+    supports_of,
+    tilt_remarks,
+    without_stress,
+)
+from .frd import FrdFile
+from .library import constants
+
+Array = NDArray[np.float64]
+NEAR = 1e-6
+#: Largest residual force over the mean force, and largest correction over the largest change
+#: (CalculiX: 5e-3, 1e-2, off by up to 7e-3 mm). A bubble's are within 1.4e-6 mm of converged, for
+#: half as many iterations again. A strip's increments are a hundredth of the whole: the load is
+#: within 2e-8 of what the bubble's give, for a sixth fewer iterations.
+TOLERANCES, TOLERANCES_STRIP = (1e-7, 1e-6), (1e-5, 1e-4)
+#: First increment as a part of the first step: the flat disk has no stiffness but bending.
+FIRST = 0.003
+#: Least increment of the first step and of the others, or of one of the law. A later step that
+#: needs more cuts has met an instability, along which CalculiX would creep for hours.
+LEAST = (1e-6, 1 / 256)
+MOST_INCREMENTS = 200
+ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
+#: Of the force of a patch's edge: its corners and, where there is one, its midside.
+SHARES = {2: (0.5, 0.5), 3: (1 / 6, 1 / 6, 2 / 3)}
+
+
+def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
+    """Return displacement and nodal force at the total times 1 to `count`, (count, nodes, 3) each.
+
+    SolverFailure: the file is not there, damaged, or does not hold every one of them.
+    """
+    try:
+        file = FrdFile(path)
+        place = np.searchsorted(file.mesh.numbers, np.arange(1, nodes + 1))
+        place = np.minimum(place, len(file.mesh.numbers) - 1)
+        if (file.mesh.numbers[place] != np.arange(1, nodes + 1)).any():
+            raise InputError(path, "nodes", f"are not the deck's {nodes}")
+        frames = {round(f.time): f for f in file.frames() if abs(f.time - round(f.time)) < NEAR}
+        found = []
+        for step in range(1, count + 1):
+            for name in ("DISP", "FORC"):
+                values = frames[step].fields.get(name) if step in frames else None
+                if values is None or not np.isfinite(values[place]).all():
+                    at, problem = f"step {step} of {count}", f"holds no {name} at every node"
+                    raise InputError(path, at, problem)
+                found.append(values[place])
+    except InputError as error:
+        raise SolverFailure(f"no usable results: {error}", "calculix") from None
+    whole = np.array(found).reshape(count, 2, nodes, 3)
+    return whole[:, 0], whole[:, 1]
+
+
+def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+    """Inflate a bubble; SolverFailure where the run does not end well."""
+    shells = setup.shells(model.mesh)
+    files = bubble_decks(model, law, shells, setup.element, setup.templates)
+    sheet = without_stress(shells, model)
+
+    def history(frd: Path, iterations: int) -> History:
+        found = bubble_history(frd, model, sheet, iterations)
+        return replace(found, remarks=(*found.remarks, *tilt_remarks(sheet)))
+
+    return run(files, history)
+
+
+def bubble_decks(
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    shells: ShellMesh,
+    element: str,
+    folder: Path | None = None,
+) -> dict[str, str]:
+    """Return the text of `job.inp` and the mesh, of shells on the model's reference surface.
+
+    `folder` has the user's templates; InputError: one that cannot be used.
+    """
+    supports = {
+        name: held_directions(directions)
+        for name, directions in model.supports.items()
+        if name in model.mesh.node_sets
+    }
+    rim = rim_paths(shells, model)
+    later = FIRST_OF_STEP if rim else 1.0
+    context: dict[str, Any] = {
+        # The law's increments are the model's, whatever CalculiX makes of them.
+        "constants": constants(law, whole_times=True),
+        "thickness": model.thickness,
+        "supports": supports_of(supports),
+        "rim": rim,
+        "most_increments": MOST_INCREMENTS,
+        "steps": [
+            {"pressure": p, "first": later if i else FIRST, "least": LEAST[bool(i)]}
+            for i, p in enumerate(model.increments)
+        ],
+    }
+    sheet = without_stress(shells, model)
+    return deck_files("bubble.inp.j2", "Bubble", sheet, element, TOLERANCES, context, folder)
+
+
+def held_directions(directions: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a shell's degrees of freedom held where the membrane's directions are (from 0).
+
+    One direction: a plane of symmetry, where the shell does not turn about the other two axes.
+    More: a pinned edge, which may turn.
+    """
+    return (*directions, *(ROTATIONS[directions[0]] if len(directions) == 1 else ()))
+
+
+def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
+    """Return displacements, support forces and strains; `shells` are those without stress.
+
+    SolverFailure: the file is not there, damaged, or does not hold every increment.
+    """
+    u, nodal = whole_times(path, len(model.increments), len(shells.points))
+    keep, levels = model.reported, np.array(model.increments)
+    reactions: dict[str, Array] = {
+        name: np.zeros((len(keep), 3)) for name in model.supports if name in shells.node_sets
+    }
+    for frame, i in enumerate(keep):
+        # CalculiX reports internal forces: what the support gives and the pressure next to it.
+        support = nodal[i] - pressure_forces(shells.points + u[i], shells.elements, levels[i])
+        for name, sums in reactions.items():
+            sums[frame] = support[shells.node_sets[name]].sum(axis=0)
+    corners = np.ascontiguousarray(u[:, : shells.corners])
+    strain = log_strain(replace(model.mesh, points=model.stress_free), corners)
+    corners += model.stress_free - model.mesh.points
+    low, high = extremes(strain)
+    return History(
+        levels[keep], corners[keep], low, high, reactions, iterations=iterations, path=corners
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class StripRun:
+    """A pull: elongation of the gauge (increments,) mm, displacement and nodal force of the shells
+    (increments, nodes, 3) mm and N."""
+
+    gauge: Array
+    displacement: Array
+    force: Array
+
+
+def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+    """Pull a strip, its grips driven by `pulls`, to the model's elongations of the gauge.
+
+    SolverFailure: a run that did not end well, a gauge that did not reach its length.
+    """
+    shells = setup.shells(model.mesh)
+
+    def decks(pulls: Array) -> dict[str, str]:
+        return strip_decks(model, law, shells, setup.element, pulls, setup.templates)
+
+    def opened(pulls: Array) -> Array:
+        return run(decks(pulls), lambda frd, _: strip_run(frd, model, shells, len(pulls))).gauge
+
+    pulls, _ = grip_pulls(model, law, opened, "calculix")
+
+    def read(frd: Path, iterations: int) -> History:
+        return strip_history(strip_run(frd, model, shells, len(pulls)), model, shells, iterations)
+
+    return run(decks(pulls), read)
+
+
+def strip_decks(
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    shells: ShellMesh,
+    element: str,
+    pulls: Array,
+    folder: Path | None = None,
+) -> dict[str, str]:
+    """Return the text of each input file; `pulls` (increments,) mm of the pulled end, along -y."""
+    angle = math.degrees(math.atan2(model.warp[1], model.warp[0]))
+    context = {
+        # A law's increment is a whole time, whatever CalculiX makes of it.
+        "constants": constants(law, angle=angle, whole_times=True),
+        "thickness": model.thickness,
+        "supports": supports_of(model.supports),
+        "pulled": model.pulled.upper(),
+        "pulls": pulls.tolist(),
+        "least": LEAST[1],
+        "most_increments": 4 * len(pulls) + 200,
+    }
+    return deck_files("strip.inp.j2", "Strip", shells, element, TOLERANCES_STRIP, context, folder)
+
+
+def strip_run(path: Path, model: UniaxialModel, shells: ShellMesh, count: int) -> StripRun:
+    """Read the `count` increments of a .frd file; SolverFailure as `whole_times`."""
+    u, force = whole_times(path, count, len(shells.points))
+    lower, upper = (shells.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
+    return StripRun(np.linalg.norm(upper - lower, axis=1) - model.gauge_length, u, force)
+
+
+def strip_history(
+    run: StripRun, model: UniaxialModel, shells: ShellMesh, iterations: int
+) -> History:
+    """Return load, displacement and reactions where the gauge has the model's elongations.
+
+    SolverFailure: the gauge does not reach its length, or gets shorter on the way.
+    """
+
+    def at_levels(values: Array) -> Array:
+        return at_elongations(run.gauge, model, values, "calculix")
+
+    corners = np.ascontiguousarray(at_levels(run.displacement[:, : shells.corners]))
+    low, high = extremes(log_strain(model.mesh, corners, model.warp))
+    # What a support gives is what CalculiX calls the force of its nodes: the inner one.
+    sums = {
+        name: at_levels(run.force[:, shells.node_sets[name]].sum(axis=1))
+        for name in (*model.supports, model.pulled)
+    }
+    load = -model.load_factor * sums[model.pulled][:, 1]
+    return History(load, corners, low, high, sums, iterations=iterations, path=corners)
+
+
+def analyse_patch(model: PatchModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
+    """Load a patch with every one of its loads; SolverFailure where the run does not end well."""
+    shells, count = setup.shells(model.mesh), len(model.loads)
+    context = {
+        "constants": constants(law, whole_times=True),
+        "thickness": model.thickness,
+        "supports": supports_of(ROLLERS_PATCH),
+        "edges": [
+            {
+                "name": name.upper(),
+                "dof": axis + 1,
+                "forces": (SIDE * model.loads[:, axis]).tolist(),
+                # Number of each node, the midside last, and its share of the force.
+                "nodes": [
+                    (int(node) + 1, share)
+                    for node, share in zip(
+                        shells.node_sets[name], SHARES[len(shells.node_sets[name])], strict=True
+                    )
+                ],
+            }
+            for axis, name in enumerate(PULLED)
+        ],
+        "count": count,
+        "least": LEAST[1],
+        "most_increments": 4 * count + 200,
+    }
+
+    def read(frd: Path, iterations: int) -> History:
+        u, _ = whole_times(frd, count, len(shells.points))
+        corners = np.ascontiguousarray(u[:, : shells.corners])
+        strain = np.column_stack([np.log1p(elongations(corners)), np.zeros(len(corners))])
+        low, high = strain.min(axis=0), strain.max(axis=0)
+        return History(model.loads.sum(axis=1), corners, low, high, iterations=iterations)
+
+    files = deck_files(
+        "patch.inp.j2", "Patch", shells, setup.element, TOLERANCES_STRIP, context, setup.templates
+    )
+    return run(files, read)

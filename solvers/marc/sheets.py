@@ -1,0 +1,231 @@
+"""Bubble and strip in Marc: their decks, and what their post files hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError, SolverFailure
+from ...materials.law import HypoelasticLaw
+from ...meshes.bubble_model import BubbleModel
+from ...meshes.mesh import Mesh
+from ...meshes.strip_models import UniaxialModel
+from ...notes import Note, NoteKind
+from ..base import History, extremes, log_strain
+from ..pulls import at_elongations, grip_pulls
+from .deck import (
+    MEMBRANE,
+    Run,
+    deck_text,
+    fabric_context,
+    fixed,
+    named_set,
+    node_sets,
+    supports,
+    time_table,
+)
+from .settings import MarcSettings
+from .t19 import T19File
+
+Array = NDArray[np.float64]
+WARP = np.array([1.0, 0.0, 0.0])
+#: The set of all nodes.
+FLAT = "all_nodes"
+MOVED, REACTION = "Displacement", "Reaction Force"
+#: Six digits: times of some hundreds are good to this, nodes to this part of the mesh's size.
+NEAR_TIME, NEAR_PLACE = 1e-2, 1e-5
+NO_REACTIONS = (
+    f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
+    "(bubblefit docs marc)"
+)
+
+
+def analyse_bubble(
+    model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
+) -> History:
+    """Inflate a bubble.
+
+    SolverFailure: a run that did not end well; a sheet with slack, or a rim that moves, which these
+    decks do not have. InputError: as `bubble_deck`.
+    """
+    if any(model.slack) or model.rim_motion is not None:
+        raise SolverFailure(
+            "takes no slack sheet and no rim that moves, use another solver", "marc"
+        )
+    deck, count = bubble_deck(model, law, settings), len(model.increments)
+    return run(deck, count, lambda t19, iterations: bubble_history(t19, model, iterations))
+
+
+def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
+    """Return the deck of an inflation; total time counts the model's increments.
+
+    InputError: a template that cannot be used, a law that Marc's shells do not carry.
+    """
+    warp = WARP if model.mesh.warp is None else model.mesh.warp
+    fabric = fabric_context(model.mesh, warp, model.thickness)
+    sets = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
+    held = supports(sets, settings.element)
+    cases = [("inflation", len(model.increments), [*(one["name"] for one in held), "pressure"])]
+    tables = [time_table(1, "load", (0.0, *model.increments))]
+    named, pressure = node_sets(model.mesh, list(sets)), pressure_context(settings)
+    return deck_text("bubble.dat.j2", "Bubble", settings, law, fabric, named, cases, tables, held,
+                     pressure=pressure)  # fmt: skip
+
+
+def pressure_context(settings: MarcSettings) -> dict[str, float]:
+    """Return load type of a pressure on the fabric, and the magnitude that inflates by 1 MPa."""
+    return {"type": settings.pressure_type, "magnitude": float(settings.pressure_sign)}
+
+
+def analyse_strip(
+    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
+) -> History:
+    """Pull a strip, its grips driven by `pulls`.
+
+    SolverFailure: a run that did not end well, a gauge that did not reach its length. InputError:
+    as `strip_deck`.
+    """
+
+    def gauge(pulls: Array) -> Array:
+        deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+        return run(deck, count, lambda t19, _: opened(t19, model, count))
+
+    pulls, driven = grip_pulls(model, law, gauge, "marc")
+    deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+    return run(deck, count, lambda t19, n: strip_history(t19, model, count, driven, n))
+
+
+def strip_deck(
+    model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, pulls: Array
+) -> str:
+    """Return the deck of a pull; `pulls` (increments,) mm of the pulled end, along -y.
+
+    InputError: a template that cannot be used, a law that Marc's shells do not carry.
+    """
+    mesh = model.mesh
+    fabric = fabric_context(mesh, model.warp, model.thickness)
+    # In its plane a strip neither bends nor twists.
+    flat = (2,) if settings.element == MEMBRANE else (2, 3, 4, 5)
+    held = [*supports(model.supports, MEMBRANE), fixed("flat", FLAT, flat)]
+    pull = fixed("pull", model.pulled.lower(), (1,), (-1.0,), table=1)
+    sets = node_sets(mesh, list(dict.fromkeys([*model.supports, model.pulled])))
+    sets.append(named_set("node", FLAT, np.arange(len(mesh.points))))
+    cases = [("pull", len(pulls), [*(one["name"] for one in held), "pull"])]
+    tables = [time_table(1, "load", (0.0, *pulls.tolist()))]
+    deck = "uniaxial.dat.j2", "Strip", settings, law, fabric, sets, cases, tables, held
+    return deck_text(*deck, fixed=[*held, pull])
+
+
+def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
+    """Return vectors by name at total times 1 to `count`, (nodes, components) each.
+
+    SolverFailure: the file is not there, damaged, of another mesh, or lacks one of the times or
+    its displacements.
+    """
+    try:
+        found = by_time(path, mesh)
+        for time in range(1, count + 1):
+            if time not in found:
+                raise InputError(path, f"time {time} of {count}", f"holds no {MOVED} of x, y and z")
+    except InputError as error:
+        raise SolverFailure(f"no usable results: {error}", "marc") from None
+    return [found[time] for time in range(1, count + 1)]
+
+
+def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, Array]]:
+    """Return vectors by name at every whole time that has displacements.
+
+    ended : as for `T19File.frames`. InputError: not there, damaged, or of another mesh.
+    """
+    file = T19File(path)
+    nodes = len(mesh.points)
+    if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):
+        raise InputError(path, "nodes", f"are not the deck's {nodes}")
+    size = float(np.abs(mesh.points).max())
+    if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
+        raise InputError(path, "nodes", "are not where the deck has them: of another job?")
+    found: dict[int, dict[str, Array]] = {}
+    for frame in file.frames(ended):
+        time, moved = round(frame.time), frame.fields.get(MOVED)
+        if abs(frame.time - time) < NEAR_TIME and moved is not None and moved.shape[1] >= 3:
+            found[time] = frame.fields
+    return found
+
+
+def displacements(frames: Sequence[Mapping[str, Array]]) -> Array:
+    """Return (frames, nodes, 3) mm."""
+    return np.ascontiguousarray([frame[MOVED][:, :3] for frame in frames])
+
+
+def reactions(frames: Sequence[Mapping[str, Array]]) -> Array | None:
+    """Return forces of the supports on the nodes, (frames, nodes, 3) N; None without them."""
+    if any(REACTION not in frame for frame in frames):
+        return None
+    return np.ascontiguousarray([frame[REACTION][:, :3] for frame in frames])
+
+
+def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
+    """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
+    frames = whole_times(path, model.mesh, len(model.increments))
+    u, forces, keep = displacements(frames), reactions(frames), model.reported
+    sums: dict[str, Array] = {}
+    if forces is not None:
+        sums = {
+            name: forces[keep][:, model.mesh.node_sets[name]].sum(axis=1)
+            for name in model.supports
+            if name in model.mesh.node_sets
+        }
+    return History(
+        np.array(model.increments)[keep],
+        u[keep],
+        *extremes(log_strain(model.mesh, u, model.mesh.warp)),
+        sums,
+        iterations=iterations,
+        path=u,
+        remarks=() if forces is not None else (Note(NoteKind.NO_REACTIONS, NO_REACTIONS),),
+    )
+
+
+def opened(path: Path, model: UniaxialModel, count: int) -> Array:
+    """Return the elongation of the gauge (mm) at the `count` increments of a pull."""
+    return _opened(displacements(whole_times(path, model.mesh, count)), model)
+
+
+def strip_history(
+    path: Path, model: UniaxialModel, count: int, driven: bool, iterations: int
+) -> History:
+    """Return load, displacement and reactions where the gauge has the model's elongations.
+
+    driven : the grips are the gauge, so that it has them already. SolverFailure: as `whole_times`;
+    no reactions, a gauge that does not reach its length.
+    """
+    frames = whole_times(path, model.mesh, count)
+    u, forces = displacements(frames), reactions(frames)
+    if forces is None:
+        raise SolverFailure(NO_REACTIONS, "marc")
+    gauge = _opened(u, model)
+
+    def at_levels(values: Array) -> Array:
+        return values if driven else at_elongations(gauge, model, values, "marc")
+
+    corners = np.ascontiguousarray(at_levels(u))
+    sums = {
+        name: at_levels(forces[:, model.mesh.node_sets[name]].sum(axis=1))
+        for name in (*model.supports, model.pulled)
+    }
+    return History(
+        -model.load_factor * sums[model.pulled][:, 1],
+        corners,
+        *extremes(log_strain(model.mesh, corners, model.warp)),
+        sums,
+        iterations=iterations,
+        path=corners,
+    )
+
+
+def _opened(u: Array, model: UniaxialModel) -> Array:
+    lower, upper = (model.mesh.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
+    return np.asarray(np.linalg.norm(upper - lower, axis=1) - model.gauge_length)
