@@ -42,8 +42,6 @@ UNLOADING = "after the largest deflection"
 class BendingCurve:
     """One repetition of a bending test, as far as it was loaded.
 
-    Parameters
-    ----------
     repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
     dropped : how many readings of it are left out, by why. source : what of the file was read.
     """
@@ -73,19 +71,14 @@ def read_bending_curves(
     The table is found as in the exports of test machines (`machine_tables`). Of each repetition
     the readings up to the largest deflection are kept: what comes after is unloading.
 
-    Parameters
-    ----------
-    repetition : name of the column of repetitions, where there is one of another name.
-    preload : N on the beam beside what the readings say: collar and strap.
-    zero : of each repetition's deflection: "none", as read; "first", the first reading is zero;
-        "line", the straight line through the first four readings goes through the origin.
-    format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : naming file and line: columns that are not there or may be several, no or unknown
-        units, cells that are not numbers, a repetition of one reading, or whose first readings
-        show no stiffness to find a zero by.
+    repetition : name of the column of repetitions, where there is one of another name. preload : N
+    on the beam beside what the readings say: collar and strap. zero : of each repetition's
+    deflection: "none", as read; "first", the first reading is zero; "line", the straight line
+    through the first four readings goes through the origin. format : name of the file's format;
+    found by its content unless given.
+    Raises InputError: naming file and line: columns that are not there or may be several, no or
+    unknown units, cells that are not numbers, a repetition of one reading, or whose first readings
+    show no stiffness to find a zero by.
     """
     path = Path(path)
     named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
@@ -126,7 +119,7 @@ def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
 
 
 def _loading(curve: BendingCurve) -> BendingCurve:
-    """The readings up to the largest deflection, sorted: a sensor's noise is no unloading."""
+    """Return the readings up to the largest deflection, sorted (noise is no unloading)."""
     part = slice(int(np.argmax(curve.deflection)) + 1)
     order = np.argsort(curve.deflection[part], kind="stable")
     after = len(curve.load) - len(order)
@@ -157,7 +150,7 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """How far a model's curve is from all readings that it reaches.
+    """Errors of a model's curve at the readings that it reaches.
 
     rms, mean : N; the mean is positive where the model is too stiff. relative : rms over the
     largest load among these readings. compared, beyond : readings up to the model's last
@@ -172,13 +165,11 @@ class BendingError:
 
 
 def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScatter:
-    """Mean and sample standard deviation of the repetitions, interpolated between readings.
+    """Return mean and sample standard deviation of the repetitions, interpolated between readings.
 
     The grid goes from the smallest to the largest deflection read.
 
-    Raises
-    ------
-    ValueError : no curves.
+    Raises ValueError: no curves.
     """
     if not curves:
         raise ValueError("scatter: no repetitions")
@@ -198,14 +189,9 @@ def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScat
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """The model's load less that read, at every reading from zero to the model's end.
+    """Return the model's load less that read, at every reading from zero to the model's end.
 
-    Parameters
-    ----------
     deflection, load : (frames,) mm, rising, and N, of the model.
-
-    Returns
-    -------
     None where the model reaches no reading of a load.
     """
     x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
@@ -223,6 +209,5 @@ def model_error(
 
 
 def _single(curve: BendingCurve) -> tuple[Array, Array]:
-    """Deflections without repeats, with the mean load of each."""
     x, whose = np.unique(curve.deflection, return_inverse=True)
     return x, np.bincount(whose, curve.load) / np.bincount(whose)

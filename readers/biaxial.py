@@ -25,11 +25,9 @@ NEAR = 4.0
 
 
 def plain_ratio(ratio: str) -> str:
-    """The same name for each spelling of a ratio: "2:1" of "2/1", "2.0 : 1" and "4:2".
+    """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2".
 
-    Raises
-    ------
-    InputError : no such ratio.
+    Raises InputError: no such ratio.
     """
     warp, fill = shares(ratio)
     least = min(x for x in (warp, fill) if x > 0)
@@ -41,7 +39,7 @@ def plain_ratio(ratio: str) -> str:
 
 
 def nearest_ratio(loads: Sequence[float]) -> str:
-    """The ratio that loads along warp and fill are of; their own numbers where it is none.
+    """Return the ratio of loads along warp and fill; their own numbers where none is near.
 
     >>> nearest_ratio([30.0, 14.8]), nearest_ratio([25.0, 0.5])
     ('2:1', '1:0')
@@ -97,16 +95,11 @@ def read_biaxial_table(
 ) -> BiaxialTable:
     """Read a table; names, units, separator and decimal mark are found as for load curves.
 
-    Parameters
-    ----------
     columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
-        `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are).
-    load_unit, strain_unit : needed where the file names none.
-
-    Raises
-    ------
-    InputError : naming file, line and the columns there are: nothing or several things found for
-        a quantity, no unit or a different one, cells that are not finite numbers, no such ratio.
+    `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are). load_unit,
+    strain_unit : needed where the file names none.
+    Raises InputError: naming file, line and the columns there are: nothing or several things found
+    for a quantity, no unit or a different one, cells that are not finite numbers, no such ratio.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
@@ -174,17 +167,15 @@ class Cycle:
 
     @property
     def rows(self) -> slice:
-        """Of the loading."""
+        """Return the rows of the loading."""
         return slice(self.first, self.last + 1)
 
 
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
-    """The cycles in their order.
+    """Return the cycles in their order.
 
-    Parameters
-    ----------
     load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; where there are none,
-        that of the loads at the top of a cycle.
+    that of the loads at the top of a cycle.
     """
     larger = np.asarray(load).max(axis=1)
     cycles: list[Cycle] = []
@@ -200,7 +191,7 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
 
 
 def _base(load: Array, row: int) -> Array:
-    """A prestress has no ratio of its own: what is below it does not count."""
+    """Return the load below which nothing counts: a prestress has no ratio of its own."""
     return np.asarray(np.minimum(load[row], load[row].min()))
 
 
@@ -217,7 +208,7 @@ def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | Non
 
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
-    """First and last row of every loading in loads (n,)."""
+    """Return first and last row of every loading in loads (n,)."""
     least = TURN * float(np.ptp(s)) if len(s) else 0.0
     if not least > 0:
         return []
@@ -231,7 +222,7 @@ def _loadings(s: Array) -> list[tuple[int, int]]:
 
 
 def _rises(s: Array, least: float) -> list[tuple[int, int]]:
-    """Rows of a valley and of the peak after it, for each rise of more than `least`."""
+    """Return rows of a valley and of the peak after it, for each rise of more than `least`."""
     found, low, high, rising = [], 0, 0, False
     for i in range(len(s)):
         if rising:
@@ -268,25 +259,23 @@ class BiaxialPath:
 
     @property
     def ratio(self) -> str:
-        """Of the loads."""
+        """Return the ratio of the loads."""
         return self.cycle.ratio
 
     @property
     def residual(self) -> Array:
-        """(2,) strain at the beginning of the loading."""
+        """Return (2,) strain at the beginning of the loading."""
         return np.asarray(self.strain[0] - self.table.strain[0])
 
     @property
     def since(self) -> Array:
-        """(n, 2) strain since the beginning of the loading."""
+        """Return (n, 2) strain since the beginning of the loading."""
         return np.asarray(self.strain - self.strain[0])
 
     def between(self, lowest: float, highest: float) -> BiaxialPath:
-        """The rows whose larger load (N/mm) lies between two.
+        """Return the rows whose larger load (N/mm) lies between two.
 
-        Raises
-        ------
-        InputError : fewer than two of them.
+        Raises InputError: fewer than two of them.
         """
         larger = self.load.max(axis=1)
         keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
@@ -299,7 +288,7 @@ class BiaxialPath:
         return replace(self, load=self.load[keep], strain=self.strain[keep])
 
     def thinned(self, most: int) -> BiaxialPath:
-        """At most so many rows, evenly spread over the larger load, both ends among them."""
+        """Return at most so many rows, evenly spread over the larger load, both ends among them."""
         if len(self.load) <= most:
             return self
         larger = np.maximum.accumulate(self.load.max(axis=1))
@@ -310,11 +299,9 @@ class BiaxialPath:
 
 
 def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:
-    """The cycles of each file; named : the ratio that a file is listed for, None for none.
+    """Return the cycles of each file; `named` holds the ratio that each is listed for, or None.
 
-    Raises
-    ------
-    InputError : a file without a cycle.
+    Raises InputError: a file without a cycle.
     """
     found = []
     for table, name in zip(tables, named, strict=True):
@@ -333,18 +320,13 @@ def evaluated_paths(
     conditioning: int = 0,
     ratios: Collection[str] | None = None,
 ) -> list[BiaxialPath]:
-    """Of each ratio the loading of one cycle, in the order of `RATIOS`, then by name.
+    """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
 
     Of a ratio that comes several times, the first time after the conditioning counts.
 
-    Parameters
-    ----------
-    which : of the cycles of a ratio. conditioning : cycles at the beginning of each file that
-        count for nothing. ratios : those that are wanted; all unless given.
-
-    Raises
-    ------
-    InputError : a ratio that is wanted and is not there, or has not so many cycles.
+    which : of the cycles of a ratio. conditioning : cycles at the beginning of each file that count
+    for nothing. ratios : those that are wanted; all unless given.
+    Raises InputError: a ratio that is wanted and is not there, or has not so many cycles.
     """
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):

@@ -49,16 +49,11 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 class LoadCurve:
     """Load against elongation of one specimen, or of several in one series.
 
-    Parameters
-    ----------
-    direction : warp, fill or bias.
-    specimen : its name in the file, else the series', else the file's.
-    elongation : (n,) mm, in the order of the file.
-    load : (n,) N, of the whole strip.
-    path : the file, None when the curve did not come from one.
-    time : (n,) in the file's unit, None unless asked for by name.
-    frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
-    notes : one sentence each: what was chosen where the file leaves a choice.
+    direction : warp, fill or bias. specimen : its name in the file, else the series', else the
+    file's. elongation : (n,) mm, in the order of the file. load : (n,) N, of the whole strip. path
+    : the file, None when the curve did not come from one. time : (n,) in the file's unit, None
+    unless asked for by name. frame : (n,) number from 0 of the frame each point is from, None but
+    for a strain gauge. notes : one sentence each: what was chosen where the file leaves a choice.
     source : what of the file was read; None where nothing was.
     """
 
@@ -74,11 +69,9 @@ class LoadCurve:
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
+    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
 
-    Raises
-    ------
-    InputError : a name that is not among them.
+    Raises InputError: a name that is not among them.
     """
     plain = re.sub(r"[\W_]+", "", name.casefold())
     if plain not in DIRECTION_ALIASES:
@@ -104,22 +97,16 @@ def read_load_curves(
     In text, lines before the row of names are passed over; names, unit row, separator and decimal
     mark are found (see `formats.machine_text`).
 
-    Parameters
-    ----------
-    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with
-        or without the unit; needed where finding is ambiguous. `time` is read only when named.
-    load_unit, length_unit : needed where the file names none.
-    width : of the strip, mm, by which a load per width (kN/m, N/mm) is multiplied.
-    comment : lines that start so are skipped.
-    direction : of a file without a column of directions; in a file with one, the rows to keep.
-    decimal : needed where 1,234 may be a thousand or little more than one.
-    format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and the columns there are: nothing or several things found for
-        a quantity, no unit or a different one, no or an unknown direction, cells that are not
-        finite numbers.
+    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with or
+    without the unit; needed where finding is ambiguous. `time` is read only when named. load_unit,
+    length_unit : needed where the file names none. width : of the strip, mm, by which a load per
+    width (kN/m, N/mm) is multiplied. comment : lines that start so are skipped. direction : of a
+    file without a column of directions; in a file with one, the rows to keep. decimal : needed
+    where 1,234 may be a thousand or little more than one. format : name of the file's format; found
+    by its content unless given.
+    Raises InputError: naming file, line and the columns there are: nothing or several things found
+    for a quantity, no unit or a different one, no or an unknown direction, cells that are not
+    finite numbers.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in QUANTITIES]
@@ -155,7 +142,7 @@ def read_load_curves(
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
-    """The specimens of a series that lists them one after the other without naming them.
+    """Return the specimens of a series that lists them one after the other without naming them.
 
     A new specimen starts where the elongation falls below half of the largest before; so not for
     tests that unload. They are called by the series' name and a number from 1.
@@ -186,7 +173,7 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
 def _load(
     found: MachineTable, column: str, unit: str | None, width: float | None
 ) -> NDArray[np.float64]:
-    """Loads (rows,) in N of the whole strip."""
+    """Return loads (rows,) in N of the whole strip."""
     units = dict(LOAD_UNITS)
     if found.units[column] in WIDTH_LOAD_UNITS or unit in WIDTH_LOAD_UNITS:
         if width is None:
@@ -199,7 +186,7 @@ def _load(
 def _labels(
     found: MachineTable, column: Mapping[str, str], wanted: str | None
 ) -> Sequence[tuple[str, str]]:
-    """Direction and specimen of each row."""
+    """Return direction and specimen of each row."""
     table = found.table
     if not column["direction"] and wanted is None:
         there = ", ".join(str(name) for name in table.cells.columns if name)[:300]

@@ -23,17 +23,12 @@ PLAIN = FrameOptions(QUANTITIES)
 class DisplacementField:
     """Displacements measured (or computed) at one pressure.
 
-    Parameters
-    ----------
-    pressure : MPa.
-    points : (n, 2) mm, places in the reference state; x is warp, y is fill.
-    displacement : (n, 3) mm.
-    dropped : how many rows of the file were left out, by why (`frames.FLAGGED` and others).
-    z : (n,) mm, height in the reference state; None where it was not measured.
-    sigma : (n,) what the correlation says of its own error, in the file's own measure, NaN where
-        it says nothing; None where it does so nowhere.
-    path : the file, None when the field did not come from one.
-    source : what of the file was read.
+    pressure : MPa. points : (n, 2) mm, places in the reference state; x is warp, y is fill.
+    displacement : (n, 3) mm. dropped : how many rows of the file were left out, by why
+    (`frames.FLAGGED` and others). z : (n,) mm, height in the reference state; None where it was not
+    measured. sigma : (n,) what the correlation says of its own error, in the file's own measure,
+    NaN where it says nothing; None where it does so nowhere. path : the file, None when the field
+    did not come from one. source : what of the file was read.
     """
 
     pressure: float
@@ -47,7 +42,7 @@ class DisplacementField:
 
     @property
     def frame(self) -> Frame:
-        """The same as a frame; the sheet lies at z = 0 where its height was not measured."""
+        """Return the field as a frame; z is 0 where the height was not measured."""
         z = np.zeros(len(self.points)) if self.z is None else self.z
         return Frame(np.column_stack([self.points, z]), self.displacement, self.path)
 
@@ -65,24 +60,16 @@ def read_fields(
 ) -> tuple[DisplacementField, ...]:
     """Read one frame a pressure.
 
-    Parameters
-    ----------
     files : the frames in order, one a file or several; columns that are not asked for are ignored.
-        A first frame in which nothing moves is left out where there is one frame too many: it is
-        the reference of a file that holds them all.
-    pressures : MPa, one a frame.
-    columns, flag_column, comment, length_scale : see `frames.FrameOptions`; quantities are `x`,
-        `y`, `dx`, `dy`, `dz`, and `z` where it is there.
-    format : its name; found by the files' content unless given.
-    options : in place of the four before, where there is more to say of the files.
-    frames : numbers from 0 of the frames taken, one a pressure, among all of the files; all of
-        them unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and column: no such file, missing columns, an empty table,
-        cells that are not finite numbers, nothing left without the doubtful rows, more or fewer
-        frames than pressures.
+    A first frame in which nothing moves is left out where there is one frame too many: it is the
+    reference of a file that holds them all. pressures : MPa, one a frame. columns, flag_column,
+    comment, length_scale : see `frames.FrameOptions`; quantities are `x`, `y`, `dx`, `dy`, `dz`,
+    and `z` where it is there. format : its name; found by the files' content unless given. options
+    : in place of the four before, where there is more to say of the files. frames : numbers from 0
+    of the frames taken, one a pressure, among all of the files; all of them unless given.
+    Raises InputError: naming file, line and column: no such file, missing columns, an empty table,
+    cells that are not finite numbers, nothing left without the doubtful rows, more or fewer frames
+    than pressures.
     """
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
@@ -116,9 +103,7 @@ def read_field(
 ) -> DisplacementField:
     """Read the field of one file, at a pressure in MPa.
 
-    Raises
-    ------
-    InputError : as `read_fields`; several frames in the file.
+    Raises InputError: as `read_fields`; several frames in the file.
     """
     frames = read_frames([path], options, format)
     if len(frames) != 1:
@@ -127,14 +112,12 @@ def read_field(
 
 
 def field_of(frame: Frame, pressure: float, options: FrameOptions = PLAIN) -> DisplacementField:
-    """The field of a frame, at a pressure in MPa.
+    """Return the field of a frame, at a pressure in MPa.
 
     Points where a quantity is not a number, where correlation was lost, are dropped as the doubtful
     ones are.
 
-    Raises
-    ------
-    InputError : no point is left.
+    Raises InputError: no point is left.
     """
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.

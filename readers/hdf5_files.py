@@ -24,14 +24,12 @@ SECONDS = 60.0
 
 
 def check_readable(path: Path, read: Callable[[], object], seconds: float = SECONDS) -> None:
-    """Try a reading in a process of its own: on some damaged files HDF5 loops for ever, or crashes.
+    """Try a reading in another process: HDF5 loops or crashes on some damaged files.
 
     read : what is about to be done, picklable where processes are spawned; what it raises is left
     to the caller's own reading.
 
-    Raises
-    ------
-    InputError : it does not come to an end.
+    Raises InputError: it does not come to an end.
     """
     if not ends(read, seconds):
         problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
@@ -42,9 +40,7 @@ def check_readable(path: Path, read: Callable[[], object], seconds: float = SECO
 def open_hdf5(path: Path) -> Iterator[Any]:
     """Open a file, as an `h5py.File`.
 
-    Raises
-    ------
-    InputError : h5py is missing, no such file, no HDF5 file, a damaged one.
+    Raises InputError: h5py is missing, no such file, no HDF5 file, a damaged one.
     """
     try:
         import h5py
@@ -68,9 +64,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 def member(path: Path, group: Any, name: str) -> Any:
     """Return the object below a group by its path; None where there is none.
 
-    Raises
-    ------
-    InputError : a link to another file.
+    Raises InputError: a link to another file.
     """
     import h5py
 
@@ -87,9 +81,8 @@ def member(path: Path, group: Any, name: str) -> Any:
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
     """Read a dataset's numbers.
 
-    Raises
-    ------
-    InputError : no dataset of numbers, one whose numbers lie in other files, or that is too large.
+    Raises InputError: no dataset of numbers, one whose numbers lie in other files, or that is too
+    large.
     """
     import h5py
 

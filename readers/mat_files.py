@@ -54,9 +54,8 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
 def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     """Read the variables of these names, those that there are.
 
-    Raises
-    ------
-    InputError : no such file, a damaged one, HDF5 without h5py, counts beyond what it can hold.
+    Raises InputError: no such file, a damaged one, HDF5 without h5py, counts beyond what it can
+    hold.
     """
     try:
         with path.open("rb") as file:
@@ -74,9 +73,7 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
 def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
     """Return an array of numbers among variables or fields.
 
-    Raises
-    ------
-    InputError : it is missing or holds no numbers.
+    Raises InputError: it is missing or holds no numbers.
     """
     value = where.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
@@ -146,7 +143,7 @@ class MatrixParts:
         return self.part()[1].decode("latin-1")
 
     def part(self) -> tuple[int, bytes]:
-        """Type and content of the next part."""
+        """Return type and content of the next part."""
         kind, size = struct.unpack_from(f"{self.order}II", self.content, self.at)
         if kind >> 16:
             size, kind, start, step = kind >> 16, kind & 0xFFFF, self.at + 4, 8
@@ -269,7 +266,7 @@ def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int])
 
 
 def _structs(values: dict[str, Any], fields: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the elements of a struct array, each field of which is a list of references."""
+    """Return the elements of a struct array; each field is a list of references."""
     import h5py
 
     listed = [

@@ -20,7 +20,7 @@ LARGEST, SMALL, RATIO = 2**30, 2**26, 100
 
 
 def array_names(path: Path) -> list[str]:
-    """Names of the arrays; none of what is no archive."""
+    """Return names of the arrays; none of what is no archive."""
     try:
         with zipfile.ZipFile(path) as archive:
             return [name[:-4] for name in archive.namelist() if name.endswith(".npy")]
@@ -29,12 +29,10 @@ def array_names(path: Path) -> list[str]:
 
 
 def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
-    """The arrays of these names, those that there are.
+    """Read the arrays of these names, those that there are.
 
-    Raises
-    ------
-    InputError : no such file, no archive, objects instead of numbers, a header that says more than
-        the file holds.
+    Raises InputError: no such file, no archive, objects instead of numbers, a header that says more
+    than the file holds.
     """
     found = {}
     try:

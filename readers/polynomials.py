@@ -21,17 +21,13 @@ MAX_ORDER = 12  # beyond, the powers of one elongation tell nothing apart
 
 @dataclass(frozen=True, eq=False)
 class LoadPolynomial:
-    """P(u) = c0 + c1 u + c2 u^2 + ...
+    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ...
 
-    Parameters
-    ----------
     coefficients : (order + 1,) N, N/mm, N/mm^2 ..., lowest power first; c0 is there, 0 when the
-        polynomial goes through the origin.
-    end : mm, the largest elongation it was fitted to; beyond, it means nothing.
-    r_squared : 1 - (squares left) / (squares about the mean load), as in Table 3.1, also through
-        the origin. NaN where not known.
-    rmse : N, root of the mean square left. NaN where not known.
-    points : how many it was fitted to; 0 where not known.
+    polynomial goes through the origin. end : mm, the largest elongation it was fitted to; beyond,
+    it means nothing. r_squared : 1 - (squares left) / (squares about the mean load), as in Table
+    3.1, also through the origin. NaN where not known. rmse : N, root of the mean square left. NaN
+    where not known. points : how many it was fitted to; 0 where not known.
     """
 
     coefficients: Array
@@ -45,12 +41,12 @@ class LoadPolynomial:
         return len(self.coefficients) - 1
 
     def __call__(self, elongation: ArrayLike) -> Array:
-        """Load in N at elongations in mm, of the same shape."""
+        """Return the load in N at elongations in mm, of the same shape."""
         at = np.asarray(elongation, dtype=float)
         return np.asarray(polynomial.polyval(at, self.coefficients))
 
     def slope(self, elongation: ArrayLike) -> Array:
-        """dP/du in N/mm at elongations in mm, of the same shape."""
+        """Return dP/du in N/mm at elongations in mm, of the same shape."""
         at = np.asarray(elongation, dtype=float)
         return np.asarray(polynomial.polyval(at, polynomial.polyder(self.coefficients)))
 
@@ -58,12 +54,10 @@ class LoadPolynomial:
 def fit_load_polynomial(
     elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
 ) -> LoadPolynomial:
-    """Least-squares polynomial through the points (n,) mm and (n,) N, all specimens together.
+    """Fit a polynomial to the points (n,) mm and (n,) N by least squares.
 
-    Raises
-    ------
-    InputError : an order out of range; points that are not finite, too few, or too close
-        together for the order; loads that are all the same.
+    Raises InputError: an order out of range; points that are not finite, too few, or too close
+    together for the order; loads that are all the same.
     """
     u, f = checked_points(elongation, load)
     terms, scale, lowest = terms_of(u, order, through_origin)
@@ -83,7 +77,7 @@ def fit_load_polynomial(
 
 @dataclass(frozen=True)
 class SpecimenScatter:
-    """How specimens lie about one polynomial, in N.
+    """Deviations of specimens from one polynomial, in N.
 
     specimens : their names. rms, mean : root mean square and mean of load - P(u), one a specimen.
     rmse : root mean square over all points. deviation : standard deviation of load - P(u) over
@@ -100,11 +94,9 @@ class SpecimenScatter:
 def specimen_scatter(
     curves: LoadCurve | Sequence[LoadCurve], fitted: LoadPolynomial
 ) -> SpecimenScatter:
-    """Scatter of one or several curves about a polynomial.
+    """Return the scatter of one or several curves about a polynomial.
 
-    Raises
-    ------
-    InputError : fewer than two points in all.
+    Raises InputError: fewer than two points in all.
     """
     each = [curves] if isinstance(curves, LoadCurve) else list(curves)
     left = [curve.load - fitted(curve.elongation) for curve in each]
@@ -121,11 +113,10 @@ def specimen_scatter(
 
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
-    """The points as arrays (n,) mm and (n,) N.
+    """Return the points as arrays (n,) mm and (n,) N.
 
-    Raises
-    ------
-    InputError : counts that differ, numbers that are not finite, no elongation, one load only.
+    Raises InputError: counts that differ, numbers that are not finite, no elongation, one load
+    only.
     """
     u, f = np.asarray(elongation, dtype=float), np.asarray(load, dtype=float)
     if u.ndim != 1 or u.shape != f.shape:
@@ -141,11 +132,9 @@ def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array
 
 
 def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, int]:
-    """Powers (n, terms) of u / scale, the scale, and the lowest power.
+    """Return powers (n, terms) of u / scale, the scale, and the lowest power.
 
-    Raises
-    ------
-    InputError : an order out of range, or fewer points than coefficients.
+    Raises InputError: an order out of range, or fewer points than coefficients.
     """
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
@@ -179,13 +168,8 @@ def read_published_polynomials(
 ) -> dict[str, PublishedPolynomial]:
     """Read load polynomials by direction: N, of the full strip, over mm.
 
-    Parameters
-    ----------
     format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and column.
+    Raises InputError: naming file, line and column.
     """
     polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
     return polynomials

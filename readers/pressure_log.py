@@ -30,7 +30,7 @@ APEX = 0.98
 
 @dataclass(frozen=True, eq=False)
 class PressureLog:
-    """Readings: time (k,) s, rising; pressure (k,) MPa; path the file."""
+    """Readings: time (k,) s, rising; pressure (k,) MPa; path of the file."""
 
     time: Array
     pressure: Array
@@ -39,13 +39,11 @@ class PressureLog:
 
 @dataclass(frozen=True)
 class LogOptions:
-    """How a log is read; what is not given is found.
+    """Options of a log; what is not given is found.
 
-    Parameters
-    ----------
-    pressure : its column; volts become a pressure by its scale, offset and unit.
-    time : its column; seconds where neither file nor channel names a unit.
-    format, comment, decimal : as for machine tables.
+    pressure : its column; volts become a pressure by its scale, offset and unit. time : its column;
+    seconds where neither file nor channel names a unit. format, comment, decimal : as for machine
+    tables.
     """
 
     pressure: Channel = AS_FOUND
@@ -58,10 +56,8 @@ class LogOptions:
 def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
     """Read a log as a test machine's table.
 
-    Raises
-    ------
-    InputError : naming file and line: no or several columns, no or unknown units, cells that are
-        not numbers, times that go back.
+    Raises InputError: naming file and line: no or several columns, no or unknown units, cells that
+    are not numbers, times that go back.
     """
     channels: Mapping[str, Channel] = {"time": options.time, "pressure": options.pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
@@ -84,14 +80,13 @@ def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> Pressur
 
 
 def apex_height(frame: Frame) -> float:
-    """How far the apex of a frame has moved, mm, whatever axes the camera has; NaN if unknown."""
+    """Return the distance (mm) that the apex of a frame has moved; NaN if unknown."""
     moved = np.linalg.norm(frame.displacement, axis=1)
     moved = moved[np.isfinite(moved)]
     return float(np.quantile(moved, APEX)) if len(moved) else float("nan")
 
 
 def apex_heights(frames: Sequence[Frame]) -> Array:
-    """(frames,) mm, see `apex_height`."""
     return np.array([apex_height(frame) for frame in frames])
 
 
@@ -103,7 +98,7 @@ POWERS = (1, 2, 3)
 
 
 def straightest(h: Array, pressures: Sequence[Array]) -> int:
-    """The power of the heights that correlates best with the pressures at any offset."""
+    """Return the power of the heights that correlates best with the pressures at any offset."""
     best = {}
     for power in POWERS:
         raised, best[power] = h**power, 0.0
@@ -117,7 +112,7 @@ def straightest(h: Array, pressures: Sequence[Array]) -> int:
 
 
 def misfit_of(p: Array, h: Array, rest: float) -> float:
-    """What rising functions leave of the variances: mean of both, 1 where there is none.
+    """Return the share of the variances that rising functions leave, 1 without variance.
 
     p : (frames,) MPa, NaN beyond the log. h : (frames,) mm, 0 at rest. rest : MPa, at rest.
     """
@@ -131,7 +126,7 @@ def misfit_of(p: Array, h: Array, rest: float) -> float:
 
 
 def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
-    """Share of the variance of y that no rising function of x through the rest explains."""
+    """Return share of the variance of y that no rising function of x through the rest explains."""
     from scipy.optimize import isotonic_regression
 
     total = float(np.sum((y - y.mean()) ** 2))
@@ -154,22 +149,17 @@ SIGMAS, AT_REST, BELOW = 6.0, 0.02, 0.01
 
 
 def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
-    """(frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
+    """Return (frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
     return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
 
 
 def offset_misfits(
     times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> tuple[Array, Array]:
-    """Offsets (s), rising, closer together about the best; and the misfit at each.
+    """Return offsets (s), rising, closer together about the best; and the misfit at each.
 
-    Parameters
-    ----------
     times, heights : (frames,) s and mm, all known. log_times, pressures : (k,) s, rising, and MPa.
-
-    Raises
-    ------
-    InputError : a log that is shorter than the frames.
+    Raises InputError: a log that is shorter than the frames.
     """
     order = np.argsort(times, kind="stable")
     t, h = times[order], heights[order]
@@ -192,7 +182,7 @@ def offset_misfits(
 
 
 def _offsets(t: Array, log_times: Array) -> Array:
-    """The offsets at which enough frames lie within the log, half a frame apart."""
+    """Return the offsets at which enough frames lie within the log, half a frame apart."""
     enough = int(np.ceil(WITHIN * len(t)))
     least = log_times[0] - t[len(t) - enough]
     most = log_times[-1] - t[enough - 1]
@@ -209,7 +199,7 @@ def _offsets(t: Array, log_times: Array) -> Array:
 
 
 def _rest_height(h: Array) -> float:
-    """Up to where a frame is at rest, by the noise from one frame to the next."""
+    """Return the height up to which a frame is at rest, from the noise between frames."""
     noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
     return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
 
@@ -236,16 +226,12 @@ WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
 class ClockOffset:
     """The log's clock less that of the frames.
 
-    Parameters
-    ----------
     offset : s. lower, upper : s, the least and the largest offset that may be right; the offset
-        itself where it was given.
-    misfit : share of the variance of heights and pressures that no rising function explains; None
-        where the offset was given.
-    pressure : (frames,) MPa, of each frame; NaN beyond the log.
-    doubt : (frames,) MPa, half of the range of each frame's pressure over all offsets that may be
-        right.
-    times : (frames,) s, by the frames' own clock. heights : (frames,) mm, NaN where none is known.
+    itself where it was given. misfit : share of the variance of heights and pressures that no
+    rising function explains; None where the offset was given. pressure : (frames,) MPa, of each
+    frame; NaN beyond the log. doubt : (frames,) MPa, half of the range of each frame's pressure
+    over all offsets that may be right. times : (frames,) s, by the frames' own clock. heights :
+    (frames,) mm, NaN where none is known.
     """
 
     offset: float
@@ -261,11 +247,9 @@ class ClockOffset:
 def given_offset(
     offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> ClockOffset:
-    """The pressures of frames by a clock offset (s) that is known; else as `find_offset`.
+    """Return the pressures of frames by a clock offset (s) that is known; else as `find_offset`.
 
-    Raises
-    ------
-    InputError : no frame lies within the log.
+    Raises InputError: no frame lies within the log.
     """
     there = log_at(offset, times, log_times, pressures)
     if not np.isfinite(there).any():
@@ -280,17 +264,12 @@ def given_offset(
 
 
 def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
-    """The offset at which heights rise with the pressures.
+    """Return the offset at which heights rise with the pressures.
 
-    Parameters
-    ----------
     times : (frames,) s, by the frames' clock. heights : (frames,) mm; NaN where none is known.
     log_times, pressures : (k,) s, rising, and MPa.
-
-    Raises
-    ------
-    InputError : too few frames, a log that is shorter than the frames; heights that follow the
-        pressures at no offset; offsets that do equally well and give other pressures.
+    Raises InputError: too few frames, a log that is shorter than the frames; heights that follow
+    the pressures at no offset; offsets that do equally well and give other pressures.
     """
     known = np.isfinite(heights)
     if known.sum() < LEAST_FRAMES:
@@ -332,7 +311,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
 
 
 def _half_range(each: Array) -> Array:
-    """(frames,) of pressures (offsets, frames); NaN where a frame is never within the log."""
+    """Return half ranges (frames,) of pressures (offsets, frames); NaN for frames beyond the log."""
     inside = np.isfinite(each)
     most = np.where(inside, each, -np.inf).max(axis=0)
     least = np.where(inside, each, np.inf).min(axis=0)
@@ -355,7 +334,7 @@ TOLERANCE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class FrameChoice:
-    """Numbers of the frames taken, by rising pressure, and how many were not looked at, by why."""
+    """Numbers of the chosen frames, by rising pressure, and counts of the others by reason."""
 
     frames: tuple[int, ...]
     left_out: dict[str, int] = field(default_factory=dict)
@@ -368,20 +347,14 @@ def choose_frames(
     tolerance: float | None = None,
     in_time: bool = False,
 ) -> FrameChoice:
-    """The frame nearest to each asked pressure, or `count` evenly spread in pressure, or all.
+    """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
-    Parameters
-    ----------
-    pressures : (frames,) MPa, of every frame; NaN where it is not known.
-    asked : MPa, rising. tolerance : MPa, how far a frame may be from the asked pressure; 2 % of the
-        largest asked one unless given.
-    in_time : whether the frames are in the order of time: those after the largest pressure are then
-        of the release, and not taken.
-
-    Raises
-    ------
-    InputError : no frame under pressure, none near an asked pressure, one that is nearest to two;
-        fewer frames than `count`.
+    pressures : (frames,) MPa, of every frame; NaN where it is not known. asked : MPa, rising.
+    tolerance : MPa, how far a frame may be from the asked pressure; 2 % of the largest asked one
+    unless given. in_time : whether the frames are in the order of time: those after the largest
+    pressure are then of the release, and not taken.
+    Raises InputError: no frame under pressure, none near an asked pressure, one that is nearest to
+    two; fewer frames than `count`.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)

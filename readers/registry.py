@@ -37,14 +37,10 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of data files.
 
-    Parameters
-    ----------
-    name : what `format =` in a project calls it.
-    content : what such a file holds.
-    title : what it is, in a few words.
-    read : reads a file; see `Content`. An `InputError` names what is wrong with it.
-    recognises : whether a file, by its path and its first `HEAD` bytes, is of this format. None
-        for the one of its content that takes what no other recognises.
+    name : what `format =` in a project calls it. content : what such a file holds. title : what it
+    is, in a few words. read : reads a file; see `Content`. An `InputError` names what is wrong with
+    it. recognises : whether a file, by its path and its first `HEAD` bytes, is of this format. None
+    for the one of its content that takes what no other recognises.
     """
 
     name: str
@@ -63,24 +59,22 @@ def register_format(one: Format) -> None:
 
 
 def formats(content: Content) -> tuple[Format, ...]:
-    """Our own formats of a content, by name."""
+    """Return our own formats of a content, by name."""
     _import_formats()
     ours = [one for one in _FORMATS.values() if one.content == content]
     return tuple(sorted(ours, key=lambda one: one.name))
 
 
 def format_names(content: Content) -> tuple[str, ...]:
-    """What `format =` may say: our own formats of a content, then every reader of plug-ins."""
+    """Return the values of `format =`: our formats of a content, then readers of plug-ins."""
     return names_with("bubblefit.readers", [one.name for one in formats(content)])
 
 
 def format_named(content: Content, name: str) -> Format:
-    """The format of this name, ours or that of a plug-in.
+    """Return the format of this name, ours or that of a plug-in.
 
-    Raises
-    ------
-    InputError : there is none of that name, or it is of another content.
-    PlugInFailure : a plug-in that does not work.
+    Raises InputError: there is none of that name, or it is of another content. PlugInFailure: a
+    plug-in that does not work.
     """
     for one in formats(content):
         if one.name == name:
@@ -96,13 +90,11 @@ def format_named(content: Content, name: str) -> Format:
 
 
 def format_of(content: Content, path: Path | str) -> Format:
-    """The format of a file, by its content: ours first, then those of plug-ins.
+    """Return the format of a file by its content: ours first, then those of plug-ins.
 
     Plug-ins that do not work are logged and passed over.
 
-    Raises
-    ------
-    InputError : several formats recognise it.
+    Raises InputError: several formats recognise it.
     """
     path = Path(path)
     head = _head(path)
@@ -119,12 +111,10 @@ def format_of(content: Content, path: Path | str) -> Format:
 
 
 def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
-    """What a file holds, by the format named, else by the one that is found; see `Content`.
+    """Read a file by the format named, else by the one that its content shows; see `Content`.
 
-    Raises
-    ------
-    InputError : the format cannot be told, or something is wrong with the file.
-    PlugInFailure : the plug-in named does not work.
+    Raises InputError: the format cannot be told, or something is wrong with the file.
+    PlugInFailure: the plug-in named does not work.
     """
     with suppress(OSError):  # the reader says why
         check_regular(path)
@@ -134,7 +124,7 @@ def read_file(content: Content, path: Path | str, name: str | None, *options: An
 
 @cache
 def _import_formats() -> None:
-    """Each module registers its own when it is imported."""
+    """Import every module of `formats`, which registers its own."""
     from . import formats as folder
 
     for module in iter_modules(folder.__path__):
@@ -142,7 +132,7 @@ def _import_formats() -> None:
 
 
 def _head(path: Path) -> bytes:
-    """The first bytes; of a file that cannot be read none: its reader says why."""
+    """Return the first bytes; none of a file that cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(HEAD)

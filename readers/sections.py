@@ -49,12 +49,12 @@ class Section(BaseModel):
 
 
 def beside(folder: Path, given: str) -> Path:
-    """The path that a file in `folder` names: beside it, unless absolute or below the home (~)."""
+    """Return the path of a file in `folder`, unless it is absolute or below the home (~)."""
     return folder / os.path.expanduser(given)
 
 
 def dotted(location: Sequence[str | int]) -> str:
-    """('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
+    """Return a dotted key: ('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
     text = ""
     for part in location:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -64,7 +64,7 @@ def dotted(location: Sequence[str | int]) -> str:
 def first_error(
     path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
 ) -> InputError:
-    """The first finding as an InputError; unknown keys first, as they explain missing ones.
+    """Return the first finding as an InputError; unknown keys first, as they explain missing ones.
 
     file : the sections and keys there are. at : dotted key of the table that was checked, "" for
     the whole file.
@@ -103,7 +103,7 @@ def _unknown(location: Sequence[str | int], file: type[BaseModel]) -> str:
 
 
 def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[str]:
-    """Allowed keys of the table that holds `location`."""
+    """Return allowed keys of the table that holds `location`."""
     table = file
     for part in location[:-1]:
         if isinstance(part, str):  # a number counts the tables of a list
@@ -112,7 +112,7 @@ def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[s
 
 
 def _table(annotation: Any) -> type[BaseModel]:
-    """The section class of an annotation such as `PointsSection | None` or `list[CaseSection]`."""
+    """Return the section class in an annotation such as `list[CaseSection]`."""
     return next(_sections(annotation))
 
 

@@ -36,10 +36,8 @@ LARGEST = 100.0
 class Sphere:
     """The sphere through the points of one frame.
 
-    Parameters
-    ----------
     centre : (3,) mm. radius : mm. centre_error, radius_error : mm, standard errors, as if the
-        errors of the points were independent; those of neighbours in image correlation are not.
+    errors of the points were independent; those of neighbours in image correlation are not.
     deviation : (n,) mm, distance of each point beyond the sphere. kept : (n,) whether it was used.
     points : (n, 3) mm.
     """
@@ -55,31 +53,29 @@ class Sphere:
 
     @property
     def rms(self) -> float:
-        """Of the deviations of the points that were used, mm."""
+        """Return the RMS deviation of the points used, mm."""
         return float(np.sqrt(np.mean(self.deviation[self.kept] ** 2)))
 
     @property
     def left_out(self) -> int:
-        """How many points lie so far off that they were not used."""
+        """Return the number of points too far off to be used."""
         return int((~self.kept).sum())
 
 
 def points_of(frame: Frame) -> Array:
-    """(n, 3) mm, the surface in this frame: reference places moved, where a motion is known."""
+    """Return the surface (n, 3) mm in this frame: reference places, moved where known."""
     moved = np.isfinite(frame.displacement).any()
     places = frame.points + frame.displacement if moved else frame.points
     return np.asarray(places[np.isfinite(places).all(axis=1)])
 
 
 def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
-    """The sphere with the least sum of squared distances from points (n, 3) in mm.
+    """Fit the sphere with the least sum of squared distances from points (n, 3) in mm.
 
     Points farther off than four robust standard deviations are left out, until those kept stay the
     same.
 
-    Raises
-    ------
-    InputError : too few points, points in a plane.
+    Raises InputError: too few points, points in a plane.
     """
     _check(points, path)
     centre, radius = _start(points)
@@ -108,7 +104,7 @@ def _check(points: Array, path: Path | None) -> None:
 
 
 def _start(points: Array) -> tuple[Array, float]:
-    """Of spheres through a few points each, the one that half of all points lie nearest to.
+    """Return the best of spheres through a few points each, by the median distance.
 
     A point far astray, such as one at the camera, would carry the fit through all of them away.
     """
@@ -121,14 +117,14 @@ def _start(points: Array) -> tuple[Array, float]:
 
 
 def _inside(points: Array, centre: Array, radius: float) -> NDArray[np.bool_]:
-    """(n,) which points are not too far off."""
+    """Return the mask (n,) of points that are not too far off."""
     off = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
     # Points without noise are off by rounding: none of them is astray.
     return np.asarray(off <= max(SIGMAS * float(np.median(off)) / MEDIAN, 1e-9 * radius))
 
 
 def _linear(points: Array) -> tuple[Array, float]:
-    """Eq. A.6, about the mean of the points so that it is well conditioned."""
+    """Solve Eq. A.6, about the mean of the points so that it is well conditioned."""
     middle = points.mean(axis=0)
     near = points - middle
     matrix = np.column_stack([2 * near, np.ones(len(near))])
@@ -138,7 +134,7 @@ def _linear(points: Array) -> tuple[Array, float]:
 
 
 def _slopes(points: Array, centre: Array) -> Array:
-    """(n, 4) d distance / d (centre, radius)."""
+    """Return (n, 4) d distance / d (centre, radius)."""
     arms = points - centre
     lengths = np.linalg.norm(arms, axis=1)
     return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])

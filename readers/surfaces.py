@@ -15,14 +15,14 @@ from .tables import TextTable, read_table, write_table
 
 
 def powers(points: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
-    """Terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2): x^d y^d first, the constant last."""
+    """Return terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2), highest powers first."""
     x = np.vander(points[:, 0], degree + 1)
     y = np.vander(points[:, 1], degree + 1)
     return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
 
 
 def total_power(degree: int) -> NDArray[np.intp]:
-    """i + j of each term x^i y^j, ((degree + 1)^2,)."""
+    """Return i + j of each term x^i y^j, ((degree + 1)^2,)."""
     falling = np.arange(degree, -1, -1)
     return (falling[:, None] + falling).ravel()
 
@@ -38,14 +38,11 @@ LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfac
 class DisplacementSurface:
     """Three polynomials F(x, y), one a direction of displacement, at one pressure.
 
-    Parameters
-    ----------
-    pressure : MPa.
-    degree : highest power of x and of y; 4 in the thesis.
-    coefficients : (3, (degree + 1)^2) mm, C_0 ... in the order of Eq. 4.4: x^d y^d first, powers
-        of x falling fastest, the constant last. They belong to x / scale and y / scale.
-    scale : mm, the largest coordinate fitted: it keeps high powers near one.
-    r_squared : (3,) coefficient of determination of each direction (Table 4.1).
+    pressure : MPa. degree : highest power of x and of y; 4 in the thesis. coefficients : (3,
+    (degree + 1)^2) mm, C_0 ... in the order of Eq. 4.4: x^d y^d first, powers of x falling fastest,
+    the constant last. They belong to x / scale and y / scale. scale : mm, the largest coordinate
+    fitted: it keeps high powers near one. r_squared : (3,) coefficient of determination of each
+    direction (Table 4.1).
     """
 
     pressure: float
@@ -55,21 +52,19 @@ class DisplacementSurface:
     r_squared: Array
 
     def evaluate(self, points: Array) -> Array:
-        """Displacement (n, 3) mm at reference points (n, 2) mm."""
+        """Return displacement (n, 3) mm at reference points (n, 2) mm."""
         return powers(np.asarray(points) / self.scale, self.degree) @ self.coefficients.T
 
     @property
     def physical(self) -> Array:
-        """Coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
+        """Return coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
         return self.coefficients / self.scale ** total_power(self.degree)
 
 
 def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
-    """Least-squares fit of Eq. 4.4, of any degree, to a displacement field.
+    """Fit Eq. 4.4, of any degree, to a displacement field by least squares.
 
-    Raises
-    ------
-    InputError : a degree out of range, or points too few or too regularly placed for it.
+    Raises InputError: a degree out of range, or points too few or too regularly placed for it.
     """
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
@@ -103,9 +98,7 @@ def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) ->
     These coefficients take x and y in mm and give mm, so the file can be used as it stands. Beyond
     `scale_mm`, the largest coordinate fitted, a polynomial means nothing.
 
-    Raises
-    ------
-    OSError : the file cannot be written; what was there may be lost.
+    Raises OSError: the file cannot be written; what was there may be lost.
     """
     most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
     rows: list[list[object]] = []
@@ -119,10 +112,8 @@ def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) ->
 def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
     """Read what `write_surfaces` wrote, equal to rounding.
 
-    Raises
-    ------
-    InputError : naming file, line and column: missing columns, cells that are not numbers,
-        directions that do not come as x, y, z, degrees without their coefficients.
+    Raises InputError: naming file, line and column: missing columns, cells that are not numbers,
+    directions that do not come as x, y, z, degrees without their coefficients.
     """
     table = read_table(path)
     direction = table.text("direction")
@@ -134,7 +125,7 @@ def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
 
 
 def _read(table: TextTable) -> DisplacementSurface:
-    """The surface of three rows."""
+    """Return the surface of three rows."""
     pressure, degree, scale = (
         table.constant(name) for name in ("pressure_MPa", "degree", "scale_mm")
     )
@@ -153,7 +144,7 @@ def _read(table: TextTable) -> DisplacementSurface:
 
 
 def _r_squared(value: Array, left: Array) -> Array:
-    """1 - (sum of squares left) / (that about the mean), by column; 1 for a constant met."""
+    """Return 1 - (sum of squares left) / (that about the mean), by column; 1 for a constant met."""
     about_mean = ((value - value.mean(axis=0)) ** 2).sum(axis=0)
     remaining = (left**2).sum(axis=0)
     # A constant direction (a clamped one, all zeros) has nothing to explain.

@@ -25,7 +25,7 @@ HOLES = ("", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind", "n. def.", "n/a",
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """Cells as text, and where each row stood.
+    """Cells as text, with the line of each row.
 
     path : the file. cells : one column a name of the header. lines : (rows,) line numbers in the
     file, from 1. decimal : the decimal mark, a point or a comma.
@@ -37,11 +37,9 @@ class TextTable:
     decimal: str = "."
 
     def numbers(self, column: str, holes: bool = False) -> NDArray[np.float64]:
-        """One column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN.
+        """Return one column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN.
 
-        Raises
-        ------
-        InputError : no such column, or two; a cell that is not a finite number.
+        Raises InputError: no such column, or two; a cell that is not a finite number.
         """
         import pandas as pd
 
@@ -68,11 +66,9 @@ class TextTable:
         return value
 
     def constant(self, column: str) -> float:
-        """One column that holds the same number in each row.
+        """Return one column that holds the same number in each row.
 
-        Raises
-        ------
-        InputError : as for `numbers`, or numbers that differ.
+        Raises InputError: as for `numbers`, or numbers that differ.
         """
         value = self.numbers(column)
         if (value != value[0]).any():
@@ -82,11 +78,9 @@ class TextTable:
         return float(value[0])
 
     def text(self, column: str) -> pd.Series:
-        """One column as it stands in the file.
+        """Return one column as it stands in the file.
 
-        Raises
-        ------
-        InputError : no such column, or two.
+        Raises InputError: no such column, or two.
         """
         names = [str(name) for name in self.cells.columns]
         if names.count(column) != 1:
@@ -96,7 +90,7 @@ class TextTable:
         return self.cells[column]
 
     def rows(self, keep: NDArray[np.bool_]) -> TextTable:
-        """The table with only the rows where `keep` (rows,) is true."""
+        """Return the table with only the rows where `keep` (rows,) is true."""
         return TextTable(self.path, self.cells[keep], self.lines[keep], self.decimal)
 
 
@@ -105,13 +99,11 @@ MOST_MISSING = 10**7
 
 
 def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> None:
-    """That a table is not mostly holes: a long row of names makes cells for every short row.
+    """Refuse a table that is mostly holes: a long row of names, far shorter rows.
 
     line : of the names. width : how many. rows : below them, of so many letters in all.
 
-    Raises
-    ------
-    InputError : it is.
+    Raises InputError: it is.
     """
     if width * rows > letters + MOST_MISSING:
         problem = f"{width} names, and {rows} rows that are far shorter; is it a table?"
@@ -121,9 +113,7 @@ def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> N
 def read_table(path: Path | str, comment: str = "#") -> TextTable:
     """Read a table with a header line; blank lines and those that start with `comment` are skipped.
 
-    Raises
-    ------
-    InputError : no such file, not text, empty, a row with too many cells.
+    Raises InputError: no such file, not text, empty, a row with too many cells.
     """
     import pandas as pd
 
@@ -154,14 +144,12 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
 
 
 def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> list[tuple[int, str]]:
-    """Line numbers from 1 and text of the lines that are neither blank nor a comment.
+    """Read the lines that are neither blank nor a comment, with their numbers from 1.
 
     any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit, as test
         machines write them.
 
-    Raises
-    ------
-    InputError : no such file, not text.
+    Raises InputError: no such file, not text.
     """
     try:
         content = content_of(path)
@@ -190,7 +178,7 @@ def _encoding(content: bytes) -> str:
 
 
 def _where(error: Exception, lines: NDArray[np.intp]) -> str:
-    """pandas counts the lines that it was given; say the file's own number."""
+    """Return the file's own line for an error of pandas, which counts the lines it was given."""
     found = re.search(r"(line|row) (\d+)", str(error))
     if not found:
         return ""
@@ -218,9 +206,7 @@ def write_table(
 
     comment : one line above the header, after "# ".
 
-    Raises
-    ------
-    OSError : the file cannot be written; what was there may be lost.
+    Raises OSError: the file cannot be written; what was there may be lost.
     """
     with open(path, "w", encoding="utf-8", newline="") as stream:
         if comment is not None:
@@ -236,16 +222,14 @@ _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds one number, with either mark."""
+    """Return whether a cell holds one number, with either mark."""
     return bool(_NUMBER.fullmatch(cell))
 
 
 def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
-    """The mark, "." or ",", of cells that should be numbers: line, name of the column, text.
+    """Return the decimal mark of cells that should be numbers: (line, column, text).
 
-    Raises
-    ------
-    InputError : commas that may be marks of thousands.
+    Raises InputError: commas that may be marks of thousands.
     """
     commas = [one for one in cells if _COMMA.fullmatch(one[2])]
     points = any("." in cell and is_number(cell) for _, _, cell in cells)

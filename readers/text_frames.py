@@ -43,7 +43,7 @@ SAMPLE = 500
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Where the numbers stand.
+    """Layout of the numbers in a file.
 
     separator : None for blanks. headings : of the columns. columns : those of each quantity, see
     `frame_headings.columns_of`. header : line number of the names. body : the rows of numbers.
@@ -59,7 +59,7 @@ class TextLayout:
 
 
 def cells_of(text: str, separator: str | None) -> list[str] | None:
-    """The cells of one line; None where a quotation mark is opened and not closed on it."""
+    """Return the cells of one line; None where a quotation mark is not closed on it."""
     if separator is None and '"' not in text:
         return text.split()
     if '"' not in text:
@@ -81,19 +81,12 @@ def find_layout(
     decimal: str | None = None,
     upper: bool = False,
 ) -> TextLayout:
-    """The layout of a file.
+    """Return the layout of a file.
 
-    Parameters
-    ----------
-    quantities : what its rows must hold.
-    named : the file's own names of some of them.
-    comment : lines that start so are passed over; a row of names may be one of them.
-    decimal : the mark, where it is known.
-    upper : see `frame_headings.columns_of`.
-
-    Raises
-    ------
-    InputError : no such file, no text, no row of names, a mark that may be one of thousands.
+    quantities : what its rows must hold. named : the file's own names of some of them. comment :
+    lines that start so are passed over; a row of names may be one of them. decimal : the mark,
+    where it is known. upper : see `frame_headings.columns_of`.
+    Raises InputError: no such file, no text, no row of names, a mark that may be one of thousands.
     """
     lines = read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
@@ -126,7 +119,7 @@ def find_layout(
 def _best_header(
     lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
 ) -> tuple[int, str | None, list[str]] | None:
-    """The row of names that tells most quantities, by any separator: index, separator, names."""
+    """Return the row of names with most quantities: index, separator, names."""
     best: tuple[tuple[int, bool, bool, bool, int], int, str | None, list[str]] | None = None
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:TOP]):
@@ -148,12 +141,12 @@ def _best_header(
 
 
 def _is_numbers(row: Sequence[str]) -> bool:
-    """Whether half of the cells or more are numbers."""
+    """Return whether half of the cells or more are numbers."""
     return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
 
 
 def _is_units(row: Sequence[str]) -> bool:
-    """Whether a row below the names is one of units: some are lengths, and none is a number."""
+    """Return whether a row is one of units: some are lengths, none a number."""
     plain = [cell.strip("()[]<>{} ").casefold() for cell in row]
     known = any(cell in LENGTHS or cell in PIXELS for cell in plain)
     return known and not any(is_number(cell) for cell in plain)
@@ -195,11 +188,9 @@ Flag = tuple[int, Sequence[int] | None]
 def quantity_columns(
     path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
 ) -> dict[str, int]:
-    """The one column of each quantity and flag that the headings tell; `named` : the file's own.
+    """Return the one column of each quantity and flag; `named` gives the file's own names.
 
-    Raises
-    ------
-    InputError : a quantity that was asked for is missing, or may be in several columns.
+    Raises InputError: a quantity that was asked for is missing, or may be in several columns.
     """
     columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
     _check_there(path, layout, columns, options)
@@ -213,13 +204,11 @@ def flag_columns(
     options: FrameOptions,
     status: tuple[str, Sequence[int]] | None,
 ) -> list[Flag]:
-    """The flags that are named; those the headings tell only where none is.
+    """Return the flags that are named, else those that the headings show.
 
     status : a column of states, and the values of good rows.
 
-    Raises
-    ------
-    InputError : a column that is named is missing, or there are two of the name.
+    Raises InputError: a column that is named is missing, or there are two of the name.
     """
     names = [heading.name for heading in layout.headings]
     asked = [(options.flag_column, (0,)), (options.valid_column, None)]
@@ -238,7 +227,7 @@ def flag_columns(
 def _one(
     path: Path, layout: TextLayout, key: str, where: Sequence[int], named: Mapping[str, str]
 ) -> int:
-    """The one column of a quantity."""
+    """Return the one column of a quantity."""
     if len(where) == 1:
         return where[0]
     names = [heading.name for heading in layout.headings]
@@ -263,7 +252,7 @@ def _named(path: Path, names: Sequence[str], name: str) -> int:
 def _check_there(
     path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
 ) -> None:
-    """Every quantity asked for is there, or can be had of the places before and after."""
+    """Check that every quantity asked for is there, or follows from places before and after."""
     spare = {"z", "dz"} if options.planar else set()
     for quantity in options.quantities:
         axis = quantity[-1]
@@ -291,11 +280,9 @@ WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invali
 def read_numbers(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """The numbers (good rows,) of each quantity, and which rows (rows,) the flags call good.
+    """Return the numbers (good rows,) of each quantity, and which rows (rows,) the flags call good.
 
-    Raises
-    ------
-    InputError : naming line and column.
+    Raises InputError: naming line and column.
     """
     return _quick(layout, columns, flags) or _slow(path, layout, columns, flags)
 
@@ -303,7 +290,7 @@ def read_numbers(
 def _quick(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
-    """All rows by pandas' reader; None where they have to be looked at one by one."""
+    """Read all rows by pandas; None where they have to be read one by one."""
     import pandas as pd
 
     separator, width = layout.separator, len(layout.headings)
@@ -348,12 +335,7 @@ def _quick(
 def _slow(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Row by row; flags first: a doubtful row may hold anything.
-
-    Raises
-    ------
-    InputError : naming line and column.
-    """
+    """Read row by row, flags first: a doubtful row may hold anything."""
     import pandas as pd
 
     width, rows = len(layout.headings), []
@@ -401,19 +383,13 @@ def read_text_rows(
     names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
 ) -> FrameRows:
-    """The rows of the one frame in a text file.
+    """Read the rows of the one frame in a text file.
 
-    Parameters
-    ----------
-    comment : that of the format, where it has one of its own.
-    upper : of two names that differ only in their letters' size, the large one is the length.
-    names : what the format calls some quantities; the user's own come first.
-    status : a column of states, and the values of good rows.
-
-    Raises
-    ------
-    InputError : naming file, line and column: no such file, missing columns, cells that are not
-        numbers.
+    comment : that of the format, where it has one of its own. upper : of two names that differ only
+    in their letters' size, the large one is the length. names : what the format calls some
+    quantities; the user's own come first. status : a column of states, and the values of good rows.
+    Raises InputError: naming file, line and column: no such file, missing columns, cells that are
+    not numbers.
     """
     own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **own}

@@ -35,22 +35,17 @@ class Biaxial:
     studied: Studied | None = None
 
     def read(self, section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-        """The test of a section, and its files.
-
-        Raises
-        ------
-        InputError : naming the file and the dotted key, or a data file.
-        """
+        """Read the section of a test, and its files."""
         return read(section, place, name)
 
     def prepare(
         self, test: BiaxialTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedBiaxial:
-        """Return the test as it is: its data were read with its section."""
+        """Return the test, which was read with its data."""
         return PreparedBiaxial(test)
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Single ratios, up to the strains that the law is known for."""
+        """Return single ratios, up to the strains that the law is known for."""
         return candidates(planning)
 
 

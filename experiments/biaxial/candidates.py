@@ -33,7 +33,7 @@ PRESTRESS = 0.05
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Each ratio by itself, up to the strains that the law is known for."""
+    """Return each ratio by itself, up to the strains that the law is known for."""
     own = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
     noise_is = "assumed" if not own else f"that of {own[0].test.name}"
     if planning.noise is not None:
@@ -45,12 +45,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> PreparedBiaxial:
-    """The path with the strains that the law gives.
-
-    Raises
-    ------
-    SolverFailure : the law carries no load of this ratio.
-    """
+    """Return the path with the strains that the law gives."""
     thickness = planning.place.fabric.thickness
     highest = _end(planning.law, planning.ends, ratio, thickness)
     loads = np.outer(np.linspace(PRESTRESS, 1.0, LOADS) * highest, shares(ratio))
@@ -72,7 +67,7 @@ def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> Pre
 
 
 def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
-    """% of independent strains."""
+    """Return the noise of independent strains, %."""
     if planning.noise is not None:
         return planning.noise
     known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.data.paths]
@@ -82,12 +77,7 @@ def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
 
 
 def _end(law: HypoelasticLaw, ends: Array, ratio: str, thickness: float) -> float:
-    """kN/m of the larger load at which a yarn is at the end of its strain.
-
-    Raises
-    ------
-    SolverFailure : no load at all is carried.
-    """
+    """Return the larger load (kN/m) at which a yarn is at the end of its strain."""
     low = largest_load(law, thickness, [shares(ratio)], ends[:2])
     if not low > 0:
         raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")

@@ -22,7 +22,7 @@ STIFFER = 1.15
 
 
 def doubts_of_biaxial(test: BiaxialTest, expected: Expected) -> Sequence[Doubt]:
-    """What is doubtful in the paths of a test."""
+    """Return the doubts about the paths of a test."""
     paths, found = test.data.paths, list[Doubt]()
     for path in paths:
         found += [*_units(path), *_ratio(path)]
@@ -30,7 +30,7 @@ def doubts_of_biaxial(test: BiaxialTest, expected: Expected) -> Sequence[Doubt]:
 
 
 def _units(path: BiaxialPath) -> list[Doubt]:
-    """Shares called %, N/m called kN/m."""
+    """Doubt strains that look like percent, loads that look like N/m."""
     end, load = float(np.abs(path.since).max()), float(path.load.max())
     found = []
     if not LEAST_END < end < MOST_END:
@@ -49,7 +49,7 @@ def _units(path: BiaxialPath) -> list[Doubt]:
 
 
 def _ratio(path: BiaxialPath) -> list[Doubt]:
-    """Loads of another ratio than the one that is said, mostly of the other yarn."""
+    """Doubt loads of another ratio than the one listed, mostly of the other yarn."""
     warp, fill = (path.load[-1] - path.load[0]).tolist()
     said = np.degrees(np.arctan2(*shares(path.ratio)[::-1]))
     own = np.degrees(np.arctan2(fill, warp))
@@ -64,7 +64,7 @@ def _ratio(path: BiaxialPath) -> list[Doubt]:
 
 
 def _modulus(paths: Sequence[BiaxialPath], thickness: float, expected: Expected) -> list[Doubt]:
-    """A unit that is wrong by a thousand shows in the modulus of the yarn that is pulled more."""
+    """Doubt a modulus that shows a unit wrong by a thousand."""
     if not expected.moduli:
         return []
     for path in paths:
@@ -84,8 +84,7 @@ def _modulus(paths: Sequence[BiaxialPath], thickness: float, expected: Expected)
 
 
 def _swapped(paths: Sequence[BiaxialPath]) -> list[Doubt]:
-    """Each of a pair of mirrored ratios has the strains of the other: a yarn that is pulled less
-    stretches more in both."""
+    """Doubt mirrored ratios in which the yarn that is pulled less stretches more."""
     found = {path.ratio: path for path in paths}
     for ratio, other in (("2:1", "1:2"), ("1:0", "0:1")):
         if ratio not in found or other not in found:

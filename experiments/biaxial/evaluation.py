@@ -46,7 +46,7 @@ BACK = 0.01
 
 @dataclass(frozen=True, eq=False)
 class KeptStrain:
-    """Of one phase of cycles, (2,) along warp and fill, as shares.
+    """Residual strains of one phase of cycles, (2,) along warp and fill, as shares.
 
     before : at the beginning of its first loading; after : when the loads are back after its last
     one. None where they are not what they were in the first row. load : (2,) kN/m, of that row.
@@ -62,7 +62,7 @@ class KeptStrain:
 
 
 def kept_strains(data: BiaxialData) -> tuple[KeptStrain, ...]:
-    """Phase by phase in the order of the files."""
+    """Return residual strains phase by phase in the order of the files."""
     return tuple(
         _kept(table, same, cycles)
         for table, cycles in zip(data.tables, data.cycles, strict=True)
@@ -107,7 +107,7 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "n
 
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
-    """Constants of one test.
+    """Elastic constants of one test.
 
     paths, lines : measured, and their regression lines, ratio by ratio. chosen : of the options
     that were asked for; others : of the others that the paths settle. first, last : of the same
@@ -126,7 +126,7 @@ class BiaxialEvaluation:
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader of the constants should know."""
+        """Return notes for a reader of the constants."""
         c, found = self.chosen.constants, []
         if not c.stable:
             words = (
@@ -147,17 +147,15 @@ class BiaxialEvaluation:
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
-        """Least and largest of each constant over all options."""
+        """Return the least and largest of each constant over all options."""
         ends = spread_of((self.chosen, *self.others))
         return {NAMES[name]: pair for name, pair in ends.items()}
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
-    """The constants of a test by some options, beside those of all others.
+    """Return the constants of a test by some options, beside those of all others.
 
-    Raises
-    ------
-    InputError : paths that do not settle the constants.
+    Raises InputError: paths that do not settle the constants.
     """
     paths = test.data.paths
     lines = _lines(paths)
@@ -188,7 +186,7 @@ def _lines(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
 
 
 def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
-    """With another cycle of the same ratios, without the conditioning that is asked for."""
+    """Return the paths of another cycle of the same ratios, without conditioning."""
     section, data = test.section, test.data
     ratios = [path.ratio for path in data.paths]
     paths = evaluated_paths(data.tables, data.cycles, which, section.conditioning, ratios)
@@ -208,7 +206,7 @@ CONVENTION = (
 
 
 def in_words(options: Options) -> str:
-    """What was evaluated, in a few words."""
+    """Return a description of what was evaluated."""
     of = "loads" if options.minimise == "load" else "strains"
     unloaded = "with" if options.unloaded else "without"
     reciprocal = "reciprocal" if options.reciprocal else "free"
@@ -217,7 +215,7 @@ def in_words(options: Options) -> str:
 
 
 def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row for each choice: options, constants of both forms, squares of strain.
+    """Return a table of constants of both forms and squares of strain, by options.
 
     Columns E in kN/m, A (direct form) in kN/m, squares in %^2 at `POINTS` points a path.
     """
@@ -228,7 +226,7 @@ def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row a ratio: cycle, loads and strains of the regression lines, what they leave."""
+    """Return a table of the regression lines, by ratio."""
     table = []
     for path, line in zip(found.paths, found.lines, strict=True):
         table.append(
@@ -253,7 +251,7 @@ def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row a phase of cycles: strain kept before and after it, %."""
+    """Return a table of residual strains before and after each phase of cycles, %."""
 
     def percent(strain: Array | None) -> Array:
         return np.full(2, np.nan) if strain is None else PERCENT * strain
@@ -279,7 +277,7 @@ def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def lines_of(found: BiaxialEvaluation) -> list[str]:
-    """For the terminal."""
+    """Return the results as lines for the terminal."""
     c = found.chosen.constants
     said = [
         f"{found.test}: {in_words(found.chosen.options)}; {found.chosen.paths} strain paths of "
@@ -316,7 +314,7 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
 
 
 def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
-    """For result.json."""
+    """Return the results for result.json."""
 
     def plain(table: pd.DataFrame) -> list[dict[str, Any]]:
         return [
@@ -337,7 +335,7 @@ def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
 
 
 def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
-    """constants.csv, lines.csv, kept.csv and constants.png into a folder; what was written."""
+    """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
     written = []
     for name, table in (
         ("constants.csv", option_table(found)),

@@ -21,17 +21,14 @@ PERCENT = 100.0
 
 
 class StrainObjective:
-    """(model - measured) / (scale sqrt(n)) of n strains along the warp, then along the fill.
+    """Residuals (model - measured) / (scale sqrt(n)) of n strains along warp, then fill.
 
     The norm of a block is the RMS error of a strain over the scale, times the weight. Both are
     counted from the first load of the path: what the fabric kept of earlier cycles is no part.
 
-    Parameters
-    ----------
     load : (n, 2) N/mm, by which the values lie along their path. strain : (n, 2) measured since the
-        beginning of the path, as shares.
-    scale : share of strain that counts as one. weight : of both blocks.
-    noise : of one measured strain; None: `EXTENSOMETER` is reckoned with.
+    beginning of the path, as shares. scale : share of strain that counts as one. weight : of both
+    blocks. noise : of one measured strain; None: `EXTENSOMETER` is reckoned with.
     """
 
     #: What the residuals are in after `scale`.
@@ -56,55 +53,55 @@ class StrainObjective:
 
     @property
     def scale(self) -> Array:
-        """(2 n,): % of strain in one unit of each residual."""
+        """Return % of strain in one unit of each residual, (2 n,)."""
         return np.full(sum(self.sizes), PERCENT * self._unit)
 
     @property
     def places(self) -> tuple[Array, ...]:
-        """(n, 1) N/mm of each block's values: along a path neighbours err as one."""
+        """Return the load (n, 1) N/mm of each block's values: neighbours err as one."""
         return (self.load[1:].max(axis=1, keepdims=True),) * 2
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Everything measured that the residual depends on."""
+        """Return everything measured that the residual depends on."""
         return self.load, self.strain
 
     def modelled(self, history: History) -> Array:
-        """(n, 2) the model's strains since the beginning of the path."""
+        """Return the model's strains (n, 2) since the beginning of the path."""
         own = elongations(history.displacement)
         return np.asarray(own - own[0])
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Both blocks, (2 n,); there is no nuisance."""
+        """Return both blocks, (2 n,)."""
         return self._blocks(self.modelled(history) - self.strain)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """(2 n, parameters) from the slope of the displacements."""
+        """Return (2 n, parameters) from the slope of the displacements."""
         own = elongations(slope)
         return self._blocks(own - own[0])
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """(2 n, 0): there is none."""
+        """Return (2 n, 0): there are no nuisance unknowns."""
         if names:
             raise InputError(None, "nuisance", f"a biaxial path knows no {', '.join(names)}")
         return np.empty((sum(self.sizes), 0))
 
     def of_points(self, values: Array) -> Array:
-        """(m,) for each residual, of values for each load of the path."""
+        """Return values for each residual from values for each load of the path."""
         return np.tile(values[1:], 2)
 
     def shifted(self, here: History, there: History) -> StrainObjective:
-        """The objective of a model that shows `here` where this one shows `there`."""
+        """Return the objective of a model that shows `here` where this one shows `there`."""
         other = copy.copy(self)
         other.strain = self.strain - (self.modelled(here) - self.modelled(there))
         return other
 
     def rms(self, history: History) -> Array:
-        """(2,) RMS error of the strains along warp and fill, %."""
+        """Return the RMS errors (2,) of the strains along warp and fill, %."""
         off = (self.modelled(history) - self.strain)[1:]
         return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
 
     def _blocks(self, values: Array) -> Array:
-        """Rows (n, 2, ...) without the first as one column of values, the warp's first."""
+        """Return rows (n, 2, ...) without the first as one column of values, the warp's first."""
         rows = np.swapaxes(values[1:], 0, 1)
         return np.asarray(rows.reshape(-1, *values.shape[2:]) / self._unit)

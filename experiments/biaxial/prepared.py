@@ -28,7 +28,7 @@ from .test import BiaxialTest, reach_of
 
 @dataclass(frozen=True, eq=False)
 class FittedPath:
-    """One ratio of a finished fit: what was measured, and what the best law makes of it."""
+    """One ratio of a finished fit: measured data and the best law's response."""
 
     path: BiaxialPath
     objective: StrainObjective
@@ -36,14 +36,14 @@ class FittedPath:
 
     @property
     def rms(self) -> tuple[float, float]:
-        """Of the strains along warp and fill, %."""
+        """Return the RMS errors of the strains along warp and fill, %."""
         warp, fill = self.objective.rms(self.history).tolist()
         return warp, fill
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedBiaxial:
-    """The test: its files were read with its section."""
+    """A biaxial test with its data."""
 
     test: BiaxialTest
     objective_is = "sum of the ratios' RMS errors of strain, warp and fill, over their largest"
@@ -51,41 +51,39 @@ class PreparedBiaxial:
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """None: a ratio is no specimen of another."""
+        """Return nothing: a ratio is no specimen of another."""
         return {}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Its ratios, where it has several."""
+        """Return the ratios as parts, where there are several."""
         paths = self.test.data.paths
         whole = {self.part(p.ratio): np.ones(len(p.load), dtype=bool) for p in paths}
         ratios = {p.ratio: {**whole, self.part(p.ratio): ~whole[self.part(p.ratio)]} for p in paths}
         return {"ratios": ratios} if len(paths) > 1 else {}
 
     def reach(self, masks: Masks) -> Reach:
-        """What the ratios say of which masks leave anything."""
+        """Return the reach of the ratios that masks leave."""
         return reach_of(self.kept(masks))
 
     def kept(self, masks: Masks | None) -> tuple[BiaxialPath, ...]:
-        """The ratios of which masks leave anything to match: they are matched whole."""
+        """Return the ratios that masks leave, which are matched whole."""
         known = masks or {}
         paths = self.test.data.paths
         return tuple(p for p in paths if known.get(self.part(p.ratio), np.True_).any())
 
     def part(self, ratio: str) -> str:
-        """The name of the comparison of a ratio."""
+        """Return the name of the comparison of a ratio."""
         return f"{self.test.name}: {ratio}"
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """One a ratio of which anything is left.
+        """Return a comparison a ratio that masks leave.
 
         They lead in: a patch has no mesh, and hardly ever fails.
 
-        Raises
-        ------
-        InputError : no strain at all along a path.
+        Raises InputError: no strain at all along a path.
         """
         test, models = self.test, self.test.models()
         kept, found = self.kept(masks), []
@@ -106,11 +104,11 @@ class PreparedBiaxial:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same comparisons: there is no mesh, and one increment a reading is enough."""
+        """Return the same comparisons: there is no mesh to refine."""
         return self.comparisons(make_solver, weighting)
 
     def fitted_paths(self, fitted: FittedTest) -> tuple[FittedPath, ...]:
-        """The ratios with what the fit makes of them."""
+        """Return the ratios with the best law's response."""
         known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
         found = []
         for path in self.test.data.paths:
@@ -120,7 +118,7 @@ class PreparedBiaxial:
         return tuple(found)
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files; the rows that count are those of the paths that are matched."""
+        """Return the files, with the number of rows on matched paths."""
         used = {id(table): 0 for table in self.test.data.tables}
         for path in self.test.data.paths:
             used[id(path.table)] += len(path.load)
@@ -133,5 +131,5 @@ class PreparedBiaxial:
         ]  # fmt: skip
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """What makes the paths doubtful."""
+        """Return the doubts about the paths."""
         return doubts_of_biaxial(self.test, expected)

@@ -29,7 +29,7 @@ YARNS = ("warp", "fill")
 
 
 def misfit_table(paths: Sequence[FittedPath]) -> Table:
-    """Misfit ratio by ratio."""
+    """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
         [
             p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
@@ -50,7 +50,7 @@ def misfit_table(paths: Sequence[FittedPath]) -> Table:
 
 
 def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Loads and strains of every ratio, measured and modelled, since the beginning of the path."""
+    """Return loads and strains of every ratio, measured and modelled, along the path."""
     parts = []
     for p in paths:
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
@@ -71,7 +71,7 @@ def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
 
 
 def residual_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Every matched strain: part, loads, quantity, measured, modelled, difference, unit."""
+    """Return a table of every matched strain."""
     parts = []
     for p in paths:
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
@@ -126,7 +126,7 @@ def exhibit(
 
 
 def findings_of(test: BiaxialTest, paths: Sequence[FittedPath]) -> Findings:
-    """Numbers and words of the best fit."""
+    """Return numbers and words of the best fit."""
     errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
     return Findings(
@@ -154,7 +154,7 @@ def _numbers(fitted: FittedPath) -> dict[str, Any]:
 
 
 def _warnings(test: BiaxialTest) -> list[Note]:
-    """What the data leave open before any fit."""
+    """Return warnings of what the data leave open before any fit."""
     words = (
         f"{test.name} pulls along the yarns only: it says nothing of G12, which rests on other "
         "tests or stays where its fit began"
@@ -168,7 +168,7 @@ PATHS = "biaxial.png"
 
 
 def exhibit_examined(test: BiaxialTest, out: Output) -> Exhibit:
-    """Write the paths that are evaluated; a table of all cycles."""
+    """Draw the paths; return a table of all cycles."""
     panels = [
         BiaxialPanel(path.ratio, path.load.max(axis=1), PERCENT * path.since)
         for path in test.data.paths
@@ -221,7 +221,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """Write paths.csv and paths.png; a failed analysis is told as such.
+    """Write paths.csv and paths.png, also of failed analyses.
 
     within_range : show each path only to where the card's valid range ends.
     """
@@ -253,7 +253,7 @@ def _loading(
 
 
 def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
-    """For result.json."""
+    """Return the results for result.json."""
     if isinstance(one, SolverFailure):
         return {"failed": one.reason}
     return {
@@ -265,7 +265,7 @@ def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
 
 
 def _lines_of_cards(found: Loadings) -> list[str]:
-    """The same for the terminal."""
+    """Return the results as lines for the terminal."""
     lines = []
     for (name, ratio), one in found.items():
         if isinstance(one, SolverFailure):
@@ -309,7 +309,7 @@ def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
 
 
 def _within(card: MaterialCard, elongation: Array) -> int:
-    """Loads before a strain leaves the card's valid range."""
+    """Return the number of loads within the card's valid range."""
     beyond = (np.log1p(elongation) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
     return int(np.argmax(beyond)) if beyond.any() else len(elongation)
 
@@ -330,5 +330,5 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
 
 
 def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
-    """Return every matched strain in %, see `residual_table`."""
+    """Return a table of every matched strain in %."""
     return residual_table(prepared.fitted_paths(fitted))

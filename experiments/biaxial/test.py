@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class BiaxialData:
-    """All that was read: files, their cycles, and the path of each ratio, as it is evaluated."""
+    """Data of a test: files, their cycles, and the path of each ratio."""
 
     tables: tuple[BiaxialTable, ...]
     cycles: tuple[tuple[Cycle, ...], ...]
@@ -40,11 +40,9 @@ class BiaxialData:
 
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
-    """The data of a section; none where a file is not there and none is needed.
+    """Read the data of a section; none where a file is missing and not needed.
 
-    Raises
-    ------
-    InputError : naming the project and the key, or the data file.
+    Raises InputError: naming the project and the key, or the data file.
     """
     data = section.data
     folder = place.data_folder
@@ -75,7 +73,7 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
 
 
 def _listed(place: Place, data: TablesSection, folder: Path) -> list[tuple[Path, str, str | None]]:
-    """Each file, its key, and the ratio that it is listed for."""
+    """Return each file, its key, and the ratio that it is listed for."""
     if isinstance(data.files, list):
         return [(folder / name, f"data.files[{i}]", None) for i, name in enumerate(data.files)]
     listed: list[tuple[Path, str, str | None]] = []
@@ -125,18 +123,18 @@ class BiaxialTest:
 
     @property
     def reads_files(self) -> bool:
-        """Yes: a biaxial test is measured."""
+        """Return True: a biaxial test is measured."""
         return True
 
     @property
     def reach(self) -> Reach:
-        """The largest strains along warp and fill."""
+        """Return the largest strains along warp and fill."""
         return reach_of(self.data.paths)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
-        """A patch for each ratio, driven by the loads as they were measured.
+        """Return a patch for each ratio, driven by the loads as they were measured.
 
         Nothing is there to be refined: one point of the law, one increment a reading.
         """
@@ -144,12 +142,12 @@ class BiaxialTest:
         return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}
 
     def settings(self) -> Mapping[str, object]:
-        """What of the section a result depends on; the data count by themselves."""
+        """Return the settings that a result depends on; data count by themselves."""
         return {"weight": self.weight, "noise": self.noise}
 
 
 def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
-    """The largest strains along warp and fill; of the shear a test tells nothing."""
+    """Return the largest strains along warp and fill; the shear stays unknown."""
     if not paths:
         return Reach()
     ends = np.max([path.strain.max(axis=0) for path in paths], axis=0)
@@ -158,11 +156,9 @@ def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
 
 
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-    """The test of a section, and its files.
+    """Read the section of a test, and its files.
 
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a data file.
+    Raises InputError: naming the file and the dotted key, or a data file.
     """
     noise = None if section.noise is None else 0.01 * section.noise
     return BiaxialTest(

@@ -11,7 +11,7 @@ __all__ = ["KIND", "CylinderKind"]
 
 
 class CylinderKind:
-    """[[cylinder]] of a project."""
+    """Kind of the sections [[cylinder]] of a project."""
 
     name = "cylinder"
     title = "an inflated cylinder in three-point bending"
@@ -22,7 +22,7 @@ class CylinderKind:
     studied = STUDIED
 
     def read(self, section: CylinderSection, place: Place, name: str) -> CylinderTest:
-        """The test of a section; raises InputError."""
+        """Read the section of a test."""
         return read(section, place, name)
 
 

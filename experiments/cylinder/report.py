@@ -62,7 +62,7 @@ class Beam:
 
 
 def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
-    """What was meshed and its mirror images."""
+    """Return the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
     points, quads, warp = mesh.points, mesh.quads, mesh.warp
@@ -86,7 +86,7 @@ def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
 
 
 def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies:
-    """Supports and collar, brought to touch the inflated beam; the collar then goes down."""
+    """Return supports and collar, placed to touch the inflated beam."""
     at = beam.mesh.points + beam.inflated
     radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
     beside = np.abs(np.abs(at[:, 2]) - half)
@@ -101,7 +101,7 @@ def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies
 
 
 def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> None:
-    """The picture of the last frame."""
+    """Draw the last frame."""
     beam = whole_beam(model, run)
     rest, sets = beam.mesh.points, beam.mesh.node_sets
     nodes, top, bottom = (sets[name] for name in LINES)
@@ -123,7 +123,7 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
 
 
 def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
-    """The last frame for ParaView, with the inflated one as a further displacement."""
+    """Write the last frame for ParaView, with the inflated one as a further displacement."""
     beam = whole_beam(model, run)
     write_vtu(
         beam.mesh,
@@ -141,10 +141,8 @@ FIGURES, BEAMS = "figures", "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Loads, gas and beam of every test, and all loads together, as pictures.
+    """Draw loads, gas and beam of every test, and all loads together.
 
-    Returns
-    -------
     Those that the page shows, each with its caption: the loads are charts there.
     """
     tests = tests_of(outcome)
@@ -176,7 +174,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
 
 
 def load_charts(outcome: CylinderOutcome) -> list[Charts]:
-    """Load over deflection of every test; nothing where no run came to an end."""
+    """Return charts of load over deflection of every test; none where no run ended."""
     cards = list(dict.fromkeys(run.card for run in outcome.runs))
     ranks = {card: rank for rank, card in enumerate(cards)}
     tests = tests_of(outcome)
@@ -190,7 +188,7 @@ def load_charts(outcome: CylinderOutcome) -> list[Charts]:
 
 
 def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """The last frame of every run for ParaView; files and what they are."""
+    """Write the last frame of every run for ParaView; return the files."""
     tests = file_names([test.name for test in tests_of(outcome)])
     cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))
     files = []
@@ -205,12 +203,12 @@ def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
 
 
 def tests_of(outcome: CylinderOutcome) -> list[CylinderTest]:
-    """The tests of the runs, each once."""
+    """Return the tests of the runs, each once."""
     return list({id(run.test): run.test for run in outcome.runs}.values())
 
 
 def file_names(names: Sequence[str]) -> dict[str, str]:
-    """A name for files for each, all different."""
+    """Return different file names for each."""
     files: dict[str, str] = {}
     for number, name in enumerate(names, start=1):
         plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
@@ -220,7 +218,7 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def _walls(outcome: CylinderOutcome) -> str:
-    """For a caption: what lines and bands are."""
+    """Return a caption for lines and bands."""
     if len(outcome.band) < 2:
         return ""
     predicted, *others = (end.name for end in outcome.band)
@@ -232,7 +230,7 @@ def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
 
 
 def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
-    """A row a diameter where there are several of them with several pressures."""
+    """Return a row a diameter, where several diameters have several pressures."""
     rows: dict[float, list[CylinderTest]] = {}
     for test in tests:
         rows.setdefault(round(test.diameter, 6), []).append(test)
@@ -243,7 +241,7 @@ def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
 
 
 def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
-    """The runs of a test that did not fail, of what the solver predicts."""
+    """Return the runs of a test that did not fail, of what the solver predicts."""
     own = [i for i in outcome.bent if outcome.runs[i].test is test]
     return [i for i in own if outcome.runs[i].predicted]
 
@@ -288,7 +286,7 @@ SIZES: Mapping[str, Callable[[CylinderTest], float]] = {
 
 
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
-    """What a reader should know before any load: how sure they are, and what was assumed."""
+    """Return notes on the uncertainty of the loads and on assumptions."""
     lines = []
     if outcome.spreads:
         shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
@@ -351,7 +349,7 @@ def _write(table: pd.DataFrame, out: Output, name: str) -> None:
 
 
 def _common(tests: Sequence[CylinderTest]) -> list[tuple[str, object]]:
-    """What all tests share, for the head of the page."""
+    """Return the facts that all tests share."""
     facts: list[tuple[str, object]] = []
     for label, values in (
         ("length, mm", {t.length for t in tests}),
@@ -445,7 +443,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:
-    """The row with names and numbers that stay on one line."""
+    """Return the row with names and numbers that stay on one line."""
     return [c.replace(" ", "\u00a0") if isinstance(c, str) and len(c) < SHORT else c for c in row]
 
 
@@ -456,7 +454,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """load_deflection.csv, figures and beams; the numbers of every card."""
+    """Write load_deflection.csv, figures and beams; return the numbers of every card."""
     kind, predicted = CylinderPredicted(), []
     for name, card in cards.items():
         run = runs[name, PART]

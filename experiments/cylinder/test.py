@@ -34,11 +34,10 @@ from .section import CylinderSection, MeasuredSection
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Every repetition in the files of a section; none where it lists none.
+    """Read every repetition in the files of a section; none where it lists none.
 
-    Raises
-    ------
-    InputError : a file that is listed twice or is not there; of a file, naming it and the line.
+    Raises InputError: a file that is listed twice or is not there; of a file, naming it and the
+    line.
     """
     names = section.files or []
     folder = place.data_folder
@@ -111,11 +110,11 @@ class CylinderTest:
 
     @property
     def reads_files(self) -> bool:
-        """Whether its section lists measured files."""
+        """Return whether its section lists measured files."""
         return self.listed
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files of the measured repetitions."""
+        """Return the files of the measured repetitions."""
         return joined(
             DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
             for c in self.measured
@@ -124,15 +123,13 @@ class CylinderTest:
 
     @property
     def reach(self) -> Reach:
-        """Nothing: its strains are known only when a card is."""
+        """Return nothing: the strains are known only with a card."""
         return Reach()
 
     def model(self, thickness: float | None = None) -> CylinderModel:
-        """The test with a fabric of this thickness (mm), else of the project's.
+        """Return the model with a fabric of this thickness (mm), else of the project's.
 
-        Raises
-        ------
-        InputError : sizes that make no mesh or bodies that do not fit around it.
+        Raises InputError: sizes that make no mesh or bodies that do not fit around it.
         """
         return inflated_cylinder(
             self.diameter,
@@ -153,11 +150,9 @@ class CylinderTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, CylinderModel]:
-        """The one model; edges, or every increment of pressure and deflection, divided.
+        """Return the one model; edges, or every increment, divided by a factor.
 
-        Raises
-        ------
-        InputError : a mesh that cannot be had; increments to be joined.
+        Raises InputError: a mesh that cannot be had; increments to be joined.
         """
         if what == "elements":
             return {PART: replace(self, size=self.size / factor).model(thickness)}
@@ -169,7 +164,7 @@ class CylinderTest:
         return {PART: replace(model, inflation=inflation, increments=increments)}
 
     def settings(self) -> Mapping[str, object]:
-        """Everything but names, measurements and where the curve is read."""
+        """Return everything but names, measurements and where the curve is read."""
         names = (
             "diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
             "deflections",
@@ -179,11 +174,9 @@ class CylinderTest:
 
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
-    """The test of a section; a cylinder that makes no model is found here, before anything runs.
+    """Read the section of a test; refuse a cylinder that makes no model.
 
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a measured file and line.
+    Raises InputError: naming the file and the dotted key, or a measured file and line.
     """
     scales = place.scales
 
@@ -240,7 +233,7 @@ def _gas(section: CylinderSection, scale: float) -> Gas:
 
 
 def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
-    """Those listed, else equal steps."""
+    """Return the deflections listed, else equal steps."""
     if section.deflections is not None:
         return tuple(d * scale for d in section.deflections)
     end = DEFLECTION if section.deflection is None else section.deflection * scale

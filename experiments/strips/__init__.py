@@ -55,22 +55,17 @@ class Strips:
     )
 
     def read(self, section: StripsSection, place: Place, name: str) -> StripsTest:
-        """The test of a section, and its load curves.
-
-        Raises
-        ------
-        InputError : naming the file and the dotted key, or a data file.
-        """
+        """Read the section of a test, and its load curves."""
         return read(section, place, name)
 
     def prepare(
         self, test: StripsTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedStrips:
-        """Return the test as it is: its data were read with its section."""
+        """Return the test, which was read with its data."""
         return PreparedStrips(test)
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Strips along the yarns and at angles to them."""
+        """Return strips along the yarns and at angles to them."""
         return candidates(planning)
 
 

@@ -27,21 +27,21 @@ SCATTER = 0.04
 
 @dataclass(frozen=True)
 class Pull:
-    """A strip that could be pulled: direction as the kind knows it, and its angle in degrees."""
+    """A strip that could be pulled: its direction (warp, fill, bias) and its angle in degrees."""
 
     direction: str
     angle: float
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Return a readable name."""
         if self.direction != "bias":
             return f"{self.direction} strip"
         return f"strip at {self.angle:g} degrees"
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Each direction by itself; of the project's first strips, or of usual ones."""
+    """Return each direction by itself, after the project's first strips or usual ones."""
     own = [test for test in planning.present if isinstance(test, PreparedStrips)]
     template = own[0] if own else None
     angles = dict.fromkeys([*ANGLES, *([template.test.bias_angle] if template else [])])
@@ -56,7 +56,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
-    """The strip with the loads that the law gives, one value an increment."""
+    """Return the strip with the loads that the law gives, one value an increment."""
     strip = _strip(pull, template, planning)
     test = _test(pull, strip, template, planning)
     (model,) = test.models().values()
@@ -69,7 +69,7 @@ def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Pr
 
 
 def _strip(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Strip:
-    """As long as the project's own of the direction, else pulled as far as the law is known."""
+    """Return a strip as long as the project's own, else up to the end of the known law."""
     own = None if template is None else template.test.strips.get(pull.direction)
     gauge = GAUGE if own is None else own.gauge_length
     final = gauge * math.exp(_strain(pull, planning))
@@ -80,7 +80,7 @@ def _strip(pull: Pull, template: PreparedStrips | None, planning: Planning) -> S
 
 
 def _strain(pull: Pull, planning: Planning) -> float:
-    """Logarithmic strain of the gauge at which a yarn, or the shear between them, is at its end.
+    """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
 
     A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
     """
@@ -115,7 +115,7 @@ def _test(
 def _noise(
     pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
 ) -> float:
-    """N of independent loads: that of the own direction, else of the others or the usual scatter.
+    """Return the noise (N) of independent loads: of the own direction, the others, or usual.
 
     The largest of the others counts, relative to the largest load.
     """
@@ -132,7 +132,7 @@ def _noise(
 
 
 def _precision(direction: str, template: PreparedStrips, planning: Planning) -> Precision:
-    """Of the project's own strips of a direction, one specimen."""
+    """Return the precision of one specimen among the project's own strips of a direction."""
     told = planning.precision[template.part(direction)]
     specimens = len(template.test.strips[direction].curves) or template.test.specimens or 1
     if template.test.match_by != "points":

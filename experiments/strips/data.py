@@ -45,11 +45,9 @@ class ListedFile:
 
 
 def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
-    """The files of [strips.data], there or not, in the order of the section.
+    """Return the files of [strips.data], there or not, in the order of the section.
 
-    Raises
-    ------
-    InputError : none in any direction, one that is listed twice for the same.
+    Raises InputError: none in any direction, one that is listed twice for the same.
     """
     if data.polynomials is not None:
         return [ListedFile(folder / data.polynomials, "data.polynomials")]
@@ -76,15 +74,13 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
 def measured_curves(
     place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
 ) -> dict[str, tuple[LoadCurve, ...]]:
-    """The specimens' curves by direction, in the order of `DIRECTIONS`; only those there are.
+    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
 
     A file with one curve in a direction perhaps lists several specimens, one after the other and
     not named: it is split where the elongation starts again. width : of the strips, mm.
 
-    Raises
-    ------
-    InputError : naming the data file and line: see `read_load_curves`; naming the project and
-        key: one curve listed for two directions.
+    Raises InputError: naming the data file and line: see `read_load_curves`; naming the project and
+    key: one curve listed for two directions.
     """
     format = named_format(place, "data.format", "machine table", data.format)
     columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
@@ -131,19 +127,15 @@ PLACES = 200  # at which a polynomial is asked for its regions
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """One direction. Lengths mm, loads N.
+    """Data of one direction; lengths mm, loads N.
 
-    Parameters
-    ----------
-    direction : warp, fill or bias.
-    gauge_length, final_length : of the virtual strain gauge, at rest and at the end.
-    polynomial : the load curve, given or fitted to the curves; None where a forward analysis does
-        without data.
-    curves : the specimens' points, empty where only the polynomial is given.
-    scatter : standard deviation of the points about the polynomial; None where not known.
-    through_origin : whether a polynomial through the points starts in the origin.
-    open_end : nobody said the final length: it is where the points end.
-    published : the file of a polynomial that was given, None of one fitted to points.
+    direction : warp, fill or bias. gauge_length, final_length : of the virtual strain gauge, at
+    rest and at the end. polynomial : the load curve, given or fitted to the curves; None where a
+    forward analysis does without data. curves : the specimens' points, empty where only the
+    polynomial is given. scatter : standard deviation of the points about the polynomial; None where
+    not known. through_origin : whether a polynomial through the points starts in the origin.
+    open_end : nobody said the final length: it is where the points end. published : the file of a
+    polynomial that was given, None of one fitted to points.
     """
 
     direction: str
@@ -158,37 +150,37 @@ class Strip:
 
     @property
     def elongation(self) -> float:
-        """Of the gauge at the end, mm."""
+        """Return the elongation of the gauge at the end, mm."""
         return self.final_length - self.gauge_length
 
     @property
     def strain(self) -> float:
-        """Logarithmic strain of the gauge at the end."""
+        """Return logarithmic strain of the gauge at the end."""
         return float(np.log1p(self.elongation / self.gauge_length))
 
     def strain_by(self, mask: NDArray[np.bool_] | None) -> float:
-        """The same by the points of a mask, which alone say where the end is if nobody else did."""
+        """Return the strain at the end by the points of a mask, unless the end was given."""
         end = self._end_of(mask) if self.open_end else self.elongation
         return float(np.log1p(end / self.gauge_length))
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Elongation and load of all specimens up to the end of the model, by elongation."""
+        """Return elongation and load of all specimens up to the end of the model, by elongation."""
         elongation, load, _ = self._inside
         return elongation, load
 
     @property
     def specimen_of(self) -> NDArray[np.intp]:
-        """Number of the specimen of each of the `points`."""
+        """Return number of the specimen of each of the `points`."""
         return self._inside[2]
 
     @property
     def beyond(self) -> int:
-        """Number of measured points that are not among the `points`."""
+        """Return number of measured points that are not among the `points`."""
         return sum(len(c.load) for c in self.curves) - len(self.points[0])
 
     def noise(self, largest: float, given: float | None = None) -> tuple[float, NoiseIs]:
-        """Least noise of a load to reckon with, N, and what it is.
+        """Return the least noise of a load, N, and its origin.
 
         largest : load measured. given : what the project says of it.
         """
@@ -199,7 +191,7 @@ class Strip:
         return LOAD_CELL * largest, "assumed"
 
     def data_files(self, points: bool) -> list[DataFile]:
-        """The files of the load curve; points : whether those up to the end alone count."""
+        """Return the files of the load curve; points : whether those up to the end alone count."""
         if self.published is not None:
             name = format_of("load polynomials", self.published).name
             return [DataFile(self.published, FrameSource(name), 1)]
@@ -215,13 +207,11 @@ class Strip:
         return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
-        """Two shares of the gauge's strain between which three lines follow the load curve best.
+        """Return the two breaks (shares of strain) of the three lines nearest to the curve.
 
         mask : of the points, which the curve is to follow; all unless given.
 
-        Raises
-        ------
-        InputError : the points matched settle no polynomial.
+        Raises InputError: the points matched settle no polynomial.
         """
         polynomial = self.polynomial
         if polynomial is None:
@@ -238,7 +228,7 @@ class Strip:
         return float(first / whole), float(second / whole)
 
     def _end_of(self, mask: NDArray[np.bool_] | None) -> float:
-        """How far (mm) the points of a mask go, at most to the end of the gauge."""
+        """Return the last elongation (mm) of masked points, at most the end of the gauge."""
         if mask is None or not self.curves:
             return self.elongation
         return min(self.elongation, float(self.points[0][mask].max()))
@@ -262,14 +252,12 @@ EXTRAPOLATED = 0.05
 
 
 def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
-    """The strips of a section, by direction: those whose table or whose data are there.
+    """Return the strips of a section, by direction: those whose table or whose data are there.
 
     Files that are not there are done without where the place needs none and all lengths are given.
 
-    Raises
-    ------
-    InputError : naming the project and the key, or the data file: no data, no gauge length, a
-        final length that is not longer or beyond the data, points that settle no polynomial.
+    Raises InputError: naming the project and the key, or the data file: no data, no gauge length, a
+    final length that is not longer or beyond the data, points that settle no polynomial.
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):

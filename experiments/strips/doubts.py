@@ -34,7 +34,7 @@ STIFFER = 1.15
 def doubts_of_strips(
     strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected
 ) -> Sequence[Doubt]:
-    """What is doubtful in the strips of a test, by direction; widths and thickness mm."""
+    """Return the doubts about the strips of a test, by direction; widths and thickness mm."""
     found: list[Doubt] = []
     for direction, strip in strips.items():
         for name, elongation, load in curves_of(strip):
@@ -49,7 +49,7 @@ def doubts_of_strips(
 
 
 def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
-    """Name, elongation and load of every specimen; of the polynomial where only that is known."""
+    """Return name, elongation and load of every specimen, else of the polynomial."""
     if strip.curves:
         return [(curve.specimen, curve.elongation, curve.load) for curve in strip.curves]
     if strip.polynomial is None:
@@ -59,7 +59,7 @@ def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
 
 
 def _end(what: str, strain: float) -> list[Doubt]:
-    """Percent, or strain, for elongation; mm beside m; a gauge length that is not the gauge's."""
+    """Doubt a final strain that shows percent, metres or a wrong gauge length."""
     if LEAST_END < strain < MOST_END:
         return []
     text = (
@@ -70,7 +70,7 @@ def _end(what: str, strain: float) -> list[Doubt]:
 
 
 def _preload(what: str, elongation: Array, load: Array) -> list[Doubt]:
-    """A load where nothing is elongated yet."""
+    """Doubt a load where nothing is elongated yet."""
     largest, end = float(load.max()), float(elongation.max())
     first = load[np.abs(elongation) <= BEGINNING * end]
     if not first.size:  # the curve begins where the strip is elongated already
@@ -86,7 +86,7 @@ def _preload(what: str, elongation: Array, load: Array) -> list[Doubt]:
 
 
 def _failure(what: str, elongation: Array, load: Array, end: float) -> list[Doubt]:
-    """Rows after the strip broke, within what is to be fitted."""
+    """Doubt rows after the strip broke, within the range that is fitted."""
     largest, row = 0.0, None
     for i, (u, f) in enumerate(zip(elongation, load, strict=True)):
         if u > end * (1 + 1e-9):
@@ -105,7 +105,7 @@ def _failure(what: str, elongation: Array, load: Array, end: float) -> list[Doub
 
 
 def _modulus(strip: Strip, elongation: Array, load: Array, area: float) -> float:
-    """Secant modulus (MPa) at half of the end strain."""
+    """Return secant modulus (MPa) at half of the end strain."""
     strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
     at = SLOPE_AT * float(strain.max())
     near = np.argsort(np.abs(strain - at))[:5]
@@ -114,7 +114,7 @@ def _modulus(strip: Strip, elongation: Array, load: Array, area: float) -> float
 
 
 def _load_unit(what: str, modulus: float, expected: Expected, name: str) -> list[Doubt]:
-    """kN beside N, N/m beside N, or a width or thickness that is not the strip's."""
+    """Doubt a modulus that shows kN, N/m, or a wrong width or thickness."""
     far = expected.outside(modulus, [name])
     if not far:
         return []
@@ -126,7 +126,7 @@ def _load_unit(what: str, modulus: float, expected: Expected, name: str) -> list
 
 
 def _swapped(strips: Mapping[str, Strip], area: float, expected: Expected) -> list[Doubt]:
-    """The fill is stiffer where the bounds have the warp stiffer."""
+    """Doubt a fill that is stiffer where the bounds have the warp stiffer."""
     if not set(ALONG) <= set(strips) or not expected.moduli or not expected.warp_is_stiffer:
         return []
     moduli = {}

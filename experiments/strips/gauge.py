@@ -38,14 +38,14 @@ class Surface:
     places: Array
 
     def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Longest edge (triangles,) mm in the reference x and y."""
+        """Return longest edge (triangles,) mm in the reference x and y."""
         corners = self.places[self.mesh.simplices[triangles], 0, :2]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(edges.max(axis=1))
 
 
 def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
-    """The surface of a frame; None where fewer than three points, or a line, were correlated.
+    """Triangulate a frame; None where fewer than three points, or a line, were correlated.
 
     before : a surface whose triangles are taken where the reference points are the same: most
         exports have the same points in every frame, and triangulating is what costs.
@@ -65,12 +65,12 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
 
 
 def usual_edge(surface: Surface) -> float:
-    """Median over the triangles of their longest edge, mm."""
+    """Return median over the triangles of their longest edge, mm."""
     return float(np.median(surface.longest_edge()))
 
 
 def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
-    """Place (2, 3) mm before and after of the point (2,), or why there is none.
+    """Return place (2, 3) mm before and after of the point (2,), or why there is none.
 
     limit : mm; a triangle with a longer edge spans a hole.
     """
@@ -87,7 +87,7 @@ def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
 
 
 def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
-    """The triangle that holds a point (2,), -1 for none, and the weights (3,) of its corners.
+    """Return the triangle that holds a point (2,), -1 for none, and its corners' weights (3,).
 
     By hand: Delaunay.find_simplex first inverts a matrix for every triangle, which costs more
     than triangulating.
@@ -108,15 +108,11 @@ log = logging.getLogger(__name__)
 class GaugeRecord:
     """A virtual strain gauge through n frames; NaN in the frames where it was lost.
 
-    Parameters
-    ----------
-    reference_length : mm, between the two reference places, by x, y and z.
-    length : (n,) mm, by x, y and z.
-    elongation : (n,) mm, length - reference length.
-    strain : (n,) engineering, elongation / reference length.
-    log_strain : (n,) ln(length / reference length).
-    lost : indices of the frames where an end had no correlated surface around it.
-    warnings : one line for each end of the gauge that was lost: in which frames, why, what to do.
+    reference_length : mm, between the two reference places, by x, y and z. length : (n,) mm, by x,
+    y and z. elongation : (n,) mm, length - reference length. strain : (n,) engineering, elongation
+    / reference length. log_strain : (n,) ln(length / reference length). lost : indices of the
+    frames where an end had no correlated surface around it. warnings : one line for each end of the
+    gauge that was lost: in which frames, why, what to do.
     """
 
     reference_length: float
@@ -140,17 +136,11 @@ def virtual_strain_gauge(
     an edge longer than `max_gap` times the usual longest edge: there the points between are
     missing, and a value would be interpolated over a hole.
 
-    Parameters
-    ----------
-    frames : in the order of the test; each with its own points, not necessarily the same.
-    lower, upper : (2,) mm, x and y of the ends in the reference state.
-    max_gap : 1.35 finds one missing point of a square grid (there the ratio is 1.41). Points
-        scattered at random need about 2.5.
-
-    Raises
-    ------
-    InputError : no frames, ends that are no points or coincide, an end lost in every frame,
-        a gauge within one triangle of points, a gap that is no number.
+    frames : in the order of the test; each with its own points, not necessarily the same. lower,
+    upper : (2,) mm, x and y of the ends in the reference state. max_gap : 1.35 finds one missing
+    point of a square grid (there the ratio is 1.41). Points scattered at random need about 2.5.
+    Raises InputError: no frames, ends that are no points or coincide, an end lost in every frame, a
+    gauge within one triangle of points, a gap that is no number.
     """
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
@@ -237,22 +227,16 @@ def gauge_load_curve(
     load_times: ArrayLike | None = None,
     path: Path | None = None,
 ) -> LoadCurve:
-    """The machine's load against the gauge's elongation; lost frames are left out.
+    """Return the machine's load over the gauge's elongation; lost frames are left out.
 
     Without times, one load a frame. With times, the load is interpolated at the frames' times;
     frames before the first or after the last load are left out, which is logged.
 
-    Parameters
-    ----------
-    loads : (n,) or, with times, (k,) N.
-    direction, specimen, path : of the curve; the direction by any of its names.
-    frame_times, load_times : (n,) and (k,) on the same clock and in the same unit; the latter
-        rising.
-
-    Raises
-    ------
-    InputError : counts that do not agree, times that do not rise, numbers that are not finite,
-        fewer than two frames left.
+    loads : (n,) or, with times, (k,) N. direction, specimen, path : of the curve; the direction by
+    any of its names. frame_times, load_times : (n,) and (k,) on the same clock and in the same
+    unit; the latter rising.
+    Raises InputError: counts that do not agree, times that do not rise, numbers that are not
+    finite, fewer than two frames left.
     """
     way = direction_named(direction)
     load, count = np.asarray(loads, dtype=float), len(record.length)
@@ -285,7 +269,7 @@ def gauge_load_curve(
 def _at_times(
     load: Array, frame_times: Array, load_times: Array, count: int, path: Path | None
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Loads (n,) at the frames' times, and which of them lie within the record."""
+    """Return loads (n,) at the frames' times, and which of them lie within the record."""
     pairs = (("frame_times", frame_times, count), ("load_times", load_times, load.size))
     for name, times, expected in pairs:
         if times.shape != (expected,) or not np.isfinite(times).all():
@@ -299,24 +283,16 @@ def _at_times(
 
 @dataclass(frozen=True)
 class PairedLoads:
-    """A machine's loads, and how they belong to the frames of a gauge.
+    """A machine's loads, and their pairing with the frames of a gauge.
 
-    Parameters
-    ----------
-    path : the machine's export.
-    direction, specimen : of the strip; the direction by any of its names.
-    load_column, time_column : names in the export, where they are not found by themselves.
-    load_unit : N or kN, where the export names none.
-    decimal : the mark in the export and in the table of times, where it is not clear.
-    format : of the export, found by its content unless given.
-    frame_times : a table of the frames' times: pairs the loads by time. frame_time_column : name
-        of its column.
-    frame_interval : s between frames, the first at 0: pairs the loads by time too.
-    time_offset : s, the machine's clock less the frames'.
-
-    Raises
-    ------
-    InputError : naming what is out of range, contradicts another, or would have no effect.
+    path : the machine's export. direction, specimen : of the strip; the direction by any of its
+    names. load_column, time_column : names in the export, where they are not found by themselves.
+    load_unit : N or kN, where the export names none. decimal : the mark in the export and in the
+    table of times, where it is not clear. format : of the export, found by its content unless
+    given. frame_times : a table of the frames' times: pairs the loads by time. frame_time_column :
+    name of its column. frame_interval : s between frames, the first at 0: pairs the loads by time
+    too. time_offset : s, the machine's clock less the frames'.
+    Raises InputError: naming what is out of range, contradicts another, or would have no effect.
     """
 
     path: Path
@@ -350,7 +326,7 @@ class PairedLoads:
 
     @property
     def timed(self) -> bool:
-        """Whether loads and frames are paired by time."""
+        """Return whether loads and frames are paired by time."""
         return self.frame_times is not None or self.frame_interval is not None
 
     def _refuse(self, *useless: str, needs: str) -> None:
@@ -360,11 +336,9 @@ class PairedLoads:
 
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
-    """The load curve of a gauge.
+    """Return the load curve of a gauge.
 
-    Raises
-    ------
-    InputError : naming the file of loads or of times; counts that do not agree.
+    Raises InputError: naming the file of loads or of times; counts that do not agree.
     """
     count, times = len(record.length), None
     if loads.frame_interval is not None:
@@ -404,7 +378,7 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
 
 @contextmanager
 def _naming(fields: str) -> Iterator[None]:
-    """Readers ask for their argument `columns`, which is called otherwise here."""
+    """Rename the readers' argument `columns` in errors to what it is called here."""
     try:
         yield
     except InputError as error:
@@ -416,13 +390,9 @@ def _naming(fields: str) -> Iterator[None]:
 class GaugeTable:
     """A gauge through the frames of a test, with the machine's loads where there are any.
 
-    Parameters
-    ----------
-    files : names of the frames, one each.
-    lower, upper : (x, y) mm of the ends in the reference state.
-    record : of the gauge.
-    curve : its loads; frames where correlation was lost, or without a load, are not in it.
-    note : what looks unmeant in the order of the frames.
+    files : names of the frames, one each. lower, upper : (x, y) mm of the ends in the reference
+    state. record : of the gauge. curve : its loads; frames where correlation was lost, or without a
+    load, are not in it. note : what looks unmeant in the order of the frames.
     """
 
     files: Sequence[str]
@@ -434,7 +404,7 @@ class GaugeTable:
 
     @property
     def notes(self) -> list[Note]:
-        """Lost ends of the gauge, the order of the frames, frames that have no load."""
+        """Return warnings: lost ends of the gauge, order of the frames, frames without load."""
         notes = [*self.record.warnings, *([as_note(self.note)] if self.note else [])]
         if without := self.without_load:
             words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
@@ -444,14 +414,14 @@ class GaugeTable:
 
     @property
     def without_load(self) -> list[str]:
-        """Files of the frames that the load curve leaves out, though the gauge has a length."""
+        """Return the files of frames with a length that the load curve leaves out."""
         if self.curve is None:
             return []
         seen = np.flatnonzero(np.isfinite(self.record.length))
         return [self.files[i] for i in sorted({*seen.tolist()} - {*self._used().tolist()})]
 
     def frame(self) -> pd.DataFrame:
-        """A row a frame, NaN where the gauge was lost; with loads only the frames of the curve."""
+        """Return a DataFrame, a row a frame; with loads only the frames of the curve."""
         import pandas as pd
 
         record, curve = self.record, self.curve
@@ -474,9 +444,7 @@ class GaugeTable:
     def write(self, path: Path | str) -> None:
         """Write the table with its notes; with loads, strips of a project read it as a curve.
 
-        Raises
-        ------
-        OutputError : it cannot be written; what was there is still there.
+        Raises OutputError: it cannot be written; what was there is still there.
         """
         ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
         about = (
@@ -490,7 +458,7 @@ class GaugeTable:
             self.frame().to_csv(stream, index=False, lineterminator="\n")
 
     def numbers(self) -> dict[str, Any]:
-        """The outcome as plain data; frames by the names of their files."""
+        """Return the results as plain data; frames by the names of their files."""
         record, curve = self.record, self.curve
         seen = np.flatnonzero(np.isfinite(record.length))
         last = seen[np.argmax(record.length[seen])]
@@ -519,7 +487,7 @@ class GaugeTable:
         return numbers
 
     def _used(self) -> NDArray[np.intp]:
-        """The frames (points,) of the curve."""
+        """Return the frames (points,) of the curve."""
         if self.curve is None or self.curve.frame is None:
             return np.flatnonzero(np.isfinite(self.record.length))
         return self.curve.frame

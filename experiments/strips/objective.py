@@ -17,22 +17,16 @@ Array = NDArray[np.float64]
 
 
 class LoadObjective:
-    """(model - measured) / (scale sqrt(n)) at n elongations of the gauge.
+    """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
 
-    Parameters
-    ----------
-    increments : (frames,) mm, elongations that the model reports.
-    elongation, load : (n,) mm, N: what was measured, inside the increments. The model's load is
-        interpolated by a cubic spline from the origin through its increments.
-    scale : N: 1 for errors in N (Eq. 3.7), the largest load for relative errors.
-    weight : of the block in e.
-    least_noise : N, to reckon with at least; noise_is : where it is from.
-    alike : how many of the loads err as one, at least, because their specimen is stiffer or softer.
-    specimens : (n,) number of the specimen of each load, None where that is not known.
-
-    Raises
-    ------
-    InputError : nothing measured, or measured outside the increments.
+    increments : (frames,) mm, elongations that the model reports. elongation, load : (n,) mm, N:
+    what was measured, inside the increments. The model's load is interpolated by a cubic spline
+    from the origin through its increments. scale : N: 1 for errors in N (Eq. 3.7), the largest load
+    for relative errors. weight : of the block in e. least_noise : N, to reckon with at least;
+    noise_is : where it is from. alike : how many of the loads err as one, at least, because their
+    specimen is stiffer or softer. specimens : (n,) number of the specimen of each load, None where
+    that is not known.
+    Raises InputError: nothing measured, or measured outside the increments.
     """
 
     unit = "N"
@@ -67,49 +61,49 @@ class LoadObjective:
 
     @property
     def scale(self) -> Array:
-        """(n,): newtons in one unit of each residual."""
+        """Return newtons in one unit of each residual, (n,)."""
         return np.full(len(self.load), self._unit)
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Everything measured that the residual depends on."""
+        """Return everything measured that the residual depends on."""
         return self.elongation, self.load
 
     @property
     def places(self) -> tuple[Array, ...]:
-        """(n, 1) mm, the elongation of every reading: neighbours may err as one."""
+        """Return the elongation of every reading, (n, 1) mm: neighbours may err as one."""
         return (self.elongation[:, None],)
 
     def of_points(self, values: Array) -> Array:
-        """(m,) for each residual, of values for each measured point."""
+        """Return values for each residual from values for each measured point."""
         return values
 
     def shifted(self, here: History, there: History) -> LoadObjective:
-        """The objective of a model that carries `here` where this one carries `there`."""
+        """Return the objective of a model that carries `here` where this one carries `there`."""
         other = copy.copy(self)
         other.load = self.load - self.sample @ (here.load - there.load)
         return other
 
     def modelled(self, history: History) -> Array:
-        """The model's load at the measured elongations, (n,) N."""
+        """Return the model's load at the measured elongations, (n,) N."""
         return np.asarray(self.sample @ history.load)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """The block, (n,); a strip knows of no nuisance."""
+        """Return the block, (n,)."""
         return np.asarray((self.modelled(history) - self.load) / self._unit)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """(n, parameters) from the history's load slope."""
+        """Return (n, parameters) from the history's load slope."""
         if history.load_slope is None:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
         return np.asarray(self.sample @ history.load_slope / self._unit)
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """(n, 0): there is none."""
+        """Return (n, 0): a load curve has no nuisance unknowns."""
         if names:
             raise InputError(None, "nuisance", f"a load curve knows no {', '.join(names)}")
         return np.empty((len(self.load), 0))
 
     def rms(self, history: History) -> float:
-        """RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
+        """Return RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
         return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))

@@ -15,7 +15,7 @@ from ...readers.polynomials import checked_points, fit_load_polynomial, terms_of
 
 @dataclass(frozen=True)
 class OrderScore:
-    """One order's fit; n points, k coefficients, S the sum of squares left.
+    """Scores of one order: n points, k coefficients, S the sum of squares left.
 
     r_squared : 1 - S / (squares about the mean). adjusted_r_squared : the same of S / (n - k) and
     (squares about the mean) / (n - 1). rmse : N, sqrt(S / n). aic, bic : n ln(S / n) + 2 (k + 1)
@@ -58,14 +58,9 @@ def compare_orders(
 ) -> OrderComparison:
     """Fit each order to the points (n,) mm and (n,) N and score it.
 
-    Parameters
-    ----------
-    specimens : (n,) which specimen each point belongs to. With it a whole specimen is left out at
-        a time: points of one specimen err together, so leaving out one of them flatters.
-
-    Raises
-    ------
-    InputError : as `fit_load_polynomial`; no orders; fewer points than coefficients and two.
+    specimens : (n,) which specimen each point belongs to. With it a whole specimen is left out at a
+    time: points of one specimen err together, so leaving out one of them flatters.
+    Raises InputError: as `fit_load_polynomial`; no orders; fewer points than coefficients and two.
     """
     u, f = checked_points(elongation, load)
     names = list(range(len(u))) if specimens is None else list(specimens)
@@ -122,7 +117,7 @@ def _score(
 
 
 def _left_out_squares(rows: NDArray[np.float64], left: NDArray[np.float64]) -> float:
-    """Squared error at points refitted without them: (1 - H)^-1 times what the full fit left."""
+    """Return the squared error at points refitted without them, by (1 - H)^-1."""
     without = np.eye(len(rows)) - rows @ rows.T
     if np.linalg.cond(without) > 1e12:
         return float("inf")  # the others do not settle the coefficients
@@ -134,18 +129,13 @@ PLACES = 40
 
 
 def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
-    """The two breaks of the broken line through the origin that follows the curve best.
+    """Return the two breaks of the broken line through the origin nearest to the curve.
 
     How Ambroziak and Klosowski read the regions of a coated fabric off its curve by eye, by
     least squares. Of the pairs on a grid of 40 places, the best.
 
-    Parameters
-    ----------
     strain, load : (n,) of one curve, strain above zero.
-
-    Raises
-    ------
-    InputError : fewer than five points, or none with strain.
+    Raises InputError: fewer than five points, or none with strain.
     """
     x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
     if len(x) < 5 or not x.max() > 0:

@@ -49,7 +49,7 @@ RINGS = 8
 def loads_alike(
     strip: Strip, loads: int, noise: float | None, specimens: int | None = None
 ) -> float:
-    """How many of so many loads of a direction err as one.
+    """Return the number of loads of a direction that err as one.
 
     noise : N, that the project gives of one load: independent of the others' where no two specimens
     tell. specimens : as for `independent_loads`.
@@ -61,17 +61,15 @@ def loads_alike(
 
 @lru_cache(maxsize=64)
 def independent_loads(strip: Strip, specimens: int | None = None) -> float:
-    """Of all specimens of a direction together, up to the end of the model.
+    """Return the number of independent loads of all specimens of a direction together.
 
     Of two or more whose points are there: as many places a specimen as do not err as one, by the
     correlation along it of what it lies beside the polynomial of all, or as the factor says by
     which it is stiffer, whichever are fewer; times the specimens less one, which that polynomial
     has taken up. Else `PLACES` a specimen, likewise.
 
-    Parameters
-    ----------
     specimens : how many there are behind a polynomial, or behind points that do not tell them
-        apart; `SPECIMENS` behind a polynomial, and one of points, where nobody says it.
+    apart; `SPECIMENS` behind a polynomial, and one of points, where nobody says it.
     """
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2 or strip.polynomial is None:
@@ -107,7 +105,7 @@ STRAIGHT, BIAS = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class FittedStrip:
-    """One strip of a finished fit: what was measured, and what the best law makes of it."""
+    """One strip of a finished fit: measured data and the best law's response."""
 
     strip: Strip
     model: UniaxialModel
@@ -116,34 +114,34 @@ class FittedStrip:
 
     @property
     def direction(self) -> str:
-        """warp, fill or bias."""
+        """Return warp, fill or bias."""
         return self.strip.direction
 
     @property
     def rms(self) -> float:
-        """Of the load error, N."""
+        """Return the RMS error of the load, N."""
         return self.objective.rms(self.history)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedStrips:
-    """The test: its curves were read with its section."""
+    """A test of strips with its data."""
 
     test: StripsTest
 
     @property
     def objective_is(self) -> str:
-        """What is minimised, in words."""
+        """Return what is minimised, in words."""
         return OBJECTIVES[self.test.objective]
 
     @property
     def known(self) -> HypoelasticLaw | None:
-        """None: loads are measured, not computed."""
+        """Return None: loads are measured, not computed."""
         return None
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Number of the specimen of each measured point that is matched, by comparison."""
+        """Return number of the specimen of each measured point that is matched, by comparison."""
         test = self.test
         if test.match_by != "points":
             return {}
@@ -151,32 +149,30 @@ class PreparedStrips:
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Directions, and specimens of a direction that has several."""
+        """Return directions, and specimens of a direction that has several."""
 
         return parts_of(self)
 
     def reach(self, masks: Masks) -> Reach:
-        """What the points matched say of the law."""
+        """Return the reach of the law in the points matched."""
         by_direction = {d: masks.get(self.part(d)) for d in self.test.matched}
         return reach_of(self.test, by_direction)
 
     def kept(self, masks: Masks | None) -> tuple[str, ...]:
-        """The directions of which masks leave anything to match."""
+        """Return the directions in which masks leave points to match."""
         known = masks or {}
         return tuple(d for d in self.test.matched if known.get(self.part(d), np.True_).any())
 
     def part(self, direction: str) -> str:
-        """The name of the comparison of a direction."""
+        """Return the name of the comparison of a direction."""
         return f"{self.test.name}: {direction}"
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """One a direction, without those whose weight is zero, or of which nothing is left.
+        """Return a comparison a direction that has weight and points.
 
-        Raises
-        ------
-        InputError : nothing was measured, or no load at all.
+        Raises InputError: nothing was measured, or no load at all.
         """
         test, models = self.test, self.test.models()
         share, kept = weighting.weight, self.kept(masks)
@@ -201,7 +197,7 @@ class PreparedStrips:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same loads on other quads; the increments hardly matter (a bar has their limit)."""
+        """Return the comparisons on other quads; increments hardly matter."""
         models = self.test.models(what="elements", factor=factor)
         own = self.comparisons(make_solver, weighting)
         return tuple(
@@ -231,7 +227,7 @@ class PreparedStrips:
         )
 
     def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
-        """The strips that a fit matched, each with its model, objective and history."""
+        """Return the strips that a fit matched, each with its model, objective and history."""
         known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
         strips = []
         for direction in self.test.matched:
@@ -243,20 +239,20 @@ class PreparedStrips:
         return tuple(strips)
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files of the curves that are matched."""
+        """Return the files of the curves that are matched."""
         points = self.test.match_by == "points"
         return joined(
             file for d in self.test.matched for file in self.test.strips[d].data_files(points)
         )
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """What makes the load curves doubtful."""
+        """Return the doubts about the load curves."""
         test = self.test
         return doubts_of_strips(test.strips, test.width, test.thickness, expected)
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:
-    """Elongation (n,) mm and load (n,) N: the points, or the polynomial at the increments."""
+    """Return elongation (n,) mm and load (n,) N: points, or the polynomial at increments."""
     if test.match_by == "points":
         return strip.points
     if strip.polynomial is None:
@@ -266,7 +262,7 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
 
 
 def parts_of(prepared: PreparedStrips) -> Mapping[str, Mapping[str, Masks]]:
-    """By sort and name, the points that are kept without each; sorts of one part left out."""
+    """Return masks without each part, by sort and name; sorts of one part are left out."""
     test = prepared.test
     points = test.match_by == "points"
     counts = {d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched}
@@ -284,7 +280,7 @@ def parts_of(prepared: PreparedStrips) -> Mapping[str, Mapping[str, Masks]]:
 
 
 def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
-    """Which points are not of each specimen, by its name; none of a strip of one specimen."""
+    """Return masks without each specimen, by its name; none of a strip of one specimen."""
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2:
         return {}

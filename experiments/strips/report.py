@@ -39,7 +39,7 @@ PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
 def findings_of(test: StripsTest, strips: Sequence[FittedStrip]) -> Findings:
-    """Numbers and words of the best fit."""
+    """Return numbers and words of the best fit."""
     total = sum(s.rms for s in strips)
     errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
     return Findings(
@@ -69,7 +69,7 @@ def _numbers(test: StripsTest, fitted: FittedStrip) -> dict[str, Any]:
 
 
 def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[Note]:
-    """What the data leave open before any fit."""
+    """Return warnings of what the data leave open before any fit."""
     directions = {s.direction for s in strips}
     notes = [
         Note(
@@ -105,7 +105,7 @@ def _line(strips: Sequence[FittedStrip], total: float) -> str:
 
 
 def misfit_table(strips: Sequence[FittedStrip]) -> Table:
-    """Misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
+    """Return the misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
     rows: list[list[object]] = []
     for fitted in strips:
         strip, polynomial = fitted.strip, fitted.strip.polynomial
@@ -130,7 +130,7 @@ def misfit_table(strips: Sequence[FittedStrip]) -> Table:
 
 
 def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Load curves of the model, and the polynomials where there are any (else NaN)."""
+    """Return load curves of the model, and the polynomials (NaN where there are none)."""
     parts = []
     for fitted in strips:
         u, polynomial = np.array(fitted.model.elongations), fitted.strip.polynomial
@@ -149,7 +149,7 @@ def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
 
 
 def residual_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Every matched load: part, elongation_mm, quantity, measured, modelled, difference, unit."""
+    """Return a table of every matched load."""
     parts = []
     for fitted in strips:
         modelled, measured = fitted.objective.modelled(fitted.history), fitted.objective.load
@@ -183,7 +183,7 @@ def load_panels(
     models: Mapping[str, Sequence[Curve]],
     rms: Mapping[str, Sequence[float]],
 ) -> list[StripCurves]:
-    """What the panels of `plot_loads` show; `models` and their `rms` (N) by direction."""
+    """Return the panels of `plot_loads`; `models` and their `rms` (N) by direction."""
     panels = []
     for strip in strips:
         curve = None
@@ -204,7 +204,7 @@ def load_panels(
 
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
-    """The deformed strip with its shear strain as a picture and for ParaView."""
+    """Draw the deformed strip with its shear strain; write it for ParaView."""
     u = history.displacement[-1]
     strain = middle_strain(model.mesh, u, model.warp)
     mesh = model.mesh
@@ -213,7 +213,7 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
 
 
 def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path) -> None:
-    """Moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
+    """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
     ends = failure_strains(strips, fitted.valid)
     strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
     curves = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
@@ -221,7 +221,7 @@ def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path
 
 
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
-    """(3,) logarithmic strain of warp and fill at the end, and shear strain in the bias gauge.
+    """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
 
     valid : (3,) the ends up to which the moduli are fitted, which no strain shown exceeds; they
     take the place of a strip that is not there.
@@ -237,7 +237,7 @@ def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
 
 
 def _gauge_shear(model: UniaxialModel, history: History) -> float:
-    """Largest shear strain of the quads between the gauge's ends."""
+    """Return largest shear strain of the quads between the gauge's ends."""
     strain = middle_strain(model.mesh, history.displacement[-1], model.warp)
     corners = model.mesh.points[model.mesh.quads][:, :, 1]
     low, high = model.mesh.points[model.mesh.node_sets["gauge"]][:, 1]
@@ -246,7 +246,7 @@ def _gauge_shear(model: UniaxialModel, history: History) -> float:
 
 
 def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
-    """Which order the load polynomials should have; False where there are no points to ask."""
+    """Draw the errors of polynomial orders; return False where there are no points."""
     panels = []
     for strip in strips:
         if strip.polynomial is None:
@@ -280,7 +280,7 @@ MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 def exhibit(
     test: StripsTest, strips: Sequence[FittedStrip], fitted: FittedTest, out: Output
 ) -> Exhibit:
-    """Write loads.csv, bias.vtu and the pictures; what the page says of them."""
+    """Write loads.csv, bias.vtu and the pictures."""
     with replacing(out.path("loads.csv")) as path:
         load_table(strips).to_csv(path, index=False)
     panels = _panels(strips)
@@ -312,7 +312,6 @@ def exhibit(
 
 
 def _panels(strips: Sequence[FittedStrip]) -> list[StripCurves]:
-    """Load curves against what was measured."""
     models = {
         s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
     }
@@ -323,7 +322,7 @@ CURVES = "curves.png"
 
 
 def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
-    """Write the curves; a table of what each specimen holds."""
+    """Draw the curves; return a table of the specimens."""
     curves = {direction: curves_of(strip) for direction, strip in test.strips.items()}
     plot_curves(out.path(CURVES), curves)
     rows: list[list[object]] = [
@@ -350,7 +349,7 @@ def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """One card on one strip: how many of its increments are shown, and how far off they are (N)."""
+    """One card on one strip: the number of increments shown, and their RMS error (N)."""
 
     model: UniaxialModel
     history: History
@@ -359,12 +358,12 @@ class Pull:
 
     @property
     def elongation(self) -> Array:
-        """mm of the gauge, at every increment."""
+        """Return the elongation of the gauge at every increment, mm."""
         return np.array(self.model.elongations)
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is left out."""
+        """Return whether nothing is left out."""
         return self.shown == len(self.model.elongations)
 
 
@@ -379,7 +378,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """Write loads.csv, loads.png and the deformed bias strips; a failed analysis is told as such.
+    """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
 
     within_range : show each curve only to where the card's valid range ends.
     """
@@ -408,7 +407,7 @@ def _pull(
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
-    """Increments before a strain in the middle of a quad leaves the card's valid range."""
+    """Return the number of increments within the card's valid range."""
     for i, u in enumerate(history.displacement):
         strain = middle_strain(model.mesh, u, model.warp)
         reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
@@ -418,7 +417,7 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 
 
 def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict[str, Any]:
-    """RMS errors, end loads and strains of a card, strip by strip."""
+    """Return RMS errors, end loads and strains of a card, strip by strip."""
     directions: dict[str, Any] = {}
     total: float | None = 0.0
     for direction in test.strips:
@@ -470,7 +469,7 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
 
 
 def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
-    """The same for the terminal."""
+    """Return the results as lines for the terminal."""
     lines = []
     for name, card in cards.items():
         parts = []
@@ -503,5 +502,5 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
 
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
-    """Return every matched load, see `residual_table`."""
+    """Return a table of every matched load."""
     return residual_table(prepared.fitted_strips(fitted))

@@ -54,32 +54,30 @@ class StripsTest:
 
     @property
     def thickness(self) -> float:
-        """Of the fabric, mm."""
+        """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
 
     @property
     def reads_files(self) -> bool:
-        """Yes: load curves are measured or published, never computed."""
+        """Return True: load curves are measured or published."""
         return True
 
     @cached_property
     def reach(self) -> Reach:
-        """What the gauges say: see `reach_of`."""
+        """Return the reach of the gauges, see `reach_of`."""
         return reach_of(self)
 
     @property
     def matched(self) -> tuple[str, ...]:
-        """The directions that a fit matches: those of a weight above 0."""
+        """Return the directions of a weight above 0."""
         return tuple(d for d in self.strips if self.weights[d] > 0)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
-        """The models by direction; edges of their quads, or their increments, over a factor.
+        """Return the models by direction; edges of quads, or increments, divided by a factor.
 
-        Raises
-        ------
-        InputError : lengths that do not make a strip.
+        Raises InputError: lengths that do not make a strip.
         """
         quads = factor if what == "elements" else 1.0
         steps = factor if what == "increments" else 1.0
@@ -99,7 +97,7 @@ class StripsTest:
         return straight_strip(direction, *lengths, increments, **quads)
 
     def settings(self) -> Mapping[str, object]:
-        """Everything but names and places of files."""
+        """Return everything but names and places of files."""
         names = ("width", "grip_distance", "bias_angle", "increments", "match_by", "objective",
                  "weight")  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
@@ -108,11 +106,9 @@ class StripsTest:
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
-    """The test of a section, and its load curves.
+    """Read the section of a test, and its load curves.
 
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a data file.
+    Raises InputError: naming the file and the dotted key, or a data file.
     """
     length = place.scales.length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
@@ -153,7 +149,7 @@ def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
-    """How far the strips are strained, and where their load curves change.
+    """Return the final strains of the strips, and the breaks of their load curves.
 
     Warp and fill: the logarithmic strain of their gauges at the end. Shear: that of a strip which
     keeps its area, 2 sin(2 angle) ln(l_f/l_i). Breaks: where three lines follow a load curve best,

@@ -25,12 +25,12 @@ _MAKER = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether a line of title names the maker or the program."""
+    """Return whether a line of title names the maker or the program."""
     return bool(_MAKER.search(b"\n".join(head[:4096].splitlines()[:10]).replace(b"\0", b"")))
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     return [frame_of(read_text_rows(path, options), options, path, "aramis")]
 
 

@@ -22,12 +22,12 @@ _NAMES = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether columns are called x and x-displacement, with a unit right behind."""
+    """Return whether columns are called x and x-displacement, with a unit right behind."""
     return bool(_NAMES.search(head[:4096]))
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     return [frame_of(read_text_rows(path, options), options, path, "davis")]
 
 

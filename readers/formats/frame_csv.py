@@ -15,7 +15,7 @@ from ..text_frames import read_text_rows
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a table; columns that are not asked for are ignored."""
+    """Read the one frame of a table; columns that are not asked for are ignored."""
     return [frame_of(read_text_rows(path, options), options, path, "csv")]
 
 

@@ -23,13 +23,13 @@ from ..text_frames import read_text_rows
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the headings are those of either version."""
+    """Return whether the headings are those of either version."""
     top = head[:4096].lower()
     return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     rows = read_text_rows(path, options, camera_axes=True)
     return [frame_of(rows, options, path, "matchid")]
 

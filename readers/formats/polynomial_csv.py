@@ -18,12 +18,10 @@ from ..tables import TextTable, read_table
 
 
 def read(path: Path) -> dict[str, PublishedPolynomial]:
-    """A polynomial a direction; load in N, elongation in mm, of the full strip.
+    """Read a polynomial a direction; load in N, elongation in mm, of the full strip.
 
-    Raises
-    ------
-    InputError : naming file, line and column: missing columns, powers left out, cells that are not
-        finite numbers, an unknown direction or one given twice, lengths that do not grow.
+    Raises InputError: naming file, line and column: missing columns, powers left out, cells that
+    are not finite numbers, an unknown direction or one given twice, lengths that do not grow.
     """
     table = read_table(path)
     names = [str(name) for name in table.cells.columns]

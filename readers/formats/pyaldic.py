@@ -28,7 +28,7 @@ NAMES = ("points3D", "U", "V", "W")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether points3D is among the arrays, or x_px and X_mm among the headings."""
+    """Return whether points3D is among the arrays, or x_px and X_mm among the headings."""
     if head.startswith(SIGNATURE):
         return "points3D" in array_names(path)
     if is_mat(head):
@@ -37,7 +37,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """All frames of a file."""
+    """Read all frames of a file."""
     try:
         with path.open("rb") as file:
             head = file.read(128)

@@ -26,13 +26,13 @@ _MOVED = re.compile(rb'"\s*(W|sigma)( \[\w+\])?\s*"')
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether "X" and "W" or "sigma" are quoted headings."""
+    """Return whether "X" and "W" or "sigma" are quoted headings."""
     top = head[:4096]
     return bool(_PLACE.search(top) and _MOVED.search(top))
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     return [frame_of(read_text_rows(path, options, upper=True), options, path, "vic3d")]
 
 
@@ -49,13 +49,13 @@ NAMES = {"x": "X", "y": "Y", "z": "Z", "dx": "U", "dy": "V", "dz": "W", "sigma":
 
 
 def recognises_vic3d_mat(path: Path, head: bytes) -> bool:
-    """Whether X, Y, U, V and W are among the variables of a MAT-file, and no frames."""
+    """Return whether X, Y, U, V and W are among the variables of a MAT-file, and no frames."""
     there = variable_names(path, head) if is_mat(head) else None
     return there is not None and {*"XYUVW"} <= {*there} and "points3D" not in there
 
 
 def read_vic3d_mat(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     names = NAMES | dict(options.columns or {})
     there = read_variables(path, [*names.values()])
     values = {
