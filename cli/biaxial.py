@@ -56,6 +56,7 @@ def command(
     chosen here is written beside what all other choices give. A law of any form is fitted to the
     same tests by `bubblefit fit`, and made into such constants by `bubblefit export`.
     """
+    from ..experiments.biaxial.data import plain_ratio
     from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of, write_tables
     from ..experiments.biaxial.test import BiaxialTest
     from ..experiments.kinds import Output
@@ -64,7 +65,6 @@ def command(
     from ..notes import lines as note_lines
     from ..notes import write_notes
     from ..project.project import read_project
-    from ..readers.biaxial import plain_ratio
     from ..runs.folder import Store
 
     read = read_project(project, data_folders(data))

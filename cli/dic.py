@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..readers.frames import FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
-from ..readers.spheres import Sphere, fit_sphere, points_of
+from ..readers.surfaces import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
 from ..writing import replacing
 from .ending import tell

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .bending import read_bending_curves
-    from .curves import read_load_curves
+    from .curves import read_load_curves, read_published_polynomials
     from .fields import read_field, read_fields
     from .frames import read_frames
     from .machine_tables import read_machine_loads
-    from .polynomials import read_published_polynomials
     from .registry import format_names
     from .surfaces import read_surfaces
 

@@ -96,10 +96,7 @@ def _at_rest(frame: Frame) -> bool:
 
 
 def read_field(
-    path: Path | str,
-    pressure: float,
-    options: FrameOptions = PLAIN,
-    format: str | None = None,
+    path: Path | str, pressure: float, options: FrameOptions = PLAIN, format: str | None = None
 ) -> DisplacementField:
     """Read the field of one file, at a pressure in MPa.
 

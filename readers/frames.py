@@ -110,9 +110,7 @@ class FrameOptions:
 
 
 def read_frames(
-    files: Sequence[Path | str],
-    options: FrameOptions = FrameOptions(),
-    format: str | None = None,
+    files: Sequence[Path | str], options: FrameOptions = FrameOptions(), format: str | None = None
 ) -> tuple[Frame, ...]:
     """Read frames in the order of the files; most formats have one a file.
 

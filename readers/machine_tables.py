@@ -63,10 +63,7 @@ def read_machine_table(
 
 
 def column_of(
-    found: MachineTable,
-    quantity: str,
-    named: Mapping[str, str],
-    needed: Sequence[str] = NEEDED,
+    found: MachineTable, quantity: str, named: Mapping[str, str], needed: Sequence[str] = NEEDED
 ) -> str:
     """Return the name of the one column that holds a quantity; "" where it may be absent and is.
 

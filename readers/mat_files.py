@@ -6,7 +6,7 @@ cannot be read without MATLAB.
 
 Version 5 is parsed here, after MathWorks' "MAT-File Format", and not by scipy.io: on a damaged or
 hostile file scipy 1.17 crashes the process (an unknown type of numbers, deep nesting) or runs for
-minutes (counts of 2^31 cells); tests/data/test_mat_files.py holds these files.
+minutes (counts of 2^31 cells); tests/readers/test_mat_files.py holds these files.
 """
 
 from __future__ import annotations

@@ -311,7 +311,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
 
 
 def _half_range(each: Array) -> Array:
-    """Return half ranges (frames,) of pressures (offsets, frames); NaN for frames beyond the log."""
+    """Return half ranges (frames,) of pressures (offsets, frames); NaN beyond the log."""
     inside = np.isfinite(each)
     most = np.where(inside, each, -np.inf).max(axis=0)
     least = np.where(inside, each, np.inf).min(axis=0)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,12 @@ from .frames import (
     FLAGGED,
     LENGTHS,
     PIXELS,
+    Frame,
     FrameOptions,
     FrameRows,
     Heading,
     columns_of,
+    frame_of,
     heading_of,
 )
 from .tables import HOLES, TextTable, check_width, decimal_mark, is_number, read_lines
@@ -371,6 +374,15 @@ def _slow(
 
 #: Names of columns that say whether a row is good, but not in which way.
 UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
+
+
+def text_reader(format: str, **settings: Any) -> Callable[[Path, FrameOptions], Sequence[Frame]]:
+    """Return the reader of a format with one frame a text file; settings of `read_text_rows`."""
+
+    def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
+        return [frame_of(read_text_rows(path, options, **settings), options, path, format)]
+
+    return read
 
 
 def read_text_rows(

@@ -7,17 +7,8 @@ from collections.abc import Sequence
 from pydantic import BaseModel
 
 from ...materials.law import HypoelasticLaw
-from ..kinds import (
-    Candidate,
-    Kind,
-    MakeSolver,
-    Place,
-    Planning,
-    Predicted,
-    Studied,
-)
-from .candidates import candidates
-from .prepared import PreparedBiaxial
+from ..kinds import Candidate, Kind, MakeSolver, Place, Planning, Predicted, Studied
+from .prepared import PreparedBiaxial, candidates
 from .section import BiaxialSection
 from .test import BiaxialTest, read
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...materials.designers import shares
-from ...readers.biaxial import BiaxialPath, nearest_ratio
 from ..kinds import Doubt, Expected
+from .data import BiaxialPath, nearest_ratio
 from .test import BiaxialTest
 
 #: Strains at the end of a path: no coated fabric ends below or above.

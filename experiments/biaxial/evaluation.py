@@ -26,10 +26,10 @@ from ...materials.designers import (
     spread_of,
 )
 from ...notes import Note, NoteKind, rows
-from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
 from ...reports.biaxial import BiaxialPanel, plot_biaxial
 from ...writing import replacing
-from .objective import PERCENT
+from .data import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
+from .prepared import PERCENT
 from .test import BiaxialData, BiaxialTest
 
 # Strain that a fabric keeps of a biaxial test: what a cutting pattern is compensated for.

@@ -15,14 +15,13 @@ from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...notes import Note, NoteKind
-from ...readers.biaxial import BiaxialPath
 from ...reports.biaxial import BiaxialPanel, plot_biaxial
 from ...reports.biaxial_charts import biaxial_charts
 from ...reports.content import Exhibit, Table
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
-from .objective import PERCENT
-from .prepared import FittedPath, PreparedBiaxial
+from .data import BiaxialPath
+from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
 YARNS = ("warp", "fill")

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...readers.biaxial import LoadUnit, StrainUnit
 from ...readers.sections import Name, Number, Positive, Section
+from .data import LoadUnit, StrainUnit
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]

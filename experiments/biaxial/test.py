@@ -11,7 +11,11 @@ import numpy as np
 
 from ...errors import InputError
 from ...meshes.strip_models import PatchModel
-from ...readers.biaxial import (
+from ...readers.sections import beside
+from ...reading import is_file
+from ..keys import named_format
+from ..kinds import Place, Reach, Refined
+from .data import (
     BiaxialPath,
     BiaxialTable,
     Cycle,
@@ -20,10 +24,6 @@ from ...readers.biaxial import (
     plain_ratio,
     read_biaxial_table,
 )
-from ...readers.sections import beside
-from ...reading import is_file
-from ..keys import named_format
-from ..kinds import Place, Reach, Refined
 from .section import BiaxialSection, TablesSection
 
 if TYPE_CHECKING:

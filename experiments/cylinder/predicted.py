@@ -17,12 +17,7 @@ from ...meshes.mesh import Mesh, surface_strain
 from ...notes import marks
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
-from ..kinds import (
-    PredictedRun,
-    RunRecord,
-    Studied,
-    band_of,
-)
+from ..kinds import PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
 
 Array = NDArray[np.float64]

@@ -10,18 +10,9 @@ from pydantic import BaseModel
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ...solvers.base import History
-from ..kinds import (
-    Candidate,
-    Kind,
-    MakeSolver,
-    Place,
-    Planning,
-    Predicted,
-    Studied,
-)
+from ..kinds import Candidate, Kind, MakeSolver, Place, Planning, Predicted, Studied
 from .candidates import candidates
-from .objective import Array
-from .prepared import PreparedStrips
+from .prepared import Array, PreparedStrips
 from .section import StripsSection
 from .test import StripsTest, read
 

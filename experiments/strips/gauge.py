@@ -125,10 +125,7 @@ class GaugeRecord:
 
 
 def virtual_strain_gauge(
-    frames: Sequence[Frame],
-    lower: ArrayLike,
-    upper: ArrayLike,
-    max_gap: float = 1.35,
+    frames: Sequence[Frame], lower: ArrayLike, upper: ArrayLike, max_gap: float = 1.35
 ) -> GaugeRecord:
     """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
 

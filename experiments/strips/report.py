@@ -28,9 +28,8 @@ from ...reports.vtu import write_vtu
 from ...solvers.base import History
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
-from .data import Strip
+from .data import Strip, compare_orders
 from .doubts import curves_of
-from .polynomials import compare_orders
 from .prepared import FittedStrip, PreparedStrips
 from .test import StripsTest
 

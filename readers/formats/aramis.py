@@ -14,12 +14,10 @@ is taken for a place after the motion, all else for one before it.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
-from ..frames import Frame, FrameOptions, frame_of
 from ..registry import Format, register_format
-from ..text_frames import read_text_rows
+from ..text_frames import text_reader
 
 _MAKER = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
 
@@ -29,9 +27,8 @@ def recognises(path: Path, head: bytes) -> bool:
     return bool(_MAKER.search(b"\n".join(head[:4096].splitlines()[:10]).replace(b"\0", b"")))
 
 
-def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """Read the one frame of a file."""
-    return [frame_of(read_text_rows(path, options), options, path, "aramis")]
-
-
-register_format(Format("aramis", "frame", "text of ARAMIS or ZEISS Correlate", read, recognises))
+register_format(
+    Format(
+        "aramis", "frame", "text of ARAMIS or ZEISS Correlate", text_reader("aramis"), recognises
+    )
+)

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
 from ..mat_files import is_mat, numbers_of, read_variables, variable_names
 from ..registry import Format, register_format
-from ..text_frames import read_text_rows
+from ..text_frames import text_reader
 
 _PLACE = re.compile(rb'"\s*X( \[\w+\])?\s*"')
 _MOVED = re.compile(rb'"\s*(W|sigma)( \[\w+\])?\s*"')
@@ -31,12 +31,9 @@ def recognises(path: Path, head: bytes) -> bool:
     return bool(_PLACE.search(top) and _MOVED.search(top))
 
 
-def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """Read the one frame of a file."""
-    return [frame_of(read_text_rows(path, options, upper=True), options, path, "vic3d")]
-
-
-register_format(Format("vic3d", "frame", "CSV of VIC-3D", read, recognises))
+register_format(
+    Format("vic3d", "frame", "CSV of VIC-3D", text_reader("vic3d", upper=True), recognises)
+)
 
 
 # MAT-files of Correlated Solutions VIC-3D: a grid of X, Y, Z, U, V, W and sigma.

@@ -8,7 +8,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.biaxial.candidates import candidates
+from bubblefit.experiments.biaxial.prepared import candidates
 from bubblefit.experiments.kinds import Planning, Precision, Weighting
 from bubblefit.materials.designers import shares
 from bubblefit.materials.law import HypoelasticLaw

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
-from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns

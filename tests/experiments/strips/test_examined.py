@@ -10,8 +10,7 @@ import pytest
 from bubblefit.experiments.kinds import Output
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.report import exhibit_examined as exhibit
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 WAY = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
 LOAD = np.array([2.0, 50.0, 90.0, 160.0, 120.0])

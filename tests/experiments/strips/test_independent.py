@@ -10,8 +10,7 @@ from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.prepared import PLACES, SPECIMENS, independent_loads, loads_alike
 from bubblefit.inference.noise import Noise
 from bubblefit.project.project import read_project
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial, specimen_scatter
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial, specimen_scatter
 
 from ...projects import constant_strips
 

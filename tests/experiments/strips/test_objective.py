@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.comparison import Blocks
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import Unknowns

@@ -14,14 +14,12 @@ import pandas as pd
 import pytest
 from bubblefit.experiments.kinds import FittedTest, Output, Weighting
 from bubblefit.experiments.strips import report as figures
-from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.polynomials import compare_orders
+from bubblefit.experiments.strips.data import Strip, compare_orders
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint

@@ -14,8 +14,7 @@ from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import CardRun, Output
 from bubblefit.experiments.strips import simulated
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip
-from bubblefit.experiments.strips.objective import LoadObjective
-from bubblefit.experiments.strips.prepared import FittedStrip
+from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective
 from bubblefit.experiments.strips.report import (
     findings_of,
     load_table,
@@ -24,8 +23,7 @@ from bubblefit.experiments.strips.report import (
 )
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import NoteKind
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from bubblefit.solvers.base import History
 
 WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])

@@ -181,11 +181,7 @@ def test_the_source_says_which_columns_were_read(tmp_path):
     [
         ("Load (N),Extension (mm),Force (N)", {}, "may be 'Load (N)' or 'Force (N)'"),
         ("Load (N),Extension (in),q", {}, "column 'Extension (in)': unit 'in' is not one of mm"),
-        (
-            "Load (N),Extension (cm),q",
-            {"length_unit": "mm"},
-            "says 'cm', length_unit says",
-        ),
+        ("Load (N),Extension (cm),q", {"length_unit": "mm"}, "says 'cm', length_unit says"),
         ("Load,Extension (cm),q", {}, "column 'Load': the file does not name the unit"),
     ],
 )

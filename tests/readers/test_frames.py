@@ -17,15 +17,8 @@ from bubblefit.readers.frames import (
 )
 from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads
 from bubblefit.readers.names import value_in_file
-from bubblefit.readers.pressure_log import (
-    AT_REST_FRAME_CHOICE as AT_REST,
-)
-from bubblefit.readers.pressure_log import (
-    BEYOND,
-    RELEASED,
-    REPEATED,
-    choose_frames,
-)
+from bubblefit.readers.pressure_log import AT_REST_FRAME_CHOICE as AT_REST
+from bubblefit.readers.pressure_log import BEYOND, RELEASED, REPEATED, choose_frames
 from bubblefit.readers.registry import format_named
 from bubblefit.readers.tables import read_table
 from hypothesis import given, settings

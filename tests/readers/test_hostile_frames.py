@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.readers import hdf5_files, mat_files, npz_files
+from bubblefit.readers import hdf5_files, mat_files
 from bubblefit.readers.fields import read_fields
+from bubblefit.readers.formats import pyaldic as npz_files
+from bubblefit.readers.formats.pyaldic import array_names, read_arrays
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.hdf5_files import array_of, check_readable, member, open_hdf5
 from bubblefit.readers.mat_files import (
@@ -25,7 +27,6 @@ from bubblefit.readers.mat_files import (
     read_variables,
     variable_names,
 )
-from bubblefit.readers.npz_files import array_names, read_arrays
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

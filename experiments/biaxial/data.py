@@ -12,11 +12,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..materials.designers import RATIOS, shares
-from .columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
-from .frames import FrameSource
-from .machine_tables import TableOptions, column_of, measured, read_machine_table, source_of
+from ...errors import InputError
+from ...materials.designers import RATIOS, shares
+from ...readers.columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
+from ...readers.frames import FrameSource
+from ...readers.machine_tables import (
+    TableOptions,
+    column_of,
+    measured,
+    read_machine_table,
+    source_of,
+)
 
 #: Those that a pair of loads may be taken for.
 KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
