@@ -133,8 +133,7 @@ def measured(
     """
     path, at = found.table.path, f"line {found.header}, column {column!r}"
     if asked is not None and asked not in units:
-        problem = f"expected one of {', '.join(units)}, got {asked!r}"
-        raise InputError(None, f"{kind}_unit", problem)
+        raise InputError(None, f"{kind}_unit", f"expected one of {', '.join(units)}, got {asked!r}")
     unit = found.units[column]
     if not unit and asked is None:
         problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
@@ -265,8 +264,7 @@ def in_unit(
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
     if factor != 1.0 and said is not None:
-        problem = f"is in {own} already: leave the scale {factor:g} out"
-        raise InputError(path, at, problem)
+        raise InputError(path, at, f"is in {own} already: leave the scale {factor:g} out")
     unit = channel.unit or ("" if raw and said is None else own)
     if not unit:
         what = "after scaling" if raw else "of the readings"

@@ -180,8 +180,7 @@ def _above(
     values = {float(found[3].replace(",", ".")) for found, _ in every}
     if len(values) > 1:
         first, second = every[0][1], every[1][1]
-        problem = f"says another {name!r} than line {first}"
-        raise InputError(path, f"line {second}", problem)
+        raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
     found, line = every[0]
     own = found[1] or found[2] or found[4] or split_unit(name)[1]
     return values.pop(), own.strip(), f"line {line}"

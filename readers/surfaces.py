@@ -234,8 +234,7 @@ def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
 
 def _check(points: Array, path: Path | None) -> None:
     if len(points) < LEAST_POINTS:
-        problem = f"expected {LEAST_POINTS} points or more, got {len(points)}"
-        raise InputError(path, "", problem)
+        raise InputError(path, "", f"expected {LEAST_POINTS} points or more, got {len(points)}")
     spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spans[2] <= FLAT * spans[0]:
         raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")

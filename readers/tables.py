@@ -121,8 +121,7 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
     numbered = read_lines(path, comment)
     if len(numbered) < 2:
         found = "only a header line" if numbered else "nothing"
-        problem = f"expected a header line and rows of numbers, found {found}"
-        raise InputError(path, "", problem)
+        raise InputError(path, "", f"expected a header line and rows of numbers, found {found}")
     letters = sum(len(text) for _, text in numbered)
     check_width(path, numbered[0][0], numbered[0][1].count(",") + 1, len(numbered), letters)
     lines = np.array([number for number, _ in numbered])
@@ -159,8 +158,9 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        problem = "is not text in UTF-8; save it as a comma-separated table"
-        raise InputError(path, "", problem) from None
+        raise InputError(
+            path, "", "is not text in UTF-8; save it as a comma-separated table"
+        ) from None
     if "\0" in text:
         raise InputError(path, "", "is not a text file; save it as a comma-separated table")
     kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)

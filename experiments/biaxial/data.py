@@ -1,11 +1,15 @@
-"""One file of a biaxial test: loads per width and strains along both yarns, row by row."""
+"""Data of biaxial tests: files with loads per width and strains along both yarns, their cycles.
+
+A cycle begins where the larger of the two loads turns from falling to rising and ends where it
+does so again. Turns that are small beside the range of the loads are noise or a hold.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +28,8 @@ from ...readers.machine_tables import (
     source_of,
 )
 
-#: Those that a pair of loads may be taken for.
+Array = NDArray[np.float64]
+#: Ratios that a pair of loads may be taken for.
 KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 #: Degrees between the direction of a pair of loads and that of a ratio: no more than it.
 NEAR = 4.0
@@ -64,7 +69,6 @@ def nearest_ratio(loads: Sequence[float]) -> str:
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
 
 
-Array = NDArray[np.float64]
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
 
@@ -143,11 +147,6 @@ def _ratio(path: Path, at: str, cell: str) -> str:
         raise InputError(path, at, error.problem) from None
 
 
-# The cycles of a biaxial test: where each is loaded from, how far, and of which ratio it is.
-#
-# A cycle begins where the larger of the two loads turns from falling to rising and ends where it
-# does so again. Turns that are small beside the range of the loads are noise or a hold.
-
 #: Of the range of loads of a phase: a smaller turn is none.
 TURN = 0.2
 #: Of a cycle's range: how far from its lowest and highest load the loading begins and ends, so
@@ -204,13 +203,8 @@ def _base(load: Array, row: int) -> Array:
 def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | None, int, int]]:
     if labels is None:
         return [(None, 0, count)]
-    found: list[tuple[str | None, int, int]] = []
-    start = 0
-    for label, same in groupby(labels):
-        stop = start + len(list(same))
-        found.append((label, start, stop))
-        start = stop
-    return found
+    turns = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+    return [(labels[a], a, b) for a, b in pairwise([0, *turns, count])]
 
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
@@ -264,6 +258,11 @@ class BiaxialPath:
     strain: Array
 
     @property
+    def larger(self) -> Array:
+        """Return the larger load of every row, (n,) N/mm."""
+        return np.asarray(self.load.max(axis=1))
+
+    @property
     def ratio(self) -> str:
         """Return the ratio of the loads."""
         return self.cycle.ratio
@@ -283,7 +282,7 @@ class BiaxialPath:
 
         Raises InputError: fewer than two of them.
         """
-        larger = self.load.max(axis=1)
+        larger = self.larger
         keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
         if keep.sum() < 2:
             problem = (
@@ -297,7 +296,7 @@ class BiaxialPath:
         """Return at most so many rows, evenly spread over the larger load, both ends among them."""
         if len(self.load) <= most:
             return self
-        larger = np.maximum.accumulate(self.load.max(axis=1))
+        larger = np.maximum.accumulate(self.larger)
         wanted = np.linspace(larger[0], larger[-1], most)
         rows = np.unique(np.clip(np.searchsorted(larger, wanted), 0, len(larger) - 1))
         rows[-1] = len(larger) - 1

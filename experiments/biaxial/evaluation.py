@@ -1,9 +1,15 @@
-"""The linear evaluation of a biaxial test: designers' constants, and what they hang on."""
+"""The linear evaluation of a biaxial test: designers' constants, their dependence on options.
+
+Residual strain, for which a cutting pattern is compensated, is the strain at the beginning of a
+loading, or after the last one, less that of the file's first row, where the test was under its
+prestress. It is known only where both loads are the same as there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +34,9 @@ from ...materials.designers import (
 from ...notes import Note, NoteKind, rows
 from ...reports.biaxial import BiaxialPanel, plot_biaxial
 from ...writing import replacing
-from .data import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
+from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialData, BiaxialTest
-
-# Strain that a fabric keeps of a biaxial test: what a cutting pattern is compensated for.
-#
-# It is by how much the strain at the beginning of a loading, or after the last one, differs from
-# that of the file's first row, where the test was under its prestress. It is told only where both
-# loads are what they were there: a fabric under other loads has other strains, and keeps nothing
-# by that.
 
 Array = NDArray[np.float64]
 #: Of a loading's range: how near both loads must be to those of the first row.
@@ -63,40 +62,23 @@ class KeptStrain:
 
 def kept_strains(data: BiaxialData) -> tuple[KeptStrain, ...]:
     """Return residual strains phase by phase in the order of the files."""
-    return tuple(
-        _kept(table, same, cycles)
-        for table, cycles in zip(data.tables, data.cycles, strict=True)
-        for same in _phases(cycles)
-    )
-
-
-def _phases(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
-    found: dict[int, list[Cycle]] = {}
-    for cycle in cycles:
-        found.setdefault(cycle.phase, []).append(cycle)
-    return list(found.values())
-
-
-def _kept(table: BiaxialTable, same: Sequence[Cycle], cycles: Sequence[Cycle]) -> KeptStrain:
-    first, last = same[0], same[-1]
-    later = [cycle.first for cycle in cycles if cycle.first > last.last]
-    stop = (later[0] if later else len(table.load) - 1) + 1
-    away = np.abs(table.load - table.load[0]).max(axis=1)
-    least = BACK * float(np.ptp(table.load.max(axis=1)))
-
-    def kept(row: int) -> Array | None:
-        return table.strain[row] - table.strain[0] if away[row] <= least else None
-
-    back = last.last + int(np.argmin(away[last.last : stop]))
-    return KeptStrain(
-        table.path.name,
-        last.ratio,
-        last.phase,
-        len(same),
-        kept(first.first),
-        kept(back),
-        table.load[0],
-    )
+    found = []
+    for table, cycles in zip(data.tables, data.cycles, strict=True):
+        away = np.abs(table.load - table.load[0]).max(axis=1)
+        least = BACK * float(np.ptp(table.load.max(axis=1)))
+        for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
+            same = list(phase)
+            last = same[-1]
+            later = [cycle.first for cycle in cycles if cycle.first > last.last]
+            stop = (later[0] if later else len(table.load) - 1) + 1
+            back = last.last + int(np.argmin(away[last.last : stop]))
+            before, after = (
+                table.strain[row] - table.strain[0] if away[row] <= least else None
+                for row in (same[0].first, back)
+            )
+            name, load = table.path.name, table.load[0]
+            found.append(KeptStrain(name, last.ratio, last.phase, len(same), before, after, load))
+    return tuple(found)
 
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
@@ -158,7 +140,7 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     Raises InputError: paths that do not settle the constants.
     """
     paths = test.data.paths
-    lines = _lines(paths)
+    lines = linear_paths(paths)
     there = [line.ratio for line in lines]
     missing = [ratio for ratio in options.ratios if ratio not in there]
     if missing:
@@ -181,7 +163,8 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     )
 
 
-def _lines(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
+def linear_paths(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
+    """Return the regression lines of paths."""
     return tuple(line_of(path.ratio, path.load, path.since) for path in paths)
 
 
@@ -195,7 +178,7 @@ def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation |
             paths = [path.between(*section.range) for path in paths]
         except InputError:
             return None
-    return evaluate_or_none(_lines(paths), options)
+    return evaluate_or_none(linear_paths(paths), options)
 
 
 #: nu_warp and nu_fill in words.
@@ -229,50 +212,34 @@ def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return a table of the regression lines, by ratio."""
     table = []
     for path, line in zip(found.paths, found.lines, strict=True):
-        table.append(
-            {
-                "ratio": path.ratio,
-                "file": path.table.path.name,
-                "cycle": path.cycle.number,
-                "cycles": path.cycles,
-                "readings": len(path.load),
-                "from_kN_per_m": float(path.load[0].max()),
-                "to_kN_per_m": float(path.load[-1].max()),
-                "warp_load_change_kN_per_m": line.load[0],
-                "fill_load_change_kN_per_m": line.load[1],
-                "warp_strain_change_percent": PERCENT * line.strain[0],
-                "fill_strain_change_percent": PERCENT * line.strain[1],
-                "warp_rms_about_line_percent": PERCENT * line.residual[0],
-                "fill_rms_about_line_percent": PERCENT * line.residual[1],
-                "rms_of_constants_percent": found.chosen.rms[path.ratio],
-            }
-        )
+        row = {
+            "ratio": path.ratio,
+            "file": path.table.path.name,
+            "cycle": path.cycle.number,
+            "cycles": path.cycles,
+            "readings": len(path.load),
+            "from_kN_per_m": float(path.larger[0]),
+            "to_kN_per_m": float(path.larger[-1]),
+        }
+        for what, values in (
+            ("load_change_kN_per_m", line.load),
+            ("strain_change_percent", PERCENT * np.asarray(line.strain)),
+            ("rms_about_line_percent", PERCENT * np.asarray(line.residual)),
+        ):
+            row |= {f"warp_{what}": values[0], f"fill_{what}": values[1]}
+        table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
     return pd.DataFrame(table)
 
 
 def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return a table of residual strains before and after each phase of cycles, %."""
-
-    def percent(strain: Array | None) -> Array:
-        return np.full(2, np.nan) if strain is None else PERCENT * strain
-
     table = []
-    for kept in found.kept:
-        before, after = percent(kept.before), percent(kept.after)
-        table.append(
-            {
-                "file": kept.file,
-                "phase": kept.phase,
-                "ratio": kept.ratio,
-                "cycles": kept.cycles,
-                "warp_before_percent": before[0],
-                "fill_before_percent": before[1],
-                "warp_after_percent": after[0],
-                "fill_after_percent": after[1],
-                "warp_load_kN_per_m": kept.load[0],
-                "fill_load_kN_per_m": kept.load[1],
-            }
-        )
+    for k in found.kept:
+        row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
+        for when, strain in (("before", k.before), ("after", k.after)):
+            values = np.full(2, np.nan) if strain is None else PERCENT * strain
+            row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
+        table.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
     return pd.DataFrame(table)
 
 
@@ -349,11 +316,9 @@ def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> li
     for measured in found.paths:
         load = measured.load
         strain = PERCENT * found.chosen.constants.strain(load - load[0])
-        larger = load.max(axis=1)
+        curves = (("constants", measured.larger, strain),)
         panels.append(
-            BiaxialPanel(
-                measured.ratio, larger, PERCENT * measured.since, (("constants", larger, strain),)
-            )
+            BiaxialPanel(measured.ratio, measured.larger, PERCENT * measured.since, curves)
         )
     written.append(plot_biaxial(folder / f"{prefix}constants.png", panels))
     return written

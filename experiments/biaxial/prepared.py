@@ -1,4 +1,4 @@
-"""A biaxial test in a fit: what is compared, and what a finished fit shows of it."""
+"""Biaxial tests in a fit: residuals, comparisons, and tests that could be made next."""
 
 from __future__ import annotations
 
@@ -198,12 +198,8 @@ class PreparedBiaxial:
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
             objective = StrainObjective(path.load, path.since, largest, share, test.noise)
-            found.append(
-                Comparison(
-                    self.part(path.ratio), models[path.ratio], make_solver(), objective,
-                    contracts=True,
-                )
-            )  # fmt: skip
+            own = self.part(path.ratio), models[path.ratio], make_solver(), objective
+            found.append(Comparison(*own, contracts=True))
         return tuple(found)
 
     def finer(
@@ -240,8 +236,6 @@ class PreparedBiaxial:
         return doubts_of_biaxial(self.test, expected)
 
 
-Array = NDArray[np.float64]
-
 #: Beside the five of designers' constants.
 FURTHER = ("1:5", "5:1")
 #: Loads of a path; values of a strain's curve that are taken to be independent where the project
@@ -266,7 +260,9 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> PreparedBiaxial:
     """Return the path with the strains that the law gives."""
     thickness = planning.place.fabric.thickness
-    highest = _end(planning.law, planning.ends, ratio, thickness)
+    highest = largest_load(planning.law, thickness, [shares(ratio)], planning.ends[:2])
+    if not highest > 0:
+        raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")
     loads = np.outer(np.linspace(PRESTRESS, 1.0, LOADS) * highest, shares(ratio))
     strain = biaxial_response(planning.law, loads, thickness).elongation
     table = BiaxialTable(
@@ -293,11 +289,3 @@ def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
     if not known:
         return Precision(PERCENT * EXTENSOMETER, 1.0, INDEPENDENT).at(LOADS - 1)
     return max(one.at(LOADS - 1) for one in known)
-
-
-def _end(law: HypoelasticLaw, ends: Array, ratio: str, thickness: float) -> float:
-    """Return the larger load (kN/m) at which a yarn is at the end of its strain."""
-    low = largest_load(law, thickness, [shares(ratio)], ends[:2])
-    if not low > 0:
-        raise SolverFailure(f"the law carries no load of ratio {ratio}", "membrane")
-    return low

@@ -1,4 +1,4 @@
-"""What a biaxial test puts on the page of a fit, and the files that it writes."""
+"""Results of biaxial tests as numbers, tables, figures and files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...materials.card import MaterialCard
-from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...notes import Note, NoteKind
 from ...reports.biaxial import BiaxialPanel, plot_biaxial
@@ -24,17 +23,15 @@ from .data import BiaxialPath
 from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
+Array = NDArray[np.float64]
 YARNS = ("warp", "fill")
 
 
 def misfit_table(paths: Sequence[FittedPath]) -> Table:
     """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
-        [
-            p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
-            float(p.path.load[0].max()), float(p.path.load[-1].max()),
-            *(PERCENT * p.path.residual).tolist(),
-        ]
+        [p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
+         *p.path.larger[[0, -1]].tolist(), *(PERCENT * p.path.residual).tolist()]
         for p in paths
     ]  # fmt: skip
     header = [
@@ -52,104 +49,17 @@ def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
     """Return loads and strains of every ratio, measured and modelled, along the path."""
     parts = []
     for p in paths:
-        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
-        parts.append(
-            pd.DataFrame(
-                {
-                    "ratio": p.path.ratio,
-                    "warp_load_kN_per_m": p.path.load[:, 0],
-                    "fill_load_kN_per_m": p.path.load[:, 1],
-                    "warp_strain_percent": measured[:, 0],
-                    "fill_strain_percent": measured[:, 1],
-                    "warp_model_percent": modelled[:, 0],
-                    "fill_model_percent": modelled[:, 1],
-                }
-            )
+        parts.append(_columns(p.path.load, "load_kN_per_m"))
+        parts[-1].insert(0, "ratio", p.path.ratio)
+        strains = (("strain", p.objective.strain), ("model", p.objective.modelled(p.history)))
+        parts[-1][[f"{yarn}_{name}_percent" for name, _ in strains for yarn in YARNS]] = (
+            PERCENT * np.hstack([strain for _, strain in strains])
         )
     return pd.concat(parts, ignore_index=True)
 
 
-def residual_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Return a table of every matched strain."""
-    parts = []
-    for p in paths:
-        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
-        for k, yarn in enumerate(YARNS):
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "part": p.path.ratio,
-                        "warp_load_kN_per_m": p.path.load[1:, 0],
-                        "fill_load_kN_per_m": p.path.load[1:, 1],
-                        "quantity": f"{yarn}_strain",
-                        "measured": measured[1:, k],
-                        "modelled": modelled[1:, k],
-                        "difference": (modelled - measured)[1:, k],
-                        "unit": "%",
-                    }
-                )
-            )
-    return pd.concat(parts, ignore_index=True)
-
-
-Array = NDArray[np.float64]
-
-CAPTION = "Strain over the larger load: measured and modelled"
-
-
-def exhibit(
-    test: BiaxialTest, paths: Sequence[FittedPath], law: HypoelasticLaw, out: Output
-) -> Exhibit:
-    """Write paths.csv and the picture of the ratios."""
-    with replacing(out.path("paths.csv")) as path:
-        path_table(paths).to_csv(path, index=False, float_format="%.9g")
-    panels = [
-        BiaxialPanel(
-            p.path.ratio,
-            p.path.load.max(axis=1),
-            PERCENT * p.objective.strain,
-            (("model", p.path.load.max(axis=1), PERCENT * p.objective.modelled(p.history)),),
-        )
-        for p in paths
-    ]
-    plot_biaxial(out.path("paths.png"), panels)
-    return Exhibit(
-        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
-        tables=[misfit_table(paths)],
-        files=[
-            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
-            (out.name("paths.png"), "picture of the ratios"),
-        ],
-        parts=[biaxial_charts(f"{test.name} ratios", panels, CAPTION)],
-    )
-
-
-def findings_of(test: BiaxialTest, paths: Sequence[FittedPath]) -> Findings:
-    """Return numbers and words of the best fit."""
-    errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
-    summary = f"RMS errors of strain along warp / fill in %: {errors}"
-    return Findings(
-        numbers={"ratios": {p.path.ratio: _numbers(p) for p in paths}},
-        warnings=tuple(_warnings(test)),
-        lines=(summary,),
-        quality=summary,
-        summary=summary,
-    )
-
-
-def _numbers(fitted: FittedPath) -> dict[str, Any]:
-    path = fitted.path
-    return {
-        "rms_warp_percent": fitted.rms[0],
-        "rms_fill_percent": fitted.rms[1],
-        "matched": len(path.load),
-        "cycle": path.cycle.number,
-        "cycles": path.cycles,
-        "end_load_warp_kN_per_m": float(path.load[-1, 0]),
-        "end_load_fill_kN_per_m": float(path.load[-1, 1]),
-        "residual_warp_percent": 100 * float(path.residual[0]),
-        "residual_fill_percent": 100 * float(path.residual[1]),
-    }
+def _columns(values: Array, name: str) -> pd.DataFrame:
+    return pd.DataFrame(values, columns=[f"{yarn}_{name}" for yarn in YARNS])
 
 
 def _warnings(test: BiaxialTest) -> list[Note]:
@@ -161,37 +71,6 @@ def _warnings(test: BiaxialTest) -> list[Note]:
     notes = [Note(NoteKind.UNMATCHED, words)]
     said = dict.fromkeys(note for table in test.data.tables for note in table.source.notes)
     return notes + [Note(NoteKind.READING, words) for words in said]
-
-
-PATHS = "biaxial.png"
-
-
-def exhibit_examined(test: BiaxialTest, out: Output) -> Exhibit:
-    """Draw the paths; return a table of all cycles."""
-    panels = [
-        BiaxialPanel(path.ratio, path.load.max(axis=1), PERCENT * path.since)
-        for path in test.data.paths
-    ]
-    plot_biaxial(out.path(PATHS), panels)
-    used = {(id(path.table), path.cycle.count) for path in test.data.paths}
-    rows: list[list[object]] = []
-    for read, cycles in zip(test.data.tables, test.data.cycles, strict=True):
-        for cycle in cycles:
-            kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
-            rows.append(
-                [
-                    read.path.name, cycle.count, cycle.ratio, cycle.number,
-                    *read.load[cycle.last].tolist(), *kept.tolist(),
-                    "yes" if (id(read), cycle.count) in used else "",
-                ]
-            )  # fmt: skip
-    header = [
-        "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
-        "strain kept before it, warp, %", "fill, %", "evaluated",
-    ]  # fmt: skip
-    table = Table("Cycles as read", header, rows, text=(0, 2, 8))
-    figures = [(out.name(PATHS), "the loading of each ratio that is evaluated")]
-    return Exhibit(figures=figures, tables=[table])
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,8 +126,7 @@ def _loading(
     strain = PERCENT * (own - own[0])[:shown]
     off = strain - PERCENT * path.since[:shown]
     warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist() if shown else (None, None)
-    larger = path.load.max(axis=1)[:shown]
-    return Loading(path, larger, strain, (warp, fill), strains_of(run.outcome))
+    return Loading(path, path.larger[:shown], strain, (warp, fill), strains_of(run.outcome))
 
 
 def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
@@ -279,19 +157,13 @@ def _lines_of_cards(found: Loadings) -> list[str]:
 
 def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
     ended = {key: one for key, one in found.items() if isinstance(one, Loading)}
-    tables = [
-        pd.DataFrame(
-            {
-                "card": name,
-                "ratio": ratio,
-                "warp_load_kN_per_m": one.path.load[: len(one.larger), 0],
-                "fill_load_kN_per_m": one.path.load[: len(one.larger), 1],
-                "warp_strain_percent": one.strain[:, 0],
-                "fill_strain_percent": one.strain[:, 1],
-            }
-        )
-        for (name, ratio), one in ended.items()
-    ]
+    tables = []
+    for (name, ratio), one in ended.items():
+        table = _columns(one.path.load[: len(one.larger)], "load_kN_per_m")
+        table[[f"{yarn}_strain_percent" for yarn in YARNS]] = one.strain
+        table.insert(0, "card", name)
+        table.insert(1, "ratio", ratio)
+        tables.append(table)
     if tables:
         with replacing(out.path("paths.csv")) as file:
             pd.concat(tables, ignore_index=True).to_csv(file, index=False, float_format="%.9g")
@@ -302,8 +174,7 @@ def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
             for (name, ratio), one in ended.items()
             if ratio == path.ratio and len(one.larger)
         )
-        larger = path.load.max(axis=1)
-        panels.append(BiaxialPanel(path.ratio, larger, PERCENT * path.since, curves))
+        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
     plot_biaxial(out.path("paths.png"), panels)
 
 
@@ -315,19 +186,90 @@ def _within(card: MaterialCard, elongation: Array) -> int:
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    return findings_of(prepared.test, prepared.fitted_paths(fitted))
+    paths, numbers = prepared.fitted_paths(fitted), {}
+    for p in paths:
+        warp, fill = p.rms
+        numbers[p.path.ratio] = {
+            "rms_warp_percent": warp,
+            "rms_fill_percent": fill,
+            "matched": len(p.path.load),
+            "cycle": p.path.cycle.number,
+            "cycles": p.path.cycles,
+            "end_load_warp_kN_per_m": float(p.path.load[-1, 0]),
+            "end_load_fill_kN_per_m": float(p.path.load[-1, 1]),
+            "residual_warp_percent": 100 * float(p.path.residual[0]),
+            "residual_fill_percent": 100 * float(p.path.residual[1]),
+        }
+    errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
+    summary = f"RMS errors of strain along warp / fill in %: {errors}"
+    warnings = tuple(_warnings(prepared.test))
+    return Findings({"ratios": numbers}, warnings, (summary,), summary, summary)
 
 
 def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
-    return exhibit(prepared.test, prepared.fitted_paths(fitted), fitted.law, out)
+    paths = prepared.fitted_paths(fitted)
+    with replacing(out.path("paths.csv")) as path:
+        path_table(paths).to_csv(path, index=False, float_format="%.9g")
+    panels = [
+        BiaxialPanel(
+            p.path.ratio,
+            p.path.larger,
+            PERCENT * p.objective.strain,
+            (("model", p.path.larger, PERCENT * p.objective.modelled(p.history)),),
+        )
+        for p in paths
+    ]
+    plot_biaxial(out.path("paths.png"), panels)
+    caption = "Strain over the larger load: measured and modelled"
+    return Exhibit(
+        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
+        tables=[misfit_table(paths)],
+        files=[
+            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
+            (out.name("paths.png"), "picture of the ratios"),
+        ],
+        parts=[biaxial_charts(f"{prepared.test.name} ratios", panels, caption)],
+    )
 
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
-    """Write the loads and cycles as they were read."""
-    return exhibit_examined(prepared.test, out)
+    """Draw the paths; return a table of all cycles."""
+    data, picture = prepared.test.data, "biaxial.png"
+    panels = [BiaxialPanel(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
+    plot_biaxial(out.path(picture), panels)
+    used = {(id(path.table), path.cycle.count) for path in data.paths}
+    rows: list[list[object]] = []
+    for read, cycles in zip(data.tables, data.cycles, strict=True):
+        for cycle in cycles:
+            kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
+            mark = "yes" if (id(read), cycle.count) in used else ""
+            rows.append([read.path.name, cycle.count, cycle.ratio, cycle.number,
+                         *read.load[cycle.last].tolist(), *kept.tolist(), mark])  # fmt: skip
+    header = [
+        "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
+        "strain kept before it, warp, %", "fill, %", "evaluated",
+    ]  # fmt: skip
+    table = Table("Cycles as read", header, rows, text=(0, 2, 8))
+    figures = [(out.name(picture), "the loading of each ratio that is evaluated")]
+    return Exhibit(figures=figures, tables=[table])
 
 
 def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
-    return residual_table(prepared.fitted_paths(fitted))
+    parts = []
+    for p in prepared.fitted_paths(fitted):
+        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
+        for k, yarn in enumerate(YARNS):
+            table = _columns(p.path.load[1:], "load_kN_per_m")
+            table.insert(0, "part", p.path.ratio)
+            parts.append(
+                table.assign(
+                    quantity=f"{yarn}_strain",
+                    measured=measured[1:, k],
+                    modelled=modelled[1:, k],
+                    difference=(modelled - measured)[1:, k],
+                    unit="%",
+                )
+            )
+    return pd.concat(parts, ignore_index=True)

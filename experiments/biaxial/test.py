@@ -1,11 +1,10 @@
-"""A biaxial test as its section says, and the models of it."""
+"""A biaxial test, as its section describes it, and its models."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +24,6 @@ from .data import (
     read_biaxial_table,
 )
 from .section import BiaxialSection, TablesSection
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +49,18 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
         if not is_file(path):
             if not place.need_data:
                 return BiaxialData((), (), ())
-            problem = f"there is no file {path}; --data DIR names another folder"
-            raise place.error(field, problem)
-        tables.append(_table(place, data, path))
+            raise place.error(field, f"there is no file {path}; --data DIR names another folder")
+        tables.append(
+            read_biaxial_table(
+                path,
+                columns={k: v for k, v in data.columns.model_dump().items() if v is not None},
+                load_unit=data.load_unit,
+                strain_unit=data.strain_unit,
+                decimal=data.decimal,
+                comment=data.comment,
+                format=named_format(place, "data.format", "machine table", data.format),
+            )
+        )
         named.append(ratio)
     cycles = cycles_of(tables, named)
     wanted = None
@@ -88,18 +93,6 @@ def _ratio(place: Place, field: str, name: str) -> str:
         return plain_ratio(name)
     except InputError as error:
         raise place.error(field, error.problem) from None
-
-
-def _table(place: Place, data: TablesSection, path: Path) -> BiaxialTable:
-    return read_biaxial_table(
-        path,
-        columns={k: v for k, v in data.columns.model_dump().items() if v is not None},
-        load_unit=data.load_unit,
-        strain_unit=data.strain_unit,
-        decimal=data.decimal,
-        comment=data.comment,
-        format=named_format(place, "data.format", "machine table", data.format),
-    )
 
 
 #: Strains below it are none that a law could be fitted over.

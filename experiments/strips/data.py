@@ -405,8 +405,7 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):
-        problem = "expected exactly one of 'polynomials' and 'files'"
-        raise place.error("data", problem)
+        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
     folder = place.data_folder
     if folder is None:
         folder = beside(place.path.parent, data.folder)

@@ -240,8 +240,7 @@ def gauge_load_curve(
     if not np.isfinite(load).all():
         raise InputError(path, "loads", "expected finite numbers; leave out rows without a load")
     if (frame_times is None) != (load_times is None):
-        problem = "expected both frame_times and load_times, or neither"
-        raise InputError(path, "times", problem)
+        raise InputError(path, "times", "expected both frame_times and load_times, or neither")
     inside = np.ones(count, dtype=bool)
     if frame_times is None or load_times is None:
         if load.shape != (count,):
@@ -270,8 +269,7 @@ def _at_times(
     pairs = (("frame_times", frame_times, count), ("load_times", load_times, load.size))
     for name, times, expected in pairs:
         if times.shape != (expected,) or not np.isfinite(times).all():
-            problem = f"expected {expected} finite numbers, got {times.size}"
-            raise InputError(path, name, problem)
+            raise InputError(path, name, f"expected {expected} finite numbers, got {times.size}")
     if load.size < 2 or (np.diff(load_times) <= 0).any():
         raise InputError(path, "load_times", "expected two or more, each later than the one before")
     inside = (frame_times >= load_times[0]) & (frame_times <= load_times[-1])

@@ -140,8 +140,7 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
 
 def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
     if place.need_data and not all(s.curves for s in strips.values()):
-        problem = "'points' needs measured points (data.files), not polynomials"
-        raise place.error("match", problem)
+        raise place.error("match", "'points' needs measured points (data.files), not polynomials")
     for direction, strip in strips.items():
         if strip.curves and not len(strip.points[0]):
             problem = "no measured point lies between the gauge length and this one"
