@@ -42,8 +42,7 @@ UNLOADING = "after the largest deflection"
 class BendingCurve:
     """One repetition of a bending test, as far as it was loaded.
 
-    repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
-    dropped : how many readings of it are left out, by why. source : what of the file was read.
+    deflection, load : (n,) mm and N, by rising deflection. dropped : counts of readings left out.
     """
 
     repetition: str
@@ -68,17 +67,10 @@ def read_bending_curves(
 ) -> tuple[BendingCurve, ...]:
     """Read the repetitions in one file, in its order; one where no column tells them apart.
 
-    The table is found as in the exports of test machines (`machine_tables`). Of each repetition
-    the readings up to the largest deflection are kept: what comes after is unloading.
-
-    repetition : name of the column of repetitions, where there is one of another name. preload : N
-    on the beam beside what the readings say: collar and strap. zero : of each repetition's
-    deflection: "none", as read; "first", the first reading is zero; "line", the straight line
-    through the first four readings goes through the origin. format : name of the file's format;
-    found by its content unless given.
-    Raises InputError: naming file and line: columns that are not there or may be several, no or
-    unknown units, cells that are not numbers, a repetition of one reading, or whose first readings
-    show no stiffness to find a zero by.
+    Of each repetition the readings up to the largest deflection are kept: the rest is unloading.
+    repetition : name of the column of repetitions. preload : N beside the readings: collar and
+    strap. zero : of the deflection: "none", as read; "first", the first reading is zero; "line",
+    the straight line through the first four readings goes through the origin.
     """
     path = Path(path)
     named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
@@ -138,8 +130,8 @@ PLACES = 61  # of the grid
 class BendingScatter:
     """Repetitions on one grid of deflections (k,) mm.
 
-    mean, deviation : (k,) N over the repetitions that reach so far; the deviation is NaN where
-    that is one. count : (k,) how many do.
+    mean, deviation : (k,) N over the `count` (k,) repetitions that reach so far; deviation NaN for
+    one.
     """
 
     deflection: Array
@@ -153,8 +145,7 @@ class BendingError:
     """Errors of a model's curve at the readings that it reaches.
 
     rms, mean : N; the mean is positive where the model is too stiff. relative : rms over the
-    largest load among these readings. compared, beyond : readings up to the model's last
-    deflection, and after it.
+    largest load read. compared, beyond : readings up to the model's last deflection, and after it.
     """
 
     rms: float
@@ -165,12 +156,7 @@ class BendingError:
 
 
 def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScatter:
-    """Return mean and sample standard deviation of the repetitions, interpolated between readings.
-
-    The grid goes from the smallest to the largest deflection read.
-
-    Raises ValueError: no curves.
-    """
+    """Return mean and sample standard deviation of the repetitions, interpolated linearly."""
     if not curves:
         raise ValueError("scatter: no repetitions")
     low = min(float(c.deflection[0]) for c in curves)
@@ -189,10 +175,9 @@ def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScat
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """Return the model's load less that read, at every reading from zero to the model's end.
+    """Return the model's load less that read, over its range; None where it reaches no load.
 
     deflection, load : (frames,) mm, rising, and N, of the model.
-    None where the model reaches no reading of a load.
     """
     x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
     way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)

@@ -49,14 +49,10 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class LoadCurve:
-    """Load against elongation of one specimen, or of several in one series.
+    """Load (n,) N of the whole strip over elongation (n,) mm of one specimen or series.
 
-    direction : warp, fill or bias. specimen : its name in the file, else the series', else the
-    file's. elongation : (n,) mm, in the order of the file. load : (n,) N, of the whole strip. path
-    : the file, None when the curve did not come from one. time : (n,) in the file's unit, None
-    unless asked for by name. frame : (n,) number from 0 of the frame each point is from, None but
-    for a strain gauge. notes : one sentence each: what was chosen where the file leaves a choice.
-    source : what of the file was read; None where nothing was.
+    specimen : its name in the file, else the series', else the file's. time : (n,) only where asked
+    for. frame : (n,) number of the frame from 0, of a strain gauge. notes : choices that were made.
     """
 
     direction: str
@@ -96,19 +92,10 @@ def read_load_curves(
 ) -> tuple[LoadCurve, ...]:
     """Read the curves of one export: one a direction and specimen, in the order of the file.
 
-    In text, lines before the row of names are passed over; names, unit row, separator and decimal
-    mark are found (see `formats.machine_text`).
-
     columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with or
-    without the unit; needed where finding is ambiguous. `time` is read only when named. load_unit,
-    length_unit : needed where the file names none. width : of the strip, mm, by which a load per
-    width (kN/m, N/mm) is multiplied. comment : lines that start so are skipped. direction : of a
-    file without a column of directions; in a file with one, the rows to keep. decimal : needed
-    where 1,234 may be a thousand or little more than one. format : name of the file's format; found
-    by its content unless given.
-    Raises InputError: naming file, line and the columns there are: nothing or several things found
-    for a quantity, no unit or a different one, no or an unknown direction, cells that are not
-    finite numbers.
+    without unit; time is read only when named. load_unit, length_unit : where the file names none.
+    width : mm of the strip, for loads per width. direction : of a file without such a column; else
+    the rows to keep. decimal : needed where 1,234 may be a thousand or little more than one.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in QUANTITIES]
@@ -144,10 +131,10 @@ def read_load_curves(
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
-    """Return the specimens of a series that lists them one after the other without naming them.
+    """Return the specimens of a series that lists them one after the other without names.
 
-    A new specimen starts where the elongation falls below half of the largest before; so not for
-    tests that unload. They are called by the series' name and a number from 1.
+    A specimen starts where the elongation falls below half of the largest before; so not for tests
+    that unload. They are called by the series' name and a number from 1.
     """
     u, starts, reached = curve.elongation, [0], 0.0
     for i, value in enumerate(u):
@@ -220,11 +207,9 @@ MAX_ORDER = 12  # beyond, the powers of one elongation tell nothing apart
 class LoadPolynomial:
     """A polynomial P(u) = c0 + c1 u + c2 u^2 + ...
 
-    coefficients : (order + 1,) N, N/mm, N/mm^2 ..., lowest power first; c0 is there, 0 when the
-    polynomial goes through the origin. end : mm, the largest elongation it was fitted to; beyond,
-    it means nothing. r_squared : 1 - (squares left) / (squares about the mean load), as in Table
-    3.1, also through the origin. NaN where not known. rmse : N, root of the mean square left. NaN
-    where not known. points : how many it was fitted to; 0 where not known.
+    coefficients : (order + 1,) N, N/mm ..., lowest power first. end : mm, the largest elongation
+    fitted. r_squared : about the mean load, as in Table 3.1; rmse : N; both NaN, and points 0,
+    where unknown.
     """
 
     coefficients: Array
@@ -276,9 +261,8 @@ def fit_load_polynomial(
 class SpecimenScatter:
     """Deviations of specimens from one polynomial, in N.
 
-    specimens : their names. rms, mean : root mean square and mean of load - P(u), one a specimen.
-    rmse : root mean square over all points. deviation : standard deviation of load - P(u) over
-    all points about their own mean, n - 1 in the denominator: the published 21.7, 64.1 and 40.3 N.
+    rms, mean : of load - P(u), one a specimen. rmse : over all points. deviation : standard
+    deviation over all points about their own mean (n - 1): the published 21.7, 64.1 and 40.3 N.
     """
 
     specimens: tuple[str, ...]
@@ -347,10 +331,8 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
 class PublishedPolynomial:
     """One direction's load over gauge elongation.
 
-    direction : warp, fill or bias. gauge_length, final_length : mm, of the virtual strain gauge
-    before the test and at its end. polynomial : its end is final - gauge length; R^2, RMSE and
-    points are not in the file. scatter : N, standard deviation of the specimens about it, NaN
-    where the file has none.
+    gauge_length, final_length : mm, of the virtual strain gauge. polynomial : without R^2, RMSE and
+    points. scatter : N, standard deviation of the specimens, or NaN.
     """
 
     direction: str
@@ -366,7 +348,6 @@ def read_published_polynomials(
     """Read load polynomials by direction: N, of the full strip, over mm.
 
     format : name of the file's format; found by its content unless given.
-    Raises InputError: naming file, line and column.
     """
     polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
     return polynomials

@@ -21,14 +21,11 @@ PLAIN = FrameOptions(QUANTITIES)
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacements measured (or computed) at one pressure.
+    """Displacements measured (or computed) at one pressure (MPa).
 
-    pressure : MPa. points : (n, 2) mm, places in the reference state; x is warp, y is fill.
-    displacement : (n, 3) mm. dropped : how many rows of the file were left out, by why
-    (`frames.FLAGGED` and others). z : (n,) mm, height in the reference state; None where it was not
-    measured. sigma : (n,) what the correlation says of its own error, in the file's own measure,
-    NaN where it says nothing; None where it does so nowhere. path : the file, None when the field
-    did not come from one. source : what of the file was read.
+    points : (n, 2) mm in the reference state; x is warp, y is fill. displacement : (n, 3) mm. z :
+    (n,) mm, height in the reference state; None where unknown. sigma : (n,) as `Frame.sigma`.
+    dropped : counts of rows left out, by reason.
     """
 
     pressure: float
@@ -60,16 +57,9 @@ def read_fields(
 ) -> tuple[DisplacementField, ...]:
     """Read one frame a pressure.
 
-    files : the frames in order, one a file or several; columns that are not asked for are ignored.
-    A first frame in which nothing moves is left out where there is one frame too many: it is the
-    reference of a file that holds them all. pressures : MPa, one a frame. columns, flag_column,
-    comment, length_scale : see `frames.FrameOptions`; quantities are `x`, `y`, `dx`, `dy`, `dz`,
-    and `z` where it is there. format : its name; found by the files' content unless given. options
-    : in place of the four before, where there is more to say of the files. frames : numbers from 0
-    of the frames taken, one a pressure, among all of the files; all of them unless given.
-    Raises InputError: naming file, line and column: no such file, missing columns, an empty table,
-    cells that are not finite numbers, nothing left without the doubtful rows, more or fewer frames
-    than pressures.
+    A first frame in which nothing moves is left out where there is one frame too many in one file.
+    pressures : MPa. columns, flag_column, comment, length_scale : see `frames.FrameOptions`;
+    options stands in their place. frames : numbers from 0 of the frames taken; all unless given.
     """
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
@@ -98,10 +88,7 @@ def _at_rest(frame: Frame) -> bool:
 def read_field(
     path: Path | str, pressure: float, options: FrameOptions = PLAIN, format: str | None = None
 ) -> DisplacementField:
-    """Read the field of one file, at a pressure in MPa.
-
-    Raises InputError: as `read_fields`; several frames in the file.
-    """
+    """Read the field of one file, at a pressure in MPa."""
     frames = read_frames([path], options, format)
     if len(frames) != 1:
         raise InputError(path, "", f"expected one frame, one a pressure; found {len(frames)}")

@@ -1,4 +1,8 @@
-"""Frames of image correlation (DIC): places in the reference picture, and how they moved."""
+"""Frames of image correlation (DIC): reference places and displacements, and their columns.
+
+The words of headings are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports (the
+readers in `formats` name sources), and of plain tables in English and German.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,8 @@ from ..notes import Note, NoteKind
 from .columns import LONGEST, split_unit
 from .registry import read_file
 
+Array = NDArray[np.float64]
+
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
 
@@ -33,10 +39,7 @@ LOST = "without a value"
 class FrameSource:
     """A record of what was read from a file.
 
-    format : name of the file's format, "" where its reader does not say. columns : for each
-    quantity that was read, what the file calls it. units : for each of them the unit that the file
-    names; a quantity is missing where the file names none. notes : one sentence each: what was
-    chosen where the file leaves a choice.
+    columns, units : by quantity, as the file names them. notes : choices that were made.
     """
 
     format: str = ""
@@ -49,11 +52,9 @@ class FrameSource:
 class Frame:
     """A surface in one frame.
 
-    points : (m, 3) mm, reference places; NaN where correlation was lost, z also where it was not
-    asked for. displacement : (m, 3) mm; NaN where correlation was lost. path : the file, None when
-    the frame did not come from one. dropped : how many rows of the file are not among the points,
-    by why. sigma : (m,) what the correlation says of its own error, in the file's own measure; None
-    where it says nothing. source : what of the file was read.
+    points, displacement : (m, 3) mm, in the reference state; NaN where correlation was lost.
+    dropped : counts of rows left out, by reason. sigma : (m,) the correlation's own measure of
+    error.
     """
 
     points: NDArray[np.float64]
@@ -75,17 +76,11 @@ class Frame:
 class FrameOptions:
     """Options of a reader of frames.
 
-    quantities : of `QUANTITIES`, those that the file must hold; others are read where they are
-    there. columns : the file's own name of some quantities; the others are found by their headings.
-    flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
-    valid_column : the same for a column that is zero in doubtful rows. comment : lines that start
-    so are skipped, where the format has no comments of its own. length_scale : mm in one unit of
-    length of columns that do not name theirs. decimal : the decimal mark, "." or ","; None finds
-    it. coordinates : whether the places in the file are those before or after the motion; None
-    where the format tells. camera_axes : whether y points down in the file and z away from the
-    camera, so that both are turned over; None where the format tells. planar : whether z and dz may
-    be missing, and are then zero.
-    Raises InputError: a name for what is no quantity, a scale that is not above zero.
+    quantities : of `QUANTITIES`, those that the file must hold. columns : the file's own names of
+    some. flag_column, valid_column : rows where the first is not zero, or the second is, are left
+    out. length_scale : mm per unit of columns without a unit. coordinates, camera_axes : state of
+    the places, and whether y points down and z away; None where the format tells. planar : z and dz
+    may be missing, and are then zero.
     """
 
     quantities: tuple[str, ...] = QUANTITIES
@@ -115,11 +110,7 @@ def read_frames(
     """Read frames in the order of the files; most formats have one a file.
 
     Exports that write zeros for the displacement only where correlation was lost need a flag
-    column: such a point cannot be told from one that did not move.
-
-    format : its name (`registry.format_names("frame")`); found by the files' content unless given.
-    Raises InputError: naming file, line and column: no files, no such file, a format that cannot be
-    told, missing columns, cells that are not numbers.
+    column.
     """
     if not files:
         raise InputError(None, "files", "expected one file a frame, got none")
@@ -133,11 +124,6 @@ def _frames(path: Path, options: FrameOptions, format: str | None) -> Sequence[F
             raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
     return frames
 
-
-# What the columns of an image correlation's export are called, and the units they name.
-#
-# The words are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports, whose readers
-# in `formats` name the source of each, and of plain tables in English and German.
 
 #: mm in one of each unit of length, by its name in small letters.
 LENGTHS = {
@@ -170,11 +156,10 @@ _UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGN
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading.
+    """A column's heading: name and unit of the file, quantity, and state of a coordinate.
 
-    name : as the file has it. unit : as the file has it, "" for none. quantity : x, y, z, dx, dy,
-    dz, sigma, valid, invalid; "" for anything else. state : of a coordinate, "reference" or
-    "deformed" where the heading says so, else "".
+    quantity : one of `QUANTITIES`, sigma, valid, invalid, or "". state : "reference", "deformed" or
+    "".
     """
 
     name: str
@@ -230,11 +215,8 @@ def columns_of(
 ) -> dict[str, list[int]]:
     """Return the columns that may hold each quantity, with deformed places as "x deformed".
 
-    Of several, those with a unit of length come before those without, which come before pixels;
-    a column of exactly the quantity's own name before all, unless `upper`.
-
-    named : the file's own names of some quantities, with or without the unit. upper : of two names
-    that differ only in their letters' size, the large one is the length.
+    Lengths come before columns without a unit, those before pixels; a quantity's own name before
+    all, unless `upper`: then, of two names that differ in case, the large one is the length.
     """
     places: dict[str, list[int]] = {}
     taken = [name.strip() for name in named.values()]
@@ -266,19 +248,14 @@ def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) 
     return [i for i in where if rank(i) == best]
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class FrameRows:
     """One frame as its file has it.
 
-    values : (rows,) of x, y, z, dx, dy, dz, those that there are; NaN where correlation was lost.
-    Of "x deformed" and so on where the file has places after the motion. names, units : what the
-    file calls each, and the unit it names, "" or missing for none. valid : (rows,) what the file's
-    own flag says; None without one. sigma : (rows,) below zero where correlation was lost; None
-    without one. camera_axes : whether y points down and z away from the camera, as in an image.
-    dropped : rows that are not in `values`, by why.
+    values : (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
+    valid, sigma : (rows,) flags of the file, and its measure of error, below zero where correlation
+    was lost. camera_axes : whether y points down and z away from the camera. dropped : counts of
+    rows that are not in `values`, by reason.
     """
 
     values: Mapping[str, Array]
@@ -294,11 +271,8 @@ class FrameRows:
 def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
     """Return the frame of the rows: reference places and displacements in mm.
 
-    Rows that the file's flag rejects, those with a sigma below zero and those that are zero
-    throughout are left out and counted. One row of zeros is a point in a frame in which nothing
-    moves.
-
-    Raises InputError: a quantity that is asked for is not there, or is in pixels.
+    Rows that a flag rejects, with a sigma below zero, or zero throughout are left out and counted.
+    One row of zeros is a point in a frame in which nothing moves.
     """
     notes = list(rows.notes)
     values = {name: _in_mm(rows, name, options, path) for name in rows.values}
@@ -385,12 +359,8 @@ def frame_files(
 ) -> tuple[list[Path], Note | None]:
     """Return the files, and a note where their order may be unintended.
 
-    given : names of files, taken in this order, and patterns, whose files are sorted by the
-        numbers in their names (frame 2 before frame 10).
-    field : what complaints call them.
-    folder : where they are; the working folder unless given.
-
-    Raises InputError: a pattern that nothing matches, no such file, a folder, a file given twice.
+    Files of patterns are sorted by the numbers in their names (frame 2 before frame 10). Raises
+    InputError: no match, no such file, a folder, a file given twice.
     """
     files: list[Path] = []
     for own in given:

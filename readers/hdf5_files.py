@@ -38,10 +38,7 @@ def check_readable(path: Path, read: Callable[[], object], seconds: float = SECO
 
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
-    """Open a file, as an `h5py.File`.
-
-    Raises InputError: h5py is missing, no such file, no HDF5 file, a damaged one.
-    """
+    """Open a file, as an `h5py.File`."""
     try:
         import h5py
     except ImportError:
@@ -79,11 +76,7 @@ def member(path: Path, group: Any, name: str) -> Any:
 
 
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
-    """Read a dataset's numbers.
-
-    Raises InputError: no dataset of numbers, one whose numbers lie in other files, or that is too
-    large.
-    """
+    """Read a dataset's numbers, which must lie in this file."""
     import h5py
 
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiub":

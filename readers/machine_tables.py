@@ -17,6 +17,7 @@ from .frames import FrameSource
 from .registry import format_of, read_file
 from .tables import TextTable
 
+Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
 
 
@@ -24,9 +25,8 @@ NEEDED = ("elongation", "load")
 class TableOptions:
     """Options of a reader of machine tables.
 
-    columns : quantities whose column is known by name. quantities : of elongation, load, deflection
-    and time, those that the table must hold. comment : lines that start so are skipped, where the
-    format has no comments of its own. decimal : the decimal mark, "." or ","; None finds it.
+    columns : the file's names of some quantities. quantities : those that the table must hold.
+    comment : of lines to skip. decimal : the mark; None finds it.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -39,9 +39,7 @@ class TableOptions:
 class MachineTable:
     """A table as the file has it.
 
-    table : the rows of numbers. units : for each column name the unit that the file names, "" for
-    none. header : line number of the row of names. notes : one sentence each: what was chosen where
-    the file leaves a choice.
+    units : by column, "" for none. header : line of the names. notes : choices that were made.
     """
 
     table: TextTable
@@ -69,8 +67,6 @@ def column_of(
 
     Times are looked for only where they are named or needed. Of several elongations, the one that
     was measured nearest to the strip (`choice_of`).
-
-    Raises InputError: several columns, or none of one that is needed or was named.
     """
     names = [str(name) for name in found.table.cells.columns]
     if quantity == "time" and quantity not in (*named, *needed):
@@ -112,8 +108,8 @@ def source_of(
 ) -> FrameSource:
     """Return the record of what was read from a table.
 
-    columns : the file's name of each quantity, "" for those that it lacks. asked : units that the
-    caller said, by quantity, for columns that name none. format : as it was asked for.
+    columns : by quantity, "" for absent ones. asked : units by quantity, for columns that name
+    none.
     """
     taken = {quantity: column for quantity, column in columns.items() if column}
     units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
@@ -123,13 +119,11 @@ def source_of(
 
 def measured(
     found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
-) -> NDArray[np.float64]:
+) -> Array:
     """Return one column (rows,) in mm or N.
 
-    kind : length or load, for complaints. units : mm or N in one of each unit. asked : the unit the
-    caller says, None to take the file's.
-    Raises InputError: no unit, an unknown one, or one that differs from `asked`; cells that are not
-    finite numbers.
+    kind : length or load. units : mm or N per unit. asked : the caller's unit, None to take the
+    file's. Raises InputError: no, an unknown or another unit; cells that are not finite numbers.
     """
     path, at = found.table.path, f"line {found.header}, column {column!r}"
     if asked is not None and asked not in units:
@@ -150,9 +144,6 @@ def measured(
     if not np.isfinite(value).all():
         raise InputError(path, at, f"numbers too large; is the unit {unit or asked!r} right?")
     return value
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,10 +167,8 @@ def read_machine_loads(
 ) -> MachineLoads:
     """Read the loads of an export, whatever else it holds; the table is found as for curves.
 
-    columns : the file's own names of `load` and `time`, where finding is ambiguous. timed : read
-    the times too. load_unit : needed where the file names none. format : name of the file's format;
-    found by its content unless given.
-    Raises InputError: as `curves.read_load_curves`; a unit of time that is not known.
+    columns : the file's own names of `load` and `time`. timed : read the times too. load_unit :
+    where the file names none.
     """
     path, named = Path(path), dict(columns or {})
     needed = ("load", "time") if timed else ("load",)
@@ -198,8 +187,6 @@ def read_times(
     """Read times (n,) in s, one a row, such as those of pictures in the camera's log.
 
     column : its name in the file, where finding is ambiguous.
-
-    Raises InputError: naming file and line: no or several columns of time, no numbers.
     """
     named = {} if column is None else {"time": column}
     found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
@@ -225,9 +212,8 @@ def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...
 class Channel:
     """A column of readings: the value is scale * reading + offset, in `unit`.
 
-    column : its name in the file; found by what names mean unless given. unit : such as mm, N or
-    kPa. The file's own unless given; needed with a scale. scale, offset : of a sensor, such as 200
-    mm per volt. None: the readings are no volts.
+    column : found by meaning unless given. unit : the file's own unless given; needed with a scale.
+    scale : of a sensor, such as 200 mm per volt; None: the readings are no volts.
     """
 
     column: str | None = None
@@ -243,10 +229,7 @@ AS_FOUND = Channel()
 def channel_values(
     found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
 ) -> Array:
-    """Return a column (rows,), converted by the table `units`.
-
-    Raises InputError: naming file and line: as `in_unit`; cells that are not finite numbers.
-    """
+    """Return a column (rows,), converted by the table `units`."""
     path, at = found.table.path, f"line {found.header}, column {column!r}"
     return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
 
@@ -256,8 +239,8 @@ def in_unit(
 ) -> Array:
     """Return readings (rows,), converted by the table `units`.
 
-    own : the unit that the file names, "" for none. path, at : where they stand, for complaints.
-    Raises InputError: no unit, one that is not known, a scale for what needs none, two units.
+    own : the unit that the file names, "" for none. Raises InputError: no or an unknown unit, two
+    units, a scale for what needs none.
     """
     known = dict(units)
     said = scale_of(own, known) if own else None

@@ -52,11 +52,7 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
 
 
 def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    """Read the variables of these names, those that there are.
-
-    Raises InputError: no such file, a damaged one, HDF5 without h5py, counts beyond what it can
-    hold.
-    """
+    """Read the variables of these names, those that there are."""
     try:
         with path.open("rb") as file:
             head = file.read(520)
@@ -71,10 +67,7 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
 
 
 def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return an array of numbers among variables or fields.
-
-    Raises InputError: it is missing or holds no numbers.
-    """
+    """Return an array of numbers among variables or fields."""
     value = where.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
         there = ", ".join(where)[:200]
@@ -127,10 +120,9 @@ def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tupl
 
 
 class MatrixParts:
-    """Read the parts of one matrix in turn.
+    """Read the parts of one matrix in turn; ValueError or struct.error where it is damaged.
 
-    content : from behind the matrix' own tag. order : of the bytes, "<" or ">". Every method takes
-    what comes next, and raises ValueError or struct.error where the content is damaged.
+    content : from behind the matrix' own tag. order : of the bytes, "<" or ">".
     """
 
     def __init__(self, content: bytes, order: str) -> None:

@@ -32,11 +32,9 @@ def number_in_name(
 ) -> float:
     """Return the number in a file's name, times what its unit is in `units`.
 
-    pattern : regular expression with one group, which holds the number; None looks for the one
-    number that is followed by a unit, as in `step_012_35.5kPa.csv`. unit : of the number that the
-    pattern finds; one in `units`, or a number without a unit (1). field : what complaints call the
-    pattern.
-    Raises InputError: no such number in the name, or several.
+    pattern : regular expression with one group; None looks for the one number that is followed by a
+    unit, as in `step_012_35.5kPa.csv`. unit : of the number of the pattern; none is 1. field : name
+    of the pattern in errors.
     """
     if pattern is not None:
         hard = len(_REPEATS.findall(pattern)) > 1
@@ -91,11 +89,8 @@ _NUMBER_FILE_VALUES = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
 def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> float:
     """Return the value that `channel.column` names, in the unit of `units`.
 
-    A column must hold the same value in each row. Else a line above the numbers says it, such as
-    `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
-
-    Raises InputError: naming file and line: no such column or line, several values, no or unknown
-    units.
+    A column must hold the same value in each row. Else a line above the numbers says it, such as `#
+    pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
     """
     name = channel.column or ""
     # Comments are kept: a value may stand in one.

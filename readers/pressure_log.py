@@ -1,4 +1,11 @@
-"""A log of pressures with its own clock, and what it says of the frames of a camera."""
+"""A log of pressures with its own clock, and the pressures of a camera's frames.
+
+At the right offset of the clocks, heights of the frames and pressures are rising functions of each
+other; at a wrong one they are not, wherever the pressure was held, released, or raised faster or
+slower. Both functions are found by isotonic regression, with the sheet at rest at the least
+pressure of the log: where the pressure was raised in equal steps, a step later would else do as
+well.
+"""
 
 from __future__ import annotations
 
@@ -41,9 +48,7 @@ class PressureLog:
 class LogOptions:
     """Options of a log; what is not given is found.
 
-    pressure : its column; volts become a pressure by its scale, offset and unit. time : its column;
-    seconds where neither file nor channel names a unit. format, comment, decimal : as for machine
-    tables.
+    pressure : volts become a pressure by its scale, offset and unit. time : seconds unless named.
     """
 
     pressure: Channel = AS_FOUND
@@ -54,11 +59,7 @@ class LogOptions:
 
 
 def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
-    """Read a log as a test machine's table.
-
-    Raises InputError: naming file and line: no or several columns, no or unknown units, cells that
-    are not numbers, times that go back.
-    """
+    """Read a log as a test machine's table."""
     channels: Mapping[str, Channel] = {"time": options.time, "pressure": options.pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
     needed = ("time", "pressure")
@@ -159,7 +160,6 @@ def offset_misfits(
     """Return offsets (s), rising, closer together about the best; and the misfit at each.
 
     times, heights : (frames,) s and mm, all known. log_times, pressures : (k,) s, rising, and MPa.
-    Raises InputError: a log that is shorter than the frames.
     """
     order = np.argsort(times, kind="stable")
     t, h = times[order], heights[order]
@@ -204,15 +204,6 @@ def _rest_height(h: Array) -> float:
     return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
 
 
-# How far two clocks are apart: the log's of the pressures, and the camera's of the frames.
-#
-# The sheet rises while the pressure does, by a law that is not known here. At the right offset the
-# heights of the frames are therefore some rising function of the pressures, and the pressures one
-# of the heights; at a wrong one they are not, wherever the pressure was held, released, or raised
-# faster or slower. Both functions are found by isotonic regression, which supposes nothing else of
-# them but that a sheet that has not risen is at the least pressure of the log: where the pressure
-# was raised in equal steps, a step later would else do as well.
-
 #: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
 FLOOR = 1e-6
 #: Offsets of a misfit up to so many times the smallest may be the right one.
@@ -226,12 +217,9 @@ WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
 class ClockOffset:
     """The log's clock less that of the frames.
 
-    offset : s. lower, upper : s, the least and the largest offset that may be right; the offset
-    itself where it was given. misfit : share of the variance of heights and pressures that no
-    rising function explains; None where the offset was given. pressure : (frames,) MPa, of each
-    frame; NaN beyond the log. doubt : (frames,) MPa, half of the range of each frame's pressure
-    over all offsets that may be right. times : (frames,) s, by the frames' own clock. heights :
-    (frames,) mm, NaN where none is known.
+    offset : s; lower, upper : of offsets that may be right. misfit : share of the variance that no
+    rising function explains; None where given. pressure, doubt : (frames,) MPa, NaN beyond the log;
+    half its range over all offsets that may be right. times, heights : (frames,) s and mm.
     """
 
     offset: float
@@ -266,10 +254,8 @@ def given_offset(
 def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
     """Return the offset at which heights rise with the pressures.
 
-    times : (frames,) s, by the frames' clock. heights : (frames,) mm; NaN where none is known.
-    log_times, pressures : (k,) s, rising, and MPa.
-    Raises InputError: too few frames, a log that is shorter than the frames; heights that follow
-    the pressures at no offset; offsets that do equally well and give other pressures.
+    Raises InputError: too few frames, a short log; heights that follow the pressures at no offset;
+    offsets that do equally well and give other pressures.
     """
     known = np.isfinite(heights)
     if known.sum() < LEAST_FRAMES:
@@ -295,7 +281,10 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     some = np.append(may_be[:: max(1, len(may_be) // 200)], may_be[-1])
     each = np.array([log_at(s, times, log_times, pressures) for s in some])
     there = log_at(offset, times, log_times, pressures)
-    doubt = _half_range(each)
+    inside = np.isfinite(each)
+    most, least = np.where(inside, each, -np.inf), np.where(inside, each, np.inf)
+    some, doubt = inside.any(axis=0), np.full(each.shape[1], np.nan)
+    doubt[some] = (most.max(axis=0) - least.min(axis=0))[some] / 2
     span = float(np.ptp(there[np.isfinite(there)]))
     if float(np.nanmean(doubt)) > MOST_DOUBT * span:
         problem = (
@@ -306,19 +295,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
         )
         raise InputError(None, "offset", problem)
     lower, upper = float(may_be[0]), float(may_be[-1])
-    least = float(misfits[best])
-    return ClockOffset(offset, lower, upper, least, there, doubt, times, heights)
-
-
-def _half_range(each: Array) -> Array:
-    """Return half ranges (frames,) of pressures (offsets, frames); NaN beyond the log."""
-    inside = np.isfinite(each)
-    most = np.where(inside, each, -np.inf).max(axis=0)
-    least = np.where(inside, each, np.inf).min(axis=0)
-    half = np.full(each.shape[1], np.nan)
-    some = inside.any(axis=0)
-    half[some] = (most - least)[some] / 2
-    return half
+    return ClockOffset(offset, lower, upper, float(misfits[best]), there, doubt, times, heights)
 
 
 #: Why frames are not looked at.
@@ -349,12 +326,9 @@ def choose_frames(
 ) -> FrameChoice:
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
-    pressures : (frames,) MPa, of every frame; NaN where it is not known. asked : MPa, rising.
-    tolerance : MPa, how far a frame may be from the asked pressure; 2 % of the largest asked one
-    unless given. in_time : whether the frames are in the order of time: those after the largest
-    pressure are then of the release, and not taken.
-    Raises InputError: no frame under pressure, none near an asked pressure, one that is nearest to
-    two; fewer frames than `count`.
+    pressures : (frames,) MPa, NaN where unknown. asked : MPa, rising. tolerance : MPa; 2 % of the
+    largest asked one unless given. in_time : leave out frames after the largest pressure, those of
+    the release.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)
@@ -372,12 +346,9 @@ def choose_frames(
     apart = np.diff(pressures[order], prepend=-np.inf) > SAME * pressures[top]
     if asked is not None:
         frames = _nearest(pressures, order, asked, tolerance)
-    elif count is not None:
-        left_out[REPEATED] = int((~apart).sum())
-        frames = _spread(pressures, order[apart], count)
     else:
-        left_out[REPEATED] = int((~apart).sum())
-        frames = order[apart].tolist()
+        left_out[REPEATED], order = int((~apart).sum()), order[apart]
+        frames = order.tolist() if count is None else _spread(pressures, order, count)
     return FrameChoice(tuple(frames), {why: n for why, n in left_out.items() if n})
 
 

@@ -7,7 +7,7 @@ that says how a file is recognised by its content and how it is read. Nothing el
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -37,10 +37,8 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of data files.
 
-    name : what `format =` in a project calls it. content : what such a file holds. title : what it
-    is, in a few words. read : reads a file; see `Content`. An `InputError` names what is wrong with
-    it. recognises : whether a file, by its path and its first `HEAD` bytes, is of this format. None
-    for the one of its content that takes what no other recognises.
+    name : of `format =` in a project. read : see `Content`. recognises : tests a file by its path
+    and first `HEAD` bytes; None for the format that takes what no other recognises.
     """
 
     name: str
@@ -93,14 +91,11 @@ def format_of(content: Content, path: Path | str) -> Format:
     """Return the format of a file by its content: ours first, then those of plug-ins.
 
     Plug-ins that do not work are logged and passed over.
-
-    Raises InputError: several formats recognise it.
     """
     path = Path(path)
     head = _head(path)
     ours = formats(content)
-    theirs = (one for one in _working() if one.content == content)
-    for group in (ours, tuple(theirs)):
+    for group in (ours, _working(content)):
         able = [one for one in group if one.recognises is not None and one.recognises(path, head)]
         if len(able) > 1:
             names = " or ".join(repr(one.name) for one in able)
@@ -111,11 +106,7 @@ def format_of(content: Content, path: Path | str) -> Format:
 
 
 def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
-    """Read a file by the format named, else by the one that its content shows; see `Content`.
-
-    Raises InputError: the format cannot be told, or something is wrong with the file.
-    PlugInFailure: the plug-in named does not work.
-    """
+    """Read a file by the format named, else by the one that its content shows; see `Content`."""
     with suppress(OSError):  # the reader says why
         check_regular(path)
     chosen = format_of(content, path) if name is None else format_named(content, name)
@@ -140,14 +131,15 @@ def _head(path: Path) -> bytes:
         return b""
 
 
-def _working() -> list[Format]:
-    able = []
+def _working(content: Content) -> Iterator[Format]:
     for plug_in in plug_ins("bubblefit.readers"):
         try:
-            able.append(_format_of(plug_in))
+            one = _format_of(plug_in)
         except PlugInFailure as error:
             log.warning("%s", error)
-    return able
+        else:
+            if one.content == content:
+                yield one
 
 
 def _format_of(plug_in: PlugIn) -> Format:

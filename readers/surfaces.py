@@ -14,8 +14,10 @@ from .fields import DisplacementField
 from .frames import Frame
 from .tables import TextTable, read_table, write_table
 
+Array = NDArray[np.float64]
 
-def powers(points: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+
+def powers(points: Array, degree: int) -> Array:
     """Return terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2), highest powers first."""
     x = np.vander(points[:, 0], degree + 1)
     y = np.vander(points[:, 1], degree + 1)
@@ -28,8 +30,6 @@ def total_power(degree: int) -> NDArray[np.intp]:
     return (falling[:, None] + falling).ravel()
 
 
-Array = NDArray[np.float64]
-
 AXES = ("x", "y", "z")
 MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
 LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfaces.csv
@@ -37,13 +37,11 @@ LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfac
 
 @dataclass(frozen=True, eq=False)
 class DisplacementSurface:
-    """Three polynomials F(x, y), one a direction of displacement, at one pressure.
+    """Three polynomials F(x, y), one a direction of displacement, at one pressure (MPa).
 
-    pressure : MPa. degree : highest power of x and of y; 4 in the thesis. coefficients : (3,
-    (degree + 1)^2) mm, C_0 ... in the order of Eq. 4.4: x^d y^d first, powers of x falling fastest,
-    the constant last. They belong to x / scale and y / scale. scale : mm, the largest coordinate
-    fitted: it keeps high powers near one. r_squared : (3,) coefficient of determination of each
-    direction (Table 4.1).
+    coefficients : (3, (degree + 1)^2) mm, of x / scale and y / scale in the order of Eq. 4.4: x^d
+    y^d first, powers of x falling fastest. scale : mm, the largest coordinate fitted. r_squared :
+    (3,) as in Table 4.1.
     """
 
     pressure: float
@@ -96,10 +94,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
 def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) -> None:
     """Write surfaces.csv, a row a pressure and direction: R^2, degree, scale, C0 ... of Eq. 4.4.
 
-    These coefficients take x and y in mm and give mm, so the file can be used as it stands. Beyond
-    `scale_mm`, the largest coordinate fitted, a polynomial means nothing.
-
-    Raises OSError: the file cannot be written; what was there may be lost.
+    The coefficients take x and y in mm and give mm. Beyond `scale_mm` a polynomial means nothing.
     """
     most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
     rows: list[list[object]] = []
@@ -111,11 +106,7 @@ def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) ->
 
 
 def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
-    """Read what `write_surfaces` wrote, equal to rounding.
-
-    Raises InputError: naming file, line and column: missing columns, cells that are not numbers,
-    directions that do not come as x, y, z, degrees without their coefficients.
-    """
+    """Read what `write_surfaces` wrote, equal to rounding."""
     table = read_table(path)
     direction = table.text("direction")
     if len(direction) % 3 or tuple(direction) != AXES * (len(direction) // 3):
@@ -154,8 +145,6 @@ def _r_squared(value: Array, left: Array) -> Array:
     return np.asarray(1.0 - share)
 
 
-Array = NDArray[np.float64]
-
 #: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.
 LEAST_POINTS = 10
 #: Points farther off than so many robust standard deviations are left out, at most so many times.
@@ -172,12 +161,10 @@ LARGEST = 100.0
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """The sphere through the points of one frame.
+    """The sphere through the points (n, 3) mm of one frame.
 
-    centre : (3,) mm. radius : mm. centre_error, radius_error : mm, standard errors, as if the
-    errors of the points were independent; those of neighbours in image correlation are not.
-    deviation : (n,) mm, distance of each point beyond the sphere. kept : (n,) whether it was used.
-    points : (n, 3) mm.
+    centre : (3,) mm. centre_error, radius_error : standard errors, as if the errors of the points
+    were independent. deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
     """
 
     centre: Array

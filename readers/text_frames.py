@@ -1,4 +1,9 @@
-"""The points of a frame from a table in a text file."""
+"""The points of a frame from a table in a text file.
+
+Header, row of units, separator and decimal mark are found by the meaning of the names. Whole
+columns are read by pandas; what does not fit it is read cell by cell, so that an error names its
+line.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +33,7 @@ from .frames import (
 )
 from .tables import HOLES, TextTable, check_width, decimal_mark, is_number, read_lines
 
-# Where the numbers of a table of points stand in a text file: header, units, separator, mark.
-#
-# Exports differ in what stands above the row of names, in whether a row of units follows it, and
-# in the separator. All of it is found by what the names mean (`frame_headings`).
-
+Array = NDArray[np.float64]
 #: Line number from 1 and text.
 Lines = list[tuple[int, str]]
 
@@ -48,9 +49,8 @@ SAMPLE = 500
 class TextLayout:
     """Layout of the numbers in a file.
 
-    separator : None for blanks. headings : of the columns. columns : those of each quantity, see
-    `frame_headings.columns_of`. header : line number of the names. body : the rows of numbers.
-    decimal : the mark.
+    separator : None for blanks. columns : by quantity. header : line of the names. decimal : the
+    mark.
     """
 
     separator: str | None
@@ -84,12 +84,9 @@ def find_layout(
     decimal: str | None = None,
     upper: bool = False,
 ) -> TextLayout:
-    """Return the layout of a file.
+    """Find the layout of a file; a row of names may be a comment.
 
-    quantities : what its rows must hold. named : the file's own names of some of them. comment :
-    lines that start so are passed over; a row of names may be one of them. decimal : the mark,
-    where it is known. upper : see `frame_headings.columns_of`.
-    Raises InputError: no such file, no text, no row of names, a mark that may be one of thousands.
+    named : the file's own names of some quantities. upper : see `frames.columns_of`.
     """
     lines = read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
@@ -188,18 +185,6 @@ def _nothing_found(lines: Lines) -> str:
 Flag = tuple[int, Sequence[int] | None]
 
 
-def quantity_columns(
-    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
-) -> dict[str, int]:
-    """Return the one column of each quantity and flag; `named` gives the file's own names.
-
-    Raises InputError: a quantity that was asked for is missing, or may be in several columns.
-    """
-    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
-    _check_there(path, layout, columns, options)
-    return columns
-
-
 def flag_columns(
     path: Path,
     layout: TextLayout,
@@ -210,8 +195,6 @@ def flag_columns(
     """Return the flags that are named, else those that the headings show.
 
     status : a column of states, and the values of good rows.
-
-    Raises InputError: a column that is named is missing, or there are two of the name.
     """
     names = [heading.name for heading in layout.headings]
     asked = [(options.flag_column, (0,)), (options.valid_column, None)]
@@ -252,10 +235,11 @@ def _named(path: Path, names: Sequence[str], name: str) -> int:
     raise InputError(path, f"column {name!r}", problem)
 
 
-def _check_there(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
-) -> None:
-    """Check that every quantity asked for is there, or follows from places before and after."""
+def quantity_columns(
+    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
+) -> dict[str, int]:
+    """Return the one column of each quantity and flag; `named` gives the file's own names."""
+    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
     spare = {"z", "dz"} if options.planar else set()
     for quantity in options.quantities:
         axis = quantity[-1]
@@ -267,15 +251,9 @@ def _check_there(
         there = ", ".join(heading.name for heading in layout.headings)[:300]
         problem = f"this column is missing; the file has: {there}"
         raise InputError(path, f"column {quantity!r}", problem)
+    return columns
 
 
-# The numbers of a table in a text file, at the speed of pandas' reader where it can.
-#
-# The quick way takes whole columns as numbers; whatever does not fit it (a comment amidst the
-# rows, a cell that is no number, a row with a cell too many) is read again cell by cell, so that a
-# complaint names its line.
-
-Array = NDArray[np.float64]
 #: Flags in words, in small letters.
 WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
 
@@ -283,10 +261,7 @@ WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invali
 def read_numbers(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Return the numbers (good rows,) of each quantity, and which rows (rows,) the flags call good.
-
-    Raises InputError: naming line and column.
-    """
+    """Return the numbers (good rows,) by quantity, and the mask (rows,) of rows that flags pass."""
     return _quick(layout, columns, flags) or _slow(path, layout, columns, flags)
 
 
@@ -397,11 +372,9 @@ def read_text_rows(
 ) -> FrameRows:
     """Read the rows of the one frame in a text file.
 
-    comment : that of the format, where it has one of its own. upper : of two names that differ only
-    in their letters' size, the large one is the length. names : what the format calls some
-    quantities; the user's own come first. status : a column of states, and the values of good rows.
-    Raises InputError: naming file, line and column: no such file, missing columns, cells that are
-    not numbers.
+    comment : that of the format. upper : see `frames.columns_of`. names : the format's names of
+    some quantities; the user's come first. status : a column of states, and the values of good
+    rows.
     """
     own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **own}

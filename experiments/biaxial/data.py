@@ -108,8 +108,6 @@ def read_biaxial_table(
     columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
     `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are). load_unit,
     strain_unit : needed where the file names none.
-    Raises InputError: naming file, line and the columns there are: nothing or several things found
-    for a quantity, no unit or a different one, cells that are not finite numbers, no such ratio.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]

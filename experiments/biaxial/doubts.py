@@ -1,4 +1,4 @@
-"""Traps that the data of a biaxial test can have fallen into."""
+"""Doubts about biaxial data: wrong units, wrong ratios, swapped yarns."""
 
 from __future__ import annotations
 

@@ -36,10 +36,7 @@ class BiaxialData:
 
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
-    """Read the data of a section; none where a file is missing and not needed.
-
-    Raises InputError: naming the project and the key, or the data file.
-    """
+    """Read the data of a section; none where a file is missing and not needed."""
     data = section.data
     folder = place.data_folder
     if folder is None:
@@ -149,10 +146,7 @@ def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
 
 
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-    """Read the section of a test, and its files.
-
-    Raises InputError: naming the file and the dotted key, or a data file.
-    """
+    """Read the section of a test, and its files."""
     noise = None if section.noise is None else 0.01 * section.noise
     return BiaxialTest(
         name=name,

@@ -174,10 +174,7 @@ class CylinderTest:
 
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
-    """Read the section of a test; refuse a cylinder that makes no model.
-
-    Raises InputError: naming the file and the dotted key, or a measured file and line.
-    """
+    """Read the section of a test; refuse a cylinder that makes no model."""
     scales = place.scales
 
     def length(value: float | None, default: float) -> float:

@@ -1,4 +1,4 @@
-"""From a section of strips and its files to the strips of a test."""
+"""Data of strip tests: files, load curves by direction, polynomials of them and their regions."""
 
 from __future__ import annotations
 
@@ -34,6 +34,8 @@ from ...reading import is_file
 from ..keys import named_format
 from ..kinds import DataFile, Place
 from .section import CurvesSection, GaugeSection, StripsSection
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,6 @@ def compare_orders(
 
     specimens : (n,) which specimen each point belongs to. With it a whole specimen is left out at a
     time: points of one specimen err together, so leaving out one of them flatters.
-    Raises InputError: as `fit_load_polynomial`; no orders; fewer points than coefficients and two.
     """
     u, f = checked_points(elongation, load)
     names = list(range(len(u))) if specimens is None else list(specimens)
@@ -99,19 +100,15 @@ def compare_orders(
     def best(values: list[float]) -> int:
         return scores[int(np.argmin(values))].order
 
-    return OrderComparison(
-        scores,
-        best([score.rmse for score in scores]),
-        best([-score.adjusted_r_squared for score in scores]),
-        best([score.aic for score in scores]),
-        best([score.bic for score in scores]),
-        best([score.left_out for score in scores]),
-    )
+    rules = ("rmse", "aic", "bic", "left_out")
+    fit, aic, bic, left_out = (best([getattr(s, rule) for s in scores]) for rule in rules)
+    adjusted = best([-score.adjusted_r_squared for score in scores])
+    return OrderComparison(scores, fit, adjusted, aic, bic, left_out)
 
 
 def _score(
-    u: NDArray[np.float64],
-    f: NDArray[np.float64],
+    u: Array,
+    f: Array,
     order: int,
     through_origin: bool,
     groups: list[NDArray[np.intp]],
@@ -139,7 +136,7 @@ def _score(
     )
 
 
-def _left_out_squares(rows: NDArray[np.float64], left: NDArray[np.float64]) -> float:
+def _left_out_squares(rows: Array, left: Array) -> float:
     """Return the squared error at points refitted without them, by (1 - H)^-1."""
     without = np.eye(len(rows)) - rows @ rows.T
     if np.linalg.cond(without) > 1e12:
@@ -222,9 +219,6 @@ def measured_curves(
 
     A file with one curve in a direction perhaps lists several specimens, one after the other and
     not named: it is split where the elongation starts again. width : of the strips, mm.
-
-    Raises InputError: naming the data file and line: see `read_load_curves`; naming the project and
-    key: one curve listed for two directions.
     """
     format = named_format(place, "data.format", "machine table", data.format)
     columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
@@ -243,7 +237,10 @@ def measured_curves(
             format=format,
         )
         before = first.setdefault(file.path, curves[0])
-        if before.direction != curves[0].direction and _same(before, curves[0]):
+        if before.direction != curves[0].direction and all(
+            np.array_equal(getattr(before, name), getattr(curves[0], name))
+            for name in ("elongation", "load")
+        ):
             problem = f"is listed for {before.direction} too, and does not tell the two apart"
             raise place.error(file.field, problem)
         for direction in DIRECTIONS:
@@ -254,12 +251,6 @@ def measured_curves(
             by_direction[direction] += own
     return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
 
-
-def _same(one: LoadCurve, other: LoadCurve) -> bool:
-    return np.array_equal(one.elongation, other.elongation) and np.array_equal(one.load, other.load)
-
-
-Array = NDArray[np.float64]
 
 #: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
 #: load cell is of accuracy class 0.5 %.
@@ -399,9 +390,6 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     """Return the strips of a section, by direction: those whose table or whose data are there.
 
     Files that are not there are done without where the place needs none and all lengths are given.
-
-    Raises InputError: naming the project and the key, or the data file: no data, no gauge length, a
-    final length that is not longer or beyond the data, points that settle no polynomial.
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):
@@ -453,15 +441,8 @@ def _published(
         start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
         end = curve.final_length if own.final_length is None else own.final_length * length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
-        strips[direction] = _strip(
-            place,
-            direction,
-            start,
-            end,
-            polynomial=curve.polynomial,
-            scatter=scatter,
-            published=file.path,
-        )
+        data_of = {"polynomial": curve.polynomial, "scatter": scatter, "published": file.path}
+        strips[direction] = _strip(place, direction, start, end, **data_of)
     return strips
 
 

@@ -1,7 +1,4 @@
-"""Traps that the load curves of strips can have fallen into.
-
-Each check is told of one specimen's curve and gives doubts, none where all is well.
-"""
+"""Doubts about load curves of strips: wrong units, preload, failure, swapped directions."""
 
 from __future__ import annotations
 

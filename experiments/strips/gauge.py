@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from scipy.spatial import Delaunay
 
 Array = NDArray[np.float64]
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +65,6 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
         return None
 
 
-def usual_edge(surface: Surface) -> float:
-    """Return median over the triangles of their longest edge, mm."""
-    return float(np.median(surface.longest_edge()))
-
-
 def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
     """Return place (2, 3) mm before and after of the point (2,), or why there is none.
 
@@ -99,9 +95,6 @@ def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
     weights = np.divide(areas, whole, out=np.full_like(areas, -1.0), where=whole != 0)
     best = int(np.argmax(weights.min(axis=1)))
     return (best if weights[best].min() >= -1e-9 else -1), weights[best]
-
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +144,7 @@ def virtual_strain_gauge(
     for frame in frames:
         seen.append(triangulated(frame, whole))
         whole = seen[-1] or whole
-    spacing = [usual_edge(surface) for surface in seen if surface is not None]
+    spacing = [float(np.median(s.longest_edge())) for s in seen if s is not None]
     usual = float(np.median(spacing)) if spacing else 0.0
     apart = float(np.linalg.norm(ends[1] - ends[0]))
     if apart < usual:
@@ -287,7 +280,6 @@ class PairedLoads:
     given. frame_times : a table of the frames' times: pairs the loads by time. frame_time_column :
     name of its column. frame_interval : s between frames, the first at 0: pairs the loads by time
     too. time_offset : s, the machine's clock less the frames'.
-    Raises InputError: naming what is out of range, contradicts another, or would have no effect.
     """
 
     path: Path
@@ -331,10 +323,7 @@ class PairedLoads:
 
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
-    """Return the load curve of a gauge.
-
-    Raises InputError: naming the file of loads or of times; counts that do not agree.
-    """
+    """Return the load curve of a gauge."""
     count, times = len(record.length), None
     if loads.frame_interval is not None:
         times = loads.frame_interval * np.arange(count)
@@ -381,6 +370,13 @@ def _naming(fields: str) -> Iterator[None]:
         raise InputError(error.path, error.field, problem) from None
 
 
+#: Columns of a table by the attributes of a record.
+COLUMNS = {
+    "length": "length_mm", "elongation": "elongation_mm", "strain": "strain",
+    "log_strain": "log_strain",
+}  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class GaugeTable:
     """A gauge through the frames of a test, with the machine's loads where there are any.
@@ -421,16 +417,9 @@ class GaugeTable:
 
         record, curve = self.record, self.curve
         rows = np.arange(len(self.files)) if curve is None else self._used()
-        table = pd.DataFrame(
-            {
-                "frame": rows,
-                "file": [self.files[i] for i in rows],
-                "length_mm": record.length[rows],
-                "elongation_mm": record.elongation[rows],
-                "strain": record.strain[rows],
-                "log_strain": record.log_strain[rows],
-            }
-        )
+        table = pd.DataFrame({"frame": rows, "file": [self.files[i] for i in rows]})
+        for name, column in COLUMNS.items():
+            table[column] = getattr(record, name)[rows]
         if curve is not None:
             table["load_N"] = curve.load
             table["specimen"], table["direction"] = curve.specimen, curve.direction
@@ -459,13 +448,8 @@ class GaugeTable:
         last = seen[np.argmax(record.length[seen])]
         numbers: dict[str, Any] = {
             "gauge_length_mm": record.reference_length,
-            "longest": {
-                "file": self.files[last],
-                "length_mm": float(record.length[last]),
-                "elongation_mm": float(record.elongation[last]),
-                "strain": float(record.strain[last]),
-                "log_strain": float(record.log_strain[last]),
-            },
+            "longest": {"file": self.files[last]}
+            | {column: float(getattr(record, name)[last]) for name, column in COLUMNS.items()},
             "frames": len(self.files),
             "lost": [self.files[i] for i in record.lost],
             "warnings": [note.line for note in self.notes],

@@ -1,4 +1,9 @@
-"""A test of strips in a fit: what is compared, and what a finished fit shows of it."""
+"""Strip tests in a fit: residuals (Eqs 3.4-3.6), comparisons, and the number of independent loads.
+
+Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not a
+hundred measurements: five specimens reduce an uncertainty by the root of five, whatever the number
+of readings.
+"""
 
 from __future__ import annotations
 
@@ -128,12 +133,6 @@ class LoadObjective:
         return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))
 
 
-# How many independent loads the curves of a direction hold.
-#
-# Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not
-# a hundred measurements, and what a fit knows better for five specimens is by a factor of the root
-# of five, whatever the number of readings.
-
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
 #: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_certainty.py strips).
 PLACES = 1.25
@@ -247,9 +246,23 @@ class PreparedStrips:
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return directions, and specimens of a direction that has several."""
-
-        return parts_of(self)
+        """Return masks without each part, by sort and name; sorts of one part are left out."""
+        test = self.test
+        points = test.match_by == "points"
+        counts = {
+            d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched
+        }
+        whole = {self.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
+        directions: dict[str, Masks] = {}
+        specimens: dict[str, Masks] = {}
+        for direction, count in counts.items():
+            name = self.part(direction)
+            directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
+            others = _without(test.strips[direction]) if points else {}
+            for which, mask in others.items():
+                specimens[f"{direction}, {which}"] = {**whole, name: mask}
+        sorts = {"directions": directions, "specimens": specimens}
+        return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the law in the points matched."""
@@ -359,32 +372,13 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
     return elongation, strip.polynomial(elongation)
 
 
-def parts_of(prepared: PreparedStrips) -> Mapping[str, Mapping[str, Masks]]:
-    """Return masks without each part, by sort and name; sorts of one part are left out."""
-    test = prepared.test
-    points = test.match_by == "points"
-    counts = {d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched}
-    whole = {prepared.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
-    directions: dict[str, Masks] = {}
-    specimens: dict[str, Masks] = {}
-    for direction, count in counts.items():
-        name = prepared.part(direction)
-        directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
-        others = _without(test.strips[direction]) if points else {}
-        for which, mask in others.items():
-            specimens[f"{direction}, {which}"] = {**whole, name: mask}
-    sorts = {"directions": directions, "specimens": specimens}
-    return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
-
-
 def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
     """Return masks without each specimen, by its name; none of a strip of one specimen."""
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2:
         return {}
     names = [strip.curves[number].specimen for number in numbers]
-    told = {n: f"specimen {n}" for n in names}
+    if len(set(names)) < len(names):  # files may name theirs alike
+        names = [str(number + 1) for number in numbers]
     whose = strip.specimen_of
-    if len(told) < len(names):  # files may name theirs alike
-        return {f"specimen {n + 1}": whose != n for n in numbers}
-    return {told[name]: whose != n for name, n in zip(names, numbers, strict=True)}
+    return {f"specimen {name}": whose != n for name, n in zip(names, numbers, strict=True)}

@@ -1,8 +1,8 @@
-"""What a finished fit means for a test of strips: RMS errors beside the specimens' scatter."""
+"""Results of strip tests as numbers, tables, figures and files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,88 +37,30 @@ from .test import StripsTest
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
-def findings_of(test: StripsTest, strips: Sequence[FittedStrip]) -> Findings:
-    """Return numbers and words of the best fit."""
-    total = sum(s.rms for s in strips)
-    errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
-    return Findings(
-        numbers={
-            "directions": {s.direction: _numbers(test, s) for s in strips},
-            "e_uniaxial_N": total,
-            "matched_by": test.match_by,
-        },
-        warnings=tuple(_warnings(test, strips)),
-        lines=(_line(strips, total),),
-        quality="RMS errors in N: " + ", ".join(f"{s.direction} {s.rms:.4g}" for s in strips),
-        summary=f"RMS errors in N: {errors}, together {total:.4g}",
-    )
-
-
-def _numbers(test: StripsTest, fitted: FittedStrip) -> dict[str, Any]:
-    strip = fitted.strip
-    return {
-        "rms_N": fitted.rms,
-        "scatter_N": strip.scatter,
-        "weight": test.weights[strip.direction],
-        "matched": len(fitted.objective.load),
-        "gauge_length_mm": strip.gauge_length,
-        "final_length_mm": strip.final_length,
-        "end_load_N": float(fitted.history.load[-1]),
-    }
-
-
-def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[Note]:
-    """Return warnings of what the data leave open before any fit."""
+def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> Iterator[Note]:
+    """Yield warnings of what the data leave open before any fit."""
     directions = {s.direction for s in strips}
-    notes = [
-        Note(
-            NoteKind.UNMATCHED,
-            f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            "directions",
-        )
-        for direction, modulus in PINS.items()
-        if direction not in directions
-    ]
-    said = dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
-    notes += [Note(NoteKind.READING, words) for words in said]
-    if test.match_by == "points":
-        notes += [
-            Note(
-                NoteKind.LEFT_OUT,
-                f"{s.strip.beyond} points beyond the final length (or before zero) were left out",
-                s.direction,
+    for direction, modulus in PINS.items():
+        if direction not in directions:
+            words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
+            yield Note(NoteKind.UNMATCHED, words + "directions")
+    for words in dict.fromkeys(n for s in strips for curve in s.strip.curves for n in curve.notes):
+        yield Note(NoteKind.READING, words)
+    for s in strips:
+        if test.match_by == "points" and s.strip.beyond:
+            words = (
+                f"{s.strip.beyond} points beyond the final length (or before zero) were left out"
             )
-            for s in strips
-            if s.strip.beyond
-        ]
-    return notes
-
-
-def _line(strips: Sequence[FittedStrip], total: float) -> str:
-    parts = []
-    for fitted in strips:
-        scatter = fitted.strip.scatter
-        beside = "" if scatter is None else f" (specimens scatter by {scatter:.3g})"
-        parts.append(f"{fitted.direction} {fitted.rms:.3g}{beside}")
-    return "RMS error, N: " + ", ".join(parts) + f"; sum {total:.4g}"
+            yield Note(NoteKind.LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
 
 
 def misfit_table(strips: Sequence[FittedStrip]) -> Table:
     """Return the misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
     rows: list[list[object]] = []
-    for fitted in strips:
-        strip, polynomial = fitted.strip, fitted.strip.polynomial
-        rows.append(
-            [
-                strip.direction,
-                fitted.rms,
-                strip.scatter,
-                polynomial.r_squared if polynomial is not None else None,
-                polynomial.rmse if polynomial is not None else None,
-                len(fitted.objective.load),
-                float(fitted.history.load[-1]),
-            ]
-        )
+    for s in strips:
+        p = s.strip.polynomial
+        rows.append([s.direction, s.rms, s.strip.scatter, p and p.r_squared, p and p.rmse,
+                     len(s.objective.load), float(s.history.load[-1])])  # fmt: skip
     header = ["strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial",
               "its RMSE, N", "points matched", "load at the end, N"]  # fmt: skip
     note = (
@@ -131,40 +73,16 @@ def misfit_table(strips: Sequence[FittedStrip]) -> Table:
 def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
     """Return load curves of the model, and the polynomials (NaN where there are none)."""
     parts = []
-    for fitted in strips:
-        u, polynomial = np.array(fitted.model.elongations), fitted.strip.polynomial
-        parts.append(
-            pd.DataFrame(
-                {
-                    "direction": fitted.direction,
-                    "elongation_mm": u,
-                    "engineering_strain": u / fitted.strip.gauge_length,
-                    "model_N": fitted.history.load,
-                    "polynomial_N": np.nan if polynomial is None else polynomial(u),
-                }
-            )
-        )
-    return pd.concat(parts, ignore_index=True)
-
-
-def residual_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Return a table of every matched load."""
-    parts = []
-    for fitted in strips:
-        modelled, measured = fitted.objective.modelled(fitted.history), fitted.objective.load
-        parts.append(
-            pd.DataFrame(
-                {
-                    "part": fitted.direction,
-                    "elongation_mm": fitted.objective.elongation,
-                    "quantity": "load",
-                    "measured": measured,
-                    "modelled": modelled,
-                    "difference": modelled - measured,
-                    "unit": fitted.objective.unit,
-                }
-            )
-        )
+    for s in strips:
+        u, polynomial = np.array(s.model.elongations), s.strip.polynomial
+        columns = {
+            "direction": s.direction,
+            "elongation_mm": u,
+            "engineering_strain": u / s.strip.gauge_length,
+            "model_N": s.history.load,
+            "polynomial_N": np.nan if polynomial is None else polynomial(u),
+        }
+        parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -189,16 +107,9 @@ def load_panels(
         if strip.polynomial is not None:
             u = np.linspace(0.0, strip.elongation, SMOOTH)
             curve = u, strip.polynomial(u)
-        panels.append(
-            StripCurves(
-                strip.direction,
-                models.get(strip.direction, ()),
-                strip.points if strip.curves else None,
-                curve,
-                strip.scatter,
-                rms.get(strip.direction, ()),
-            )
-        )
+        d, points = strip.direction, strip.points if strip.curves else None
+        errors = rms.get(d, ())
+        panels.append(StripCurves(d, models.get(d, ()), points, curve, strip.scatter, errors))
     return panels
 
 
@@ -211,14 +122,6 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
 
 
-def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path) -> None:
-    """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
-    ends = failure_strains(strips, fitted.valid)
-    strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
-    curves = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
-    plot_moduli_together(picture, strains, np.array(curves))
-
-
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
     """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
 
@@ -226,22 +129,18 @@ def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
     take the place of a strip that is not there.
     """
     ends = np.array(valid, dtype=float)
-    for fitted in strips:
-        if fitted.direction == "bias":
-            ends[2] = min(ends[2], _gauge_shear(fitted.model, fitted.history))
+    for s in strips:
+        if s.direction == "bias":  # the largest shear of the quads between the gauge's ends
+            mesh = s.model.mesh
+            strain = middle_strain(mesh, s.history.displacement[-1], s.model.warp)
+            corners = mesh.points[mesh.quads][:, :, 1]
+            low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
+            inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
+            ends[2] = min(ends[2], float(np.abs(strain[inside, 2]).max()))
         else:
-            component = 0 if fitted.direction == "warp" else 1
-            ends[component] = min(ends[component], fitted.strip.strain)
+            component = 0 if s.direction == "warp" else 1
+            ends[component] = min(ends[component], s.strip.strain)
     return ends
-
-
-def _gauge_shear(model: UniaxialModel, history: History) -> float:
-    """Return largest shear strain of the quads between the gauge's ends."""
-    strain = middle_strain(model.mesh, history.displacement[-1], model.warp)
-    corners = model.mesh.points[model.mesh.quads][:, :, 1]
-    low, high = model.mesh.points[model.mesh.node_sets["gauge"]][:, 1]
-    inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
-    return float(np.abs(strain[inside, 2]).max())
 
 
 def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
@@ -258,92 +157,14 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
             ).scores
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
-        panels.append(
-            OrderErrors(
-                strip.direction,
-                [s.order for s in scores],
-                [s.rmse for s in scores],
-                [s.left_out for s in scores],
-                strip.polynomial.order,
-            )
-        )
+        columns = zip(*((s.order, s.rmse, s.left_out) for s in scores), strict=True)
+        panels.append(OrderErrors(strip.direction, *map(list, columns), strip.polynomial.order))
     if panels:
         plot_orders(picture, panels)
     return bool(panels)
 
 
-LOADS = "Load over gauge elongation: measured and modelled"
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
-
-
-def exhibit(
-    test: StripsTest, strips: Sequence[FittedStrip], fitted: FittedTest, out: Output
-) -> Exhibit:
-    """Write loads.csv, bias.vtu and the pictures."""
-    with replacing(out.path("loads.csv")) as path:
-        load_table(strips).to_csv(path, index=False)
-    panels = _panels(strips)
-    plot_loads(out.path("loads.png"), panels)
-    figures: list[Shown] = []
-    files = [
-        (out.name("loads.csv"), "load curves of the best fit"),
-        (out.name("loads.png"), "picture of the load curves"),
-    ]
-    for strip in strips:
-        if strip.direction == "bias":
-            picture, vtu = out.path("bias.png"), out.path("bias.vtu")
-            draw_bias(strip.model, strip.history, picture, vtu)
-            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
-            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
-    draw_moduli(strips, fitted, out.path("failure.png"))
-    caption = "Tangent moduli up to the strains at the end of each strip"
-    figures.append((out.name("failure.png"), caption))
-    if draw_orders([s.strip for s in strips], out.path("orders.png")):
-        caption = "Error of load polynomials by order, and with a specimen left out"
-        figures.append((out.name("orders.png"), caption))
-    return Exhibit(
-        facts=[("matched", MATCHED[test.match_by])],
-        figures=figures,
-        tables=[misfit_table(strips)],
-        files=files,
-        parts=[load_charts(f"{test.name} loads", panels, LOADS)],
-    )
-
-
-def _panels(strips: Sequence[FittedStrip]) -> list[StripCurves]:
-    models = {
-        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
-    }
-    return load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
-
-
-CURVES = "curves.png"
-
-
-def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
-    """Draw the curves; return a table of the specimens."""
-    curves = {direction: curves_of(strip) for direction, strip in test.strips.items()}
-    plot_curves(out.path(CURVES), curves)
-    rows: list[list[object]] = [
-        [
-            direction,
-            name or "polynomial",
-            len(load),
-            float(elongation[0]),
-            float(elongation[-1]),
-            float(np.log1p(elongation[-1] / test.strips[direction].gauge_length)),
-            float(load[0]),
-            float(load.max()),
-        ]
-        for direction, specimens in curves.items()
-        for name, elongation, load in specimens
-    ]
-    header = [
-        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
-        "first load, N", "largest load, N",
-    ]  # fmt: skip
-    table = Table("Load curves as read", header, rows, text=(1,))
-    return Exhibit(figures=[(out.name(CURVES), "load curves as they were read")], tables=[table])
 
 
 @dataclass(frozen=True, eq=False)
@@ -439,16 +260,10 @@ def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls)
 
 def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> None:
     ended = {key: pull for key, pull in pulls.items() if isinstance(pull, Pull)}
+    header = ("card", "direction", "elongation_mm", "load_N")
     tables = [
-        pd.DataFrame(
-            {
-                "card": name,
-                "direction": direction,
-                "elongation_mm": pull.elongation,
-                "load_N": pull.history.load,
-            }
-        )
-        for (name, direction), pull in ended.items()
+        pd.DataFrame(dict(zip(header, (*key, pull.elongation, pull.history.load), strict=True)))
+        for key, pull in ended.items()
     ]
     with replacing(out.path("loads.csv")) as path:
         pd.concat(tables).to_csv(path, index=False)
@@ -487,19 +302,106 @@ def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    return findings_of(prepared.test, prepared.fitted_strips(fitted))
+    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    total = sum(s.rms for s in strips)
+    errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
+    beside = [
+        "" if s.strip.scatter is None else f" (specimens scatter by {s.strip.scatter:.3g})"
+        for s in strips
+    ]
+    line = ", ".join(f"{s.direction} {s.rms:.3g}{b}" for s, b in zip(strips, beside, strict=True))
+    numbers = {
+        s.direction: {
+            "rms_N": s.rms,
+            "scatter_N": s.strip.scatter,
+            "weight": test.weights[s.direction],
+            "matched": len(s.objective.load),
+            "gauge_length_mm": s.strip.gauge_length,
+            "final_length_mm": s.strip.final_length,
+            "end_load_N": float(s.history.load[-1]),
+        }
+        for s in strips
+    }
+    return Findings(
+        {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
+        tuple(_warnings(test, strips)),
+        (f"RMS error, N: {line}; sum {total:.4g}",),
+        "RMS errors in N: " + ", ".join(f"{s.direction} {s.rms:.4g}" for s in strips),
+        f"RMS errors in N: {errors}, together {total:.4g}",
+    )
 
 
 def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-    return exhibit(prepared.test, prepared.fitted_strips(fitted), fitted, out)
+    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    with replacing(out.path("loads.csv")) as path:
+        load_table(strips).to_csv(path, index=False)
+    models = {
+        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
+    }
+    panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
+    plot_loads(out.path("loads.png"), panels)
+    figures: list[Shown] = []
+    files = [
+        (out.name("loads.csv"), "load curves of the best fit"),
+        (out.name("loads.png"), "picture of the load curves"),
+    ]
+    for s in strips:
+        if s.direction == "bias":
+            draw_bias(s.model, s.history, out.path("bias.png"), out.path("bias.vtu"))
+            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
+            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
+    ends = failure_strains(strips, fitted.valid)
+    strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
+    moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
+    plot_moduli_together(out.path("failure.png"), strains, np.array(moduli))
+    caption = "Tangent moduli up to the strains at the end of each strip"
+    figures.append((out.name("failure.png"), caption))
+    if draw_orders([s.strip for s in strips], out.path("orders.png")):
+        caption = "Error of load polynomials by order, and with a specimen left out"
+        figures.append((out.name("orders.png"), caption))
+    caption = "Load over gauge elongation: measured and modelled"
+    return Exhibit(
+        facts=[("matched", MATCHED[test.match_by])],
+        figures=figures,
+        tables=[misfit_table(strips)],
+        files=files,
+        parts=[load_charts(f"{test.name} loads", panels, caption)],
+    )
 
 
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
-    """Write the load curves as they were read."""
-    return exhibit_examined(prepared.test, out)
+    """Draw the load curves as read; return a table of the specimens."""
+    strips = prepared.test.strips
+    curves = {direction: curves_of(strip) for direction, strip in strips.items()}
+    plot_curves(out.path("curves.png"), curves)
+    rows: list[list[object]] = []
+    for direction, specimens in curves.items():
+        for name, u, load in specimens:
+            strain = float(np.log1p(u[-1] / strips[direction].gauge_length))
+            rows.append([direction, name or "polynomial", len(load), float(u[0]), float(u[-1]),
+                         strain, float(load[0]), float(load.max())])  # fmt: skip
+    header = [
+        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
+        "first load, N", "largest load, N",
+    ]  # fmt: skip
+    figures = [(out.name("curves.png"), "load curves as they were read")]
+    return Exhibit(figures=figures, tables=[Table("Load curves as read", header, rows, text=(1,))])
 
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load."""
-    return residual_table(prepared.fitted_strips(fitted))
+    parts = []
+    for s in prepared.fitted_strips(fitted):
+        modelled, measured = s.objective.modelled(s.history), s.objective.load
+        columns = {
+            "part": s.direction,
+            "elongation_mm": s.objective.elongation,
+            "quantity": "load",
+            "measured": measured,
+            "modelled": modelled,
+            "difference": modelled - measured,
+            "unit": s.objective.unit,
+        }
+        parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True)

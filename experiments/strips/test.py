@@ -1,4 +1,4 @@
-"""A test of strips as its section says, and the models of it."""
+"""A test of strips, as its section describes it, and its models."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,6 @@ from ...meshes.strip_models import (
 from ..kinds import Place, Reach, Refined
 from .data import Strip, read_strips
 from .section import Match, StripsSection, Unit
-
-if TYPE_CHECKING:
-    pass
 
 Mask = NDArray[np.bool_]
 
@@ -106,10 +103,7 @@ class StripsTest:
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
-    """Read the section of a test, and its load curves.
-
-    Raises InputError: naming the file and the dotted key, or a data file.
-    """
+    """Read the section of a test, and its load curves."""
     length = place.scales.length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
     strips = read_strips(place, section)
@@ -120,7 +114,13 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         problem = f"expected less than the distance of the grips, {grips:g} mm"
         raise place.error("bias.gauge_length", problem)
     if section.match == "points":
-        _check_points(strips, place)
+        if place.need_data and not all(s.curves for s in strips.values()):
+            problem = "'points' needs measured points (data.files), not polynomials"
+            raise place.error("match", problem)
+        for direction, strip in strips.items():
+            if strip.curves and not len(strip.points[0]):
+                problem = "no measured point lies between the gauge length and this one"
+                raise place.error(f"{direction}.final_length", problem)
     return StripsTest(
         name=name,
         place=place,
@@ -136,15 +136,6 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         noise=section.noise,
         specimens=section.data.specimens,
     )
-
-
-def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
-    if place.need_data and not all(s.curves for s in strips.values()):
-        raise place.error("match", "'points' needs measured points (data.files), not polynomials")
-    for direction, strip in strips.items():
-        if strip.curves and not len(strip.points[0]):
-            problem = "no measured point lies between the gauge length and this one"
-            raise place.error(f"{direction}.final_length", problem)
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:

@@ -22,11 +22,7 @@ register_format(Format("csv", "frame", "columns of text in any dialect", text_re
 
 
 def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
-    """Read a polynomial a direction; load in N, elongation in mm, of the full strip.
-
-    Raises InputError: naming file, line and column: missing columns, powers left out, cells that
-    are not finite numbers, an unknown direction or one given twice, lengths that do not grow.
-    """
+    """Read a polynomial a direction; load in N, elongation in mm, of the full strip."""
     table = read_table(path)
     names = [str(name) for name in table.cells.columns]
     found = {int(name[1:]) for name in names if re.fullmatch(r"c\d{1,2}", name)}

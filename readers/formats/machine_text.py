@@ -108,14 +108,14 @@ def find_blocks(
             body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
         # What stands between two tables begins with a word: the title of the second.
-        while end < len(rows) and inside and not _begins_with_a_number(inside[-1][1]):
+        while (
+            end < len(rows)
+            and inside
+            and not is_number(next((cell for cell in inside[-1][1] if cell), ""))
+        ):
             inside.pop()
         blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
     return blocks
-
-
-def _begins_with_a_number(row: list[str]) -> bool:
-    return is_number(next((cell for cell in row if cell), ""))
 
 
 def _is_number(row: list[str], column: int) -> bool:

@@ -152,11 +152,8 @@ def _rows(
 ) -> FrameRows:
     values = {key: table[:, i] for key, i in columns.items()}
     valid, invalid, sigma = (values.pop(key, None) for key in ("valid", "invalid", "sigma"))
-    good = np.ones(len(table), dtype=bool)
-    if valid is not None:
-        good &= valid != 0
-    if invalid is not None:
-        good &= invalid == 0
+    good = np.ones(len(table), dtype=bool) if valid is None else valid != 0
+    good &= True if invalid is None else invalid == 0
     names = {key: headings[columns[key]].name for key in values}
     units = {key: headings[columns[key]].unit for key in values}
     return FrameRows(values, names, units, valid=good, sigma=sigma)

@@ -7,6 +7,10 @@ decimal commas and a line above the names), in which sigma is below zero where c
 X, Y, Z are added to U, V, W for the deformed state, and rejected points have empty cells. Files
 without units are older ones; there "x" in small letters is a place in the picture and "X" one in
 space.
+
+MAT-files hold a grid of X, Y, Z, U, V, W and sigma. Source: public scripts that load such files: X,
+Y, Z, U, V, W are lengths, x, y, u, v in small letters pixels, and points with a sigma of -1 are
+bad. The unit is not in the file: mm unless `length_unit` says otherwise (could not be confirmed).
 """
 
 from __future__ import annotations
@@ -35,12 +39,6 @@ register_format(
     Format("vic3d", "frame", "CSV of VIC-3D", text_reader("vic3d", upper=True), recognises)
 )
 
-
-# MAT-files of Correlated Solutions VIC-3D: a grid of X, Y, Z, U, V, W and sigma.
-#
-# Source: public scripts that load such files: X, Y, Z, U, V, W are lengths, x, y, u, v in small
-# letters pixels, and points with a sigma of -1 are bad. The unit is not in the file: mm unless
-# `length_unit` says otherwise (could not be confirmed).
 
 NAMES = {"x": "X", "y": "Y", "z": "Z", "dx": "U", "dy": "V", "dz": "W", "sigma": "sigma"}
 
