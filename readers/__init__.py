@@ -20,6 +20,7 @@ _PLACES = {
     "read_published_polynomials": "curves",
     "read_surfaces": "surfaces",
 }
+__all__ = [*_PLACES]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Cylinders with cards: what is kept of a run, and what runs say."""
+"""Runs of cylinders with cards: the arrays that are stored, and the numbers of a run."""
 
 from __future__ import annotations
 
@@ -58,16 +58,12 @@ def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
         raise SolverFailure(f"the results end {where}, and do not say why", "")
     if history.cavity_pressure is None or history.cavity_volume is None:
         raise SolverFailure("the results have no gas pressure or no volume", "")
-    run = BendingRun(
-        deflection[:reached],
-        np.asarray(history.load, dtype=float),
-        np.asarray(history.cavity_pressure, dtype=float),
-        np.asarray(history.cavity_volume, dtype=float),
-        history.displacement[0],
-        history.displacement[-1],
-        np.empty(0) if history.wrinkled is None else np.asarray(history.wrinkled, dtype=float),
-    )
-    return {field.name: getattr(run, field.name) for field in fields(run)}
+    wrinkled = np.empty(0) if history.wrinkled is None else history.wrinkled
+    curves = (history.load, history.cavity_pressure, history.cavity_volume)
+    load, pressure, volume, share = (np.asarray(c, dtype=float) for c in (*curves, wrinkled))
+    ends = history.displacement[0], history.displacement[-1]
+    values = (deflection[:reached], load, pressure, volume, *ends, share)
+    return dict(zip((field.name for field in fields(BendingRun)), values, strict=True))
 
 
 def early_end(model: CylinderModel, history: History) -> str:
@@ -75,15 +71,6 @@ def early_end(model: CylinderModel, history: History) -> str:
     if len(history.load) > len(model.deflections):
         return ""
     return history.early
-
-
-def depends_on(model: CylinderModel) -> tuple[object, ...]:
-    """Return all of a model that its result depends on."""
-    mesh = model.mesh
-    return (
-        model.thickness, model.inflation, model.deflections, model.increments, model.collar,
-        model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
-    )  # fmt: skip
 
 
 #: The initial stiffness is that of a straight line through at least so many frames.
@@ -148,17 +135,17 @@ def bending_measures(
     knee = knee_point(d, load, stiffness, over)
     body, anywhere = inflation_strain(model.mesh, run.inflated)
     return BendingMeasures(
-        stiffness,
-        loads_at(d, load, model.reading.places),
-        knee,
-        limit_point(d, load),
-        wrinkle_onset(run),
-        straightness(d, load, knee[1] if knee else float(load.max())),
-        body,
-        anywhere,
-        1e3 * float(run.pressure[-1] - run.pressure[0]),
-        float(d[-1]),
-        model_error(measured, d, load),
+        stiffness=stiffness,
+        loads=loads_at(d, load, model.reading.places),
+        knee=knee,
+        limit=limit_point(d, load),
+        wrinkles=wrinkle_onset(run),
+        straightness=straightness(d, load, knee[1] if knee else float(load.max())),
+        body_strain=body,
+        anywhere_strain=anywhere,
+        pressure_rise=1e3 * float(run.pressure[-1] - run.pressure[0]),
+        reached=float(d[-1]),
+        error=model_error(measured, d, load),
     )
 
 
@@ -213,7 +200,7 @@ def wrinkle_onset(run: BendingRun) -> Point | None:
 def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] | None:
     """Return R^2 of a line up to `STRAIGHT` of the buckling load, and the largest deviation.
 
-    The deviation is the largest, over the load where the part ends.
+    The deviation is over the load where the part ends.
     """
     beyond = np.flatnonzero(load > STRAIGHT * buckling)
     count = int(beyond[0]) if len(beyond) else len(d)
@@ -404,19 +391,12 @@ class CylinderOutcome:
         known = loads_at(self.bent[number].deflection, own, places)
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
 
-    def _around(self, number: int) -> str | None:
-        """Return the runs around a run."""
-        around = self.runs[number].around if number in self.spreads else None
-        return None if around is None else around.words
-
     @property
     def unsure(self) -> Sequence[str]:
         """Return notes on cards of unknown spread."""
         cards = [run.card for run in self.runs if run.material.certainty is None]
-        names = ", ".join(dict.fromkeys(cards))
-        return [f"no spread of loads with {names}: the card does not say how sure it is"] * bool(
-            names
-        )
+        words = f"no spread of loads with {', '.join(dict.fromkeys(cards))}"
+        return [f"{words}: the card does not say how sure it is"] if cards else []
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""
@@ -436,6 +416,7 @@ class CylinderOutcome:
     def numbers(self, number: int) -> Mapping[str, Any]:
         """Return the numbers of a run that did not fail, for result.json."""
         m = self.measures[number]
+        around = self.runs[number].around if number in self.spreads else None
         names = ("warp", "fill")
         return {
             "reached_mm": m.reached,
@@ -446,14 +427,13 @@ class CylinderOutcome:
             "wrinkle_onset": _point(m.wrinkles),
             "load_N": dict(m.loads),
             "load_sigma_N": self.sigma(number),
-            "spread": self._around(number),
+            "spread": None if around is None else around.words,
             "inflation_strain": {
                 "body": dict(zip(names, m.body_strain, strict=True)),
                 "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
             },
-            "straight_before_buckling": None
-            if m.straightness is None
-            else {"r_squared": m.straightness[0], "largest_deviation": m.straightness[1]},
+            "straight_before_buckling": m.straightness
+            and dict(zip(("r_squared", "largest_deviation"), m.straightness, strict=True)),
             "pressure_rise_kPa": m.pressure_rise,
             "error": None if m.error is None else asdict(m.error),
         }
@@ -505,7 +485,12 @@ class CylinderPredicted:
     """Predictions of cylinders."""
 
     def depends_on(self, model: CylinderModel) -> Sequence[object]:
-        return depends_on(model)
+        """Return all of a model that its result depends on."""
+        mesh = model.mesh
+        return (
+            model.thickness, model.inflation, model.deflections, model.increments, model.collar,
+            model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
+        )  # fmt: skip
 
     def arrays(self, model: CylinderModel, history: History) -> Mapping[str, Array]:
         """Return the arrays of a history that are stored."""

@@ -1,4 +1,4 @@
-"""What bent cylinders put on a page: facts, figures, tables and files."""
+"""Results of bent cylinders as facts, figures, tables and files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -42,9 +41,6 @@ from .predicted import (
     place_names,
 )
 from .test import PART, CylinderTest
-
-if TYPE_CHECKING:
-    from .predicted import CylinderOutcome
 
 Array = NDArray[np.float64]
 
@@ -109,32 +105,21 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
     ring = np.append(nodes[around], nodes[around[0]])
     top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
-    inflated, bent = beam.mesh.points + beam.inflated, beam.mesh.points + beam.bent
-    plot_beam(
-        path,
-        bent,
-        beam.mesh.quads,
-        surface_strain(beam.mesh, beam.bent)[:, 0],
-        inflated[outline][:, [2, 1]],
-        (inflated[ring, :2], bent[ring, :2]),
-        bodies_of(model, beam, float(run.deflection[-1])),
-        title,
-    )
+    inflated, bent = rest + beam.inflated, rest + beam.bent
+    strain = surface_strain(beam.mesh, beam.bent)[:, 0]
+    lines = inflated[outline][:, [2, 1]], (inflated[ring, :2], bent[ring, :2])
+    bodies = bodies_of(model, beam, float(run.deflection[-1]))
+    plot_beam(path, bent, beam.mesh.quads, strain, *lines, bodies, title)
 
 
 def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
     """Write the last frame for ParaView, with the inflated one as a further displacement."""
     beam = whole_beam(model, run)
-    write_vtu(
-        beam.mesh,
-        beam.bent,
-        path,
-        {"inflated_displacement": beam.inflated},
-        {
-            "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
-            "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
-        },
-    )
+    strains = {
+        "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
+        "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
+    }
+    write_vtu(beam.mesh, beam.bent, path, {"inflated_displacement": beam.inflated}, strains)
 
 
 FIGURES, BEAMS = "figures", "beams"
@@ -146,8 +131,7 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     Those that the page shows, each with its caption: the loads are charts there.
     """
     tests = tests_of(outcome)
-    cards = list(dict.fromkeys(run.card for run in outcome.runs))
-    ranks = {card: rank for rank, card in enumerate(cards)}
+    ranks = _ranks(outcome)
     names = file_names([test.name for test in tests])
     panels, figures = {}, []
     for test in tests:
@@ -168,20 +152,24 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     if sum(bool(panel.lines) for panel in panels.values()) > 1:
         rows = _rows(tests)
         columns = max(map(len, rows))
-        laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
+        laid = []
+        for row in rows:
+            laid += [panels[t.name] for t in row] + [BendPanel("")] * (columns - len(row))
         plot_bending_cases(out.path(f"{FIGURES}/all-loads.png"), laid, columns)
     return figures
 
 
 def load_charts(outcome: CylinderOutcome) -> list[Charts]:
     """Return charts of load over deflection of every test; none where no run ended."""
-    cards = list(dict.fromkeys(run.card for run in outcome.runs))
-    ranks = {card: rank for rank, card in enumerate(cards)}
+    ranks = _ranks(outcome)
     tests = tests_of(outcome)
     panels = [_panel(test, outcome, _ended(test, outcome), ranks) for test in tests]
     if not any(panel.lines for panel in panels):
         return []
-    caption = f"Load over deflection{_walls(outcome)}"
+    caption = "Load over deflection"
+    if len(outcome.band) > 1:
+        predicted, *others = (end.name for end in outcome.band)
+        caption += f"; line: {predicted}, dashed: {', '.join(others)}"
     if outcome.spreads:
         caption += f". Shaded: {panels[0].spread}"
     return [bending_charts(panels, caption)]
@@ -217,16 +205,8 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
     return files
 
 
-def _walls(outcome: CylinderOutcome) -> str:
-    """Return a caption for lines and bands."""
-    if len(outcome.band) < 2:
-        return ""
-    predicted, *others = (end.name for end in outcome.band)
-    return f"; line: {predicted}, dashed: {', '.join(others)}"
-
-
-def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
-    return [BendPanel("")] * (columns - len(row))
+def _ranks(outcome: CylinderOutcome) -> dict[str, int]:
+    return {card: k for k, card in enumerate(dict.fromkeys(run.card for run in outcome.runs))}
 
 
 def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
@@ -265,12 +245,8 @@ def _panel(
         # Where a repetition has ended the mean of the others jumps.
         whole = s.count == len(test.measured)
         readings = [(c.deflection, c.load) for c in test.measured]
-        measured = BendReadings(
-            readings,
-            s.deflection,
-            np.where(whole, s.mean, np.nan),
-            np.where(whole, s.deviation, np.nan),
-        )
+        shown = (np.where(whole, values, np.nan) for values in (s.mean, s.deviation))
+        measured = BendReadings(readings, s.deflection, *shown)
     names = [end.name for end in outcome.band]
     walls = f"from {' to '.join(names)}" if names else ""
     return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card")
@@ -312,6 +288,7 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
 #: Letters of a cell that is not broken.
 SHORT = 30
 CURVES = "load_deflection.csv"
+CONTENT = ("deflection", "load", "pressure", "volume", "wrinkled share")
 MEASURED = "measured.csv"
 
 
@@ -322,7 +299,14 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     files = [*_write_tables(outcome, tests, out), *write_beams(outcome, out)]
     tables = [_runs(outcome, tests), *_errors(outcome)]
     parts: list[Part] = [Words(how_sure(outcome, tests)), *load_charts(outcome)]
-    return Exhibit(_common(tests), figures, tables, files, parts)
+    shared = (
+        ("length, mm", {t.length for t in tests}),
+        ("span, mm", {t.supports.span for t in tests}),
+        ("element size, mm", {t.size for t in tests}),
+        ("seam width, mm", {t.seam_width for t in tests}),
+    )
+    facts = [(label, float(values.pop())) for label, values in shared if len(values) == 1]
+    return Exhibit(facts, figures, tables, files, parts)
 
 
 def _write_tables(
@@ -333,33 +317,21 @@ def _write_tables(
         curve.insert(0, "wall", run.wall)
         curve.insert(0, "card", run.card)
         curve.insert(0, "test", run.test.name)
-    _write(pd.concat(curves), out, CURVES)
-    what = "every curve: deflection, load, pressure, volume, wrinkled share"
-    files = [(out.name(CURVES), what)]
-    measured = measured_table(tests)
-    if len(measured):
-        _write(measured, out, MEASURED)
-        files.append((out.name(MEASURED), "mean and scatter of the repetitions on a grid"))
+    found = [
+        (
+            CURVES,
+            pd.concat(curves),
+            "every curve: deflection, load, pressure, volume, wrinkled share",
+        ),
+        (MEASURED, measured_table(tests), "mean and scatter of the repetitions on a grid"),
+    ]
+    files = []
+    for name, table, what in found:
+        if len(table) or name == CURVES:
+            with replacing(out.path(name)) as path:
+                table.to_csv(path, index=False)
+            files.append((out.name(name), what))
     return files
-
-
-def _write(table: pd.DataFrame, out: Output, name: str) -> None:
-    with replacing(out.path(name)) as path:
-        table.to_csv(path, index=False)
-
-
-def _common(tests: Sequence[CylinderTest]) -> list[tuple[str, object]]:
-    """Return the facts that all tests share."""
-    facts: list[tuple[str, object]] = []
-    for label, values in (
-        ("length, mm", {t.length for t in tests}),
-        ("span, mm", {t.supports.span for t in tests}),
-        ("element size, mm", {t.size for t in tests}),
-        ("seam width, mm", {t.seam_width for t in tests}),
-    ):
-        if len(values) == 1:
-            facts.append((label, float(values.pop())))
-    return facts
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:
@@ -386,14 +358,11 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         knee = " (knee)" if m.buckling_is == "knee" else ""
         buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
         wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
-        loads = [m.loads.get(place) for place in places]
         strain, rise = f"{max(m.body_strain):.3f}", f"{m.pressure_rise:+.2f}"
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
         spread = outcome.sigma(i)
-        listed = [
-            None if load is None else load_words(load, spread.get(place))
-            for place, load in zip(places, loads, strict=True)
-        ]
+        loads = [(m.loads.get(place), spread.get(place)) for place in places]
+        listed = [None if one[0] is None else load_words(*one) for one in loads]
         rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
     header = [
         "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
@@ -423,23 +392,20 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
 
 def _errors(outcome: CylinderOutcome) -> list[Table]:
     walls = ["wall"] if outcome.band else []
-    rows: list[list[object]] = [
-        [
-            outcome.runs[i].test.name, outcome.runs[i].card,
-            *(walls and [outcome.runs[i].wall]), m.error.rms,
-            percent(m.error.relative), f"{m.error.mean:+.1f}", m.error.compared, m.error.beyond,
-        ]
-        for i, m in outcome.measures.items()
-        if m.error is not None
-    ]  # fmt: skip
+    rows: list[list[object]] = []
+    for i, m in outcome.measures.items():
+        if (error := m.error) is not None:
+            run = outcome.runs[i]
+            numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
+            head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
+            rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
     if not rows:
         return []
-    shared = ["RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
-    header = ["test", "card", *walls, *shared]
+    named = ["test", "card", *walls]
+    header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
-    text = [_unbroken(row) for row in rows]
-    named = tuple(range(1, header.index("RMS, N")))
-    return [Table("Against measured loads", header, text, note, text=named)]
+    text = tuple(range(1, len(named)))
+    return [Table("Against measured loads", header, rows, note, text=text)]
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:

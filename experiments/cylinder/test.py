@@ -1,4 +1,4 @@
-"""A cylinder in bending as its section says, and the model of it."""
+"""A cylinder in bending, as its section describes it, and its model."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from ...errors import InputError
 from ...meshes.cylinder_model import (
@@ -71,7 +72,6 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
 PART = "cylinder"
 #: mm of an element, unless the file says otherwise.
 SIZE = 25.0
-#: Keys of the section, where a model calls them otherwise.
 #: Keys that may be left out, and what is then as usual.
 USUAL = {"span": "span", "seam_width": "seam width", "length": "length", "collar": "collar",
          "support_diameter": "diameter of the supports"}  # fmt: skip
@@ -131,20 +131,11 @@ class CylinderTest:
 
         Raises InputError: sizes that make no mesh or bodies that do not fit around it.
         """
+        thick = self.place.fabric.thickness if thickness is None else thickness
+        shape = self.size, self.length, self.seam_width
+        bending = self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp
         return inflated_cylinder(
-            self.diameter,
-            self.pressure,
-            self.place.fabric.thickness if thickness is None else thickness,
-            self.size,
-            self.length,
-            self.seam_width,
-            self.supports,
-            self.collar,
-            self.deflections,
-            self.symmetry,
-            self.cap_warp,
-            self.gas,
-            self.reading,
+            self.diameter, self.pressure, thick, *shape, *bending, self.gas, self.reading
         )
 
     def models(
@@ -160,8 +151,12 @@ class CylinderTest:
             problem = "the cylinder's steps are divided, never joined: use --coarser 0"
             raise InputError(None, "increments", problem)
         model, parts = self.model(thickness), int(factor)
-        inflation, increments = (_divided(s, parts) for s in (model.inflation, model.increments))
-        return {PART: replace(model, inflation=inflation, increments=increments)}
+        finer = {}
+        for name in ("inflation", "increments"):
+            ends = pairwise((0.0, *getattr(model, name)))
+            steps = [np.linspace(a, b, parts + 1)[1:] for a, b in ends]
+            finer[name] = [float(value) for part in steps for value in part]
+        return {PART: replace(model, **finer)}
 
     def settings(self) -> Mapping[str, object]:
         """Return everything but names, measurements and where the curve is read."""
@@ -197,9 +192,11 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
                 length(section.span, RigidSupports().span),
                 length(section.support_diameter, RigidSupports().diameter),
             ),
-            collar=_collar(section, diameter, scales.length),
+            collar=usual_collar(diameter)
+            if section.collar is None
+            else Collar(**_scaled(section.collar, scales.length)),
             deflections=_deflections(section, scales.length),
-            gas=_gas(section, scales.pressure),
+            gas=Gas(**_scaled(section.gas, scales.pressure, ("ambient",))),
             reading=curve_reading(
                 diameter,
                 None if places is None else [p * scales.length for p in places],
@@ -215,18 +212,9 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     return replace(test, measured=measured, listed=listed, assumed=assumed)
 
 
-def _collar(section: CylinderSection, diameter: float, scale: float) -> Collar:
-    if section.collar is None:
-        return usual_collar(diameter)
-    given = section.collar.model_dump(exclude_none=True)
-    return Collar(**{key: value * scale for key, value in given.items()})
-
-
-def _gas(section: CylinderSection, scale: float) -> Gas:
-    given = section.gas.model_dump(exclude_none=True)
-    if "ambient" in given:
-        given["ambient"] *= scale
-    return Gas(**given)
+def _scaled(section: BaseModel, scale: float, names: Sequence[str] | None = None) -> dict[str, Any]:
+    given = section.model_dump(exclude_none=True)
+    return {k: v * scale if names is None or k in names else v for k, v in given.items()}
 
 
 def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
@@ -235,8 +223,3 @@ def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
         return tuple(d * scale for d in section.deflections)
     end = DEFLECTION if section.deflection is None else section.deflection * scale
     return tuple(np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist())
-
-
-def _divided(ends: Sequence[float], parts: int) -> list[float]:
-    steps = [np.linspace(a, b, parts + 1)[1:] for a, b in pairwise((0.0, *ends))]
-    return [float(value) for part in steps for value in part]

@@ -46,11 +46,9 @@ def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> Iterator[Note]
             yield Note(NoteKind.UNMATCHED, words + "directions")
     for words in dict.fromkeys(n for s in strips for curve in s.strip.curves for n in curve.notes):
         yield Note(NoteKind.READING, words)
+    words = "points beyond the final length (or before zero) were left out"
     for s in strips:
         if test.match_by == "points" and s.strip.beyond:
-            words = (
-                f"{s.strip.beyond} points beyond the final length (or before zero) were left out"
-            )
             yield Note(NoteKind.LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
 
 
@@ -120,6 +118,14 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
     mesh = model.mesh
     plot_strip(picture, mesh.points, mesh.quads, u, strain[:, 2], mesh.node_sets["gauge"])
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
+
+
+def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path) -> None:
+    """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
+    ends = failure_strains(strips, fitted.valid)
+    strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
+    moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
+    plot_moduli_together(picture, strains, np.array(moduli))
 
 
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
@@ -351,10 +357,7 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
             draw_bias(s.model, s.history, out.path("bias.png"), out.path("bias.vtu"))
             figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
             files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
-    ends = failure_strains(strips, fitted.valid)
-    strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
-    moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
-    plot_moduli_together(out.path("failure.png"), strains, np.array(moduli))
+    draw_moduli(strips, fitted, out.path("failure.png"))
     caption = "Tangent moduli up to the strains at the end of each strip"
     figures.append((out.name("failure.png"), caption))
     if draw_orders([s.strip for s in strips], out.path("orders.png")):

@@ -38,7 +38,7 @@ def outcome() -> CylinderOutcome:
 def test_every_row_says_which_wall(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(page, "draw_figures", lambda *_: [])
     monkeypatch.setattr(page, "write_beams", lambda *_: [])
-    shown = page.exhibit(outcome, Output(tmp_path))
+    shown = page.show_outcome(outcome, Output(tmp_path))
     runs, errors = shown.tables
     assert runs.header[:4] == ["test", "card", "wall", "stiffness, N/mm"]
     assert [unbroken(row[1:3]) for row in runs.rows] == [

@@ -78,7 +78,7 @@ def outcome() -> CylinderOutcome:
 def test_every_cell(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(page, "draw_figures", lambda *_: [("a.png", "a picture")])
     monkeypatch.setattr(page, "write_beams", lambda *_: [("b.vtu", "a beam")])
-    shown = page.exhibit(outcome, Output(tmp_path / "out", "c/"))
+    shown = page.show_outcome(outcome, Output(tmp_path / "out", "c/"))
     assert shown.facts == [
         ("length, mm", 3000.0), ("span, mm", 2000.0), ("element size, mm", 40.0),
         ("seam width, mm", 35.0),
@@ -150,7 +150,7 @@ def test_without_readings_there_is_nothing_to_compare(
     plain = CylinderOutcome([run(case("a"), "soft"), run(case("b", size=20.0, length=1e3), "soft")])
     plain.__dict__["measures"] = {i: replace(MEASURES, error=None) for i in (0, 1)}
     plain.__dict__["bent"] = {0: BENT, 1: BENT}
-    shown = page.exhibit(plain, Output(tmp_path))
+    shown = page.show_outcome(plain, Output(tmp_path))
     assert [name for name, _ in shown.files] == ["load_deflection.csv"]
     assert [table.title for table in shown.tables] == ["Runs"]
     assert shown.facts == [("span, mm", 2000.0), ("seam width, mm", 35.0)]  # what all share

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.kinds import Output
 from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.report import exhibit_examined as exhibit
+from bubblefit.experiments.strips.report import examine
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 WAY = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
@@ -26,7 +26,7 @@ def test_every_cell(tmp_path: Path) -> None:
             "bias": Strip("bias", 20.0, 30.0),  # without data
         }
     )
-    shown = exhibit(test, Output(tmp_path, "s/"))
+    shown = examine(SimpleNamespace(test=test), Output(tmp_path, "s/"))
     assert shown.figures == [("s/curves.png", "load curves as they were read")]
     assert (tmp_path / "s" / "curves.png").is_file()
     (table,) = shown.tables

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.kinds import FittedTest, Output, Weighting
+from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips import report as figures
 from bubblefit.experiments.strips.data import Strip, compare_orders
 from bubblefit.experiments.strips.prepared import PreparedStrips
@@ -39,7 +40,7 @@ def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
         test = read(project_file(tmp_path, PUBLISHED, COARSE, *changes))
-        return test.prepare(LAW, MembraneSolver)
+        return KIND.prepare(test, LAW, MembraneSolver)
 
     return prepared
 
@@ -51,7 +52,7 @@ def exported(tmp_path: Path) -> Callable[..., PreparedStrips]:
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
         test = read(project_file(tmp_path, SMALL, POINTS, *changes))
-        return test.prepare(LAW, MembraneSolver)
+        return KIND.prepare(test, LAW, MembraneSolver)
 
     return prepared
 
@@ -183,7 +184,7 @@ def test_settings_are_what_a_result_depends_on(published, tmp_path):
 def test_findings(published):
     prepared = published()
     fit = fitted(prepared)
-    found = prepared.findings(fit)
+    found = report.findings(prepared, fit)
     directions = found.numbers["directions"]
     assert list(directions) == ["warp", "fill", "bias"]
     for (name, numbers), c, h in zip(
@@ -203,11 +204,11 @@ def test_findings(published):
 
 def test_what_the_data_leave_open_is_said(published, exported):
     prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
-    assert prepared.findings(fitted(prepared)).warnings == (
+    assert report.findings(prepared, fitted(prepared)).warnings == (
         "no fill strip of strips is matched: E2 rests on the other directions",
     )
     cut = exported(("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"))
-    (words,) = cut.findings(fitted(cut)).warnings
+    (words,) = report.findings(cut, fitted(cut)).warnings
     beyond = cut.test.strips["warp"].beyond
     left = "points beyond the final length (or before zero) were left out"
     assert words.line == f"warp: {beyond} {left}"
@@ -216,13 +217,13 @@ def test_what_the_data_leave_open_is_said(published, exported):
 def test_residuals_are_every_matched_load(exported):
     prepared = exported()
     fit = fitted(prepared)
-    table = prepared.residuals(fit)
+    table = report.residuals(prepared, fit)
     assert list(table.columns) == [
         "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit",
     ]  # fmt: skip
     assert set(table["unit"]) == {"N"}
     assert len(table) == sum(len(c.objective.load) for c in fit.comparisons)
-    for direction, numbers in prepared.findings(fit).numbers["directions"].items():
+    for direction, numbers in report.findings(prepared, fit).numbers["directions"].items():
         own = table[table["part"] == direction]
         np.testing.assert_allclose(own["modelled"] - own["measured"], own["difference"])
         assert np.sqrt((own["difference"] ** 2).mean()) == pytest.approx(numbers["rms_N"])
@@ -232,7 +233,9 @@ def test_residuals_are_every_matched_load(exported):
 def test_what_is_shown_is_written(exported, tmp_path, prefix):
     prepared = exported()
     fit = fitted(prepared)
-    shown = prepared.show(fit, prepared.findings(fit), Output(tmp_path / "out", prefix))
+    shown = report.show(
+        prepared, fit, report.findings(prepared, fit), Output(tmp_path / "out", prefix)
+    )
     names = [name for name, _ in (*shown.figures, *shown.files)]
     there = {p.name for p in (tmp_path / "out").iterdir()}
     assert set(names) == there and all(name.startswith(prefix) for name in names)
@@ -339,7 +342,8 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> Non
         return strain
 
     monkeypatch.setattr(figures, "middle_strain", middle)
-    assert figures._gauge_shear(model, history) == pytest.approx(0.3)
+    strip: Any = SimpleNamespace(direction="bias", model=model, history=history)
+    assert figures.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
     drawn: list[Any] = []
     monkeypatch.setattr(figures, "plot_strip", lambda *what: drawn.append(what))
     monkeypatch.setattr(figures, "write_vtu", lambda *what, **more: drawn.append((what, more)))

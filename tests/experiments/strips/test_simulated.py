@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import CardRun, Output
-from bubblefit.experiments.strips import KIND
+from bubblefit.experiments.strips import report
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
@@ -51,7 +51,7 @@ def test_two_cards_side_by_side(test, tmp_path):
     cards = {"table": card("table", replace(SHORT, strain_range=[0.153, 0.232, 0.883])),
              "linear": card("linear", LINEAR)}  # fmt: skip
     runs = run(test, cards)
-    told = KIND.simulate(test, cards, runs, Output(tmp_path / "sim"))
+    told = report.simulate(test, cards, runs, Output(tmp_path / "sim"))
     assert list(told.numbers["cards"]) == ["table", "linear"]
     assert [name for name, _ in told.figures] == ["loads.png"]
     table = told.numbers["cards"]["table"]
@@ -76,7 +76,7 @@ def test_two_cards_side_by_side(test, tmp_path):
 def test_within_the_range_of_the_card(test, tmp_path):
     """A card of small strains: its curves end early, and no sum of errors is made of them."""
     cards = {"short": card("short", SHORT)}
-    told = KIND.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"), True)
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"), True)
     (numbers,) = told.numbers["cards"].values()
     assert numbers["e_uniaxial_N"] is None
     for direction, end in (("warp", 0.08), ("fill", 0.1)):
@@ -90,7 +90,7 @@ def test_a_card_that_fails_on_a_strip_is_told_as_such(test, tmp_path):
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = 20.0, 220.0, -5000.0, 300.0  # E1 negative beyond a strain of 0.06
     cards = {"brittle": card("brittle", HypoelasticLaw(beta)), "good": card("good", LINEAR)}
-    told = KIND.simulate(test, cards, run(test, cards), Output(tmp_path / "sim", "one-"))
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim", "one-"))
     brittle, fine = told.numbers["cards"].values()
     assert "failed" in brittle["directions"]["warp"] and brittle["e_uniaxial_N"] is None
     assert brittle["directions"]["fill"]["rms_N"] > 0 and fine["e_uniaxial_N"] > 0
@@ -107,7 +107,7 @@ def test_without_data_the_loads_at_the_end_are_told(tmp_path):
     steps = ("[warp]", "increments = 3\n[warp]")
     test = read(project_file(tmp_path, SMALL, steps, *ends), need_data=False)
     cards = {"some": card("some", LINEAR)}
-    told = KIND.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"))
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"))
     assert "N at the end" in told.lines[0]
     (numbers,) = told.numbers["cards"].values()
     assert numbers["e_uniaxial_N"] is None

@@ -5,22 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import CardRun, Output
-from bubblefit.experiments.strips import simulated
+from bubblefit.experiments.strips import report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip
 from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective
-from bubblefit.experiments.strips.report import (
-    findings_of,
-    load_table,
-    misfit_table,
-    residual_table,
-)
+from bubblefit.experiments.strips.report import load_table, misfit_table
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import NoteKind
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
@@ -48,12 +43,20 @@ def fitted(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
     return FittedStrip(strip, MODEL, objective, history(*loads))
 
 
+def prepared(test: Any, strips: list[FittedStrip]) -> Any:
+    return SimpleNamespace(test=test, fitted_strips=lambda _: strips)
+
+
+def findings(test: Any, strips: list[FittedStrip]) -> Any:
+    return report.findings(prepared(test, strips), cast(Any, None))
+
+
 BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
 
 
 def test_findings() -> None:
     test: Any = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
-    found = findings_of(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
+    found = findings(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
     rms = np.sqrt(12.5), np.sqrt(50.0)
     warp = {
         "rms_N": pytest.approx(rms[0]), "scatter_N": 7.5, "weight": 1.0, "matched": 2,
@@ -80,7 +83,7 @@ def test_findings() -> None:
         (NoteKind.LEFT_OUT, left_out, "warp"),
     ]
     test.match_by = "polynomial"
-    assert [n.kind for n in findings_of(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
+    assert [n.kind for n in findings(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
 
 
 def test_tables() -> None:
@@ -100,7 +103,7 @@ def test_tables() -> None:
     assert loads["direction"].tolist() == ["warp"] * 2 + ["bias"] * 2
     assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
     assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
-    rest = residual_table(both)
+    rest = report.residuals(prepared(None, both), cast(Any, None))
     assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
     assert list(rest.columns) == [
         "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit"
@@ -155,7 +158,7 @@ def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
     calls: dict[str, list[Any]] = {"plot_loads": [], "draw_bias": []}
     for name, found in calls.items():
-        monkeypatch.setattr(simulated, name, lambda *what, found=found: found.append(what))
+        monkeypatch.setattr(report, name, lambda *what, found=found: found.append(what))
     return calls
 
 
@@ -165,7 +168,7 @@ def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = Fals
     law = SimpleNamespace(strain_range=np.array([0.1, 0.1, 0.1]))
     cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
     runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
-    return simulated.simulate(test, cards, runs, Output(folder), within)
+    return report.simulate(test, cards, runs, Output(folder), within)
 
 
 def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
@@ -228,7 +231,7 @@ def test_curves_end_where_the_range_of_the_card_does(
 ) -> None:
     """At the first increment nothing is strained, at the second so much."""
     strain = iter([np.zeros((1, 3)), np.array([strains])])
-    monkeypatch.setattr(simulated, "middle_strain", lambda *_: next(strain))
+    monkeypatch.setattr(report, "middle_strain", lambda *_: next(strain))
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     (card,) = said.numbers["cards"].values()
     warp = card["directions"]["warp"]
@@ -241,7 +244,7 @@ def test_curves_end_where_the_range_of_the_card_does(
 
 
 def test_a_card_whose_range_ends_at_once(tmp_path: Path, drawn, monkeypatch) -> None:
-    monkeypatch.setattr(simulated, "middle_strain", lambda *_: np.ones((1, 3)))
+    monkeypatch.setattr(report, "middle_strain", lambda *_: np.ones((1, 3)))
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     warp = said.numbers["cards"]["soft"]["directions"]["warp"]
     assert (warp["shown_to_mm"], warp["rms_N"]) == (0.0, None)
