@@ -36,10 +36,7 @@ NEAR = 4.0
 
 
 def plain_ratio(ratio: str) -> str:
-    """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2".
-
-    Raises InputError: no such ratio.
-    """
+    """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2"."""
     warp, fill = shares(ratio)
     least = min(x for x in (warp, fill) if x > 0)
     whole = [round(x / least, 3) for x in (warp, fill)]
@@ -78,11 +75,10 @@ QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 @dataclass(frozen=True, eq=False)
 class BiaxialTable:
-    """The rows of a file in their order.
+    """The rows (n,) of a file in their order.
 
-    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the length
-    at the beginning. ratio : (n,) names of load ratios, None where the file has none. lines : (n,)
-    in the file. source : what of it was read.
+    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the first
+    length. ratio : (n,) names, None where the file has none. lines : (n,) in the file.
     """
 
     path: Path
@@ -106,8 +102,7 @@ def read_biaxial_table(
     """Read a table; names, units, separator and decimal mark are found as for load curves.
 
     columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
-    `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are). load_unit,
-    strain_unit : needed where the file names none.
+    `ratio`. load_unit, strain_unit : where the file names none.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
@@ -154,11 +149,10 @@ HOLD = 0.01
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle, by rows of the test.
+    """One cycle, by rows of the test; numbers are from 1.
 
-    ratio : "2:1". phase : number, from 1, of the row of cycles of one ratio that it is in; number :
-    from 1, within its phase; count : from 1, in the whole test. first : row from which the
-    fabric is loaded; last : row at which it is loaded most (both are of the loading).
+    phase : of consecutive cycles of one ratio. number : within its phase. count : in the whole
+    test. first, last : rows where the loading begins and is highest.
     """
 
     ratio: str
@@ -177,8 +171,8 @@ class Cycle:
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
     """Return the cycles in their order.
 
-    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; where there are none,
-    that of the loads at the top of a cycle.
+    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; else by the loads at the
+    top.
     """
     larger = np.asarray(load).max(axis=1)
     cycles: list[Cycle] = []
@@ -244,9 +238,8 @@ Which = int | Literal["last"]
 class BiaxialPath:
     """The loading of one cycle.
 
-    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file, change
-    of length over the length there. residual : (2,) strain at the beginning of the loading, of the
-    same beginning. cycles : how many the phase has.
+    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file. cycles
+    : number in the phase.
     """
 
     table: BiaxialTable
@@ -276,10 +269,7 @@ class BiaxialPath:
         return np.asarray(self.strain - self.strain[0])
 
     def between(self, lowest: float, highest: float) -> BiaxialPath:
-        """Return the rows whose larger load (N/mm) lies between two.
-
-        Raises InputError: fewer than two of them.
-        """
+        """Return the rows whose larger load (N/mm) lies between two."""
         larger = self.larger
         keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
         if keep.sum() < 2:
@@ -302,10 +292,7 @@ class BiaxialPath:
 
 
 def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:
-    """Return the cycles of each file; `named` holds the ratio that each is listed for, or None.
-
-    Raises InputError: a file without a cycle.
-    """
+    """Return the cycles of each file; `named` holds the ratio that each is listed for, or None."""
     found = []
     for table, name in zip(tables, named, strict=True):
         labels = [name] * len(table.load) if name is not None else table.ratio
@@ -325,11 +312,8 @@ def evaluated_paths(
 ) -> list[BiaxialPath]:
     """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
 
-    Of a ratio that comes several times, the first time after the conditioning counts.
-
-    which : of the cycles of a ratio. conditioning : cycles at the beginning of each file that count
-    for nothing. ratios : those that are wanted; all unless given.
-    Raises InputError: a ratio that is wanted and is not there, or has not so many cycles.
+    Of a ratio that comes several times, the first phase after the conditioning (cycles at the
+    beginning of each file) counts. ratios : those wanted; all unless given.
     """
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):

@@ -47,8 +47,8 @@ BACK = 0.01
 class KeptStrain:
     """Residual strains of one phase of cycles, (2,) along warp and fill, as shares.
 
-    before : at the beginning of its first loading; after : when the loads are back after its last
-    one. None where they are not what they were in the first row. load : (2,) kN/m, of that row.
+    before, after : at the beginning of its first loading, and when the loads are back after its
+    last; None where they are not those of the first row, load (2,) kN/m.
     """
 
     file: str
@@ -91,10 +91,8 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "n
 class BiaxialEvaluation:
     """Elastic constants of one test.
 
-    paths, lines : measured, and their regression lines, ratio by ratio. chosen : of the options
-    that were asked for; others : of the others that the paths settle. first, last : of the same
-    options with the first and the last cycle of each ratio, None where they do not settle it.
-    kept : strain that the fabric kept, ratio by ratio.
+    lines : regression lines of the paths. others : of other options that the paths settle. first,
+    last : with the first and the last cycle of each ratio, None where they do not settle it.
     """
 
     test: str
@@ -135,10 +133,7 @@ class BiaxialEvaluation:
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
-    """Return the constants of a test by some options, beside those of all others.
-
-    Raises InputError: paths that do not settle the constants.
-    """
+    """Return the constants of a test by some options, beside those of all others."""
     paths = test.data.paths
     lines = linear_paths(paths)
     there = [line.ratio for line in lines]

@@ -47,12 +47,8 @@ PERCENT = 100.0
 class StrainObjective:
     """Residuals (model - measured) / (scale sqrt(n)) of n strains along warp, then fill.
 
-    The norm of a block is the RMS error of a strain over the scale, times the weight. Both are
-    counted from the first load of the path: what the fabric kept of earlier cycles is no part.
-
-    load : (n, 2) N/mm, by which the values lie along their path. strain : (n, 2) measured since the
-    beginning of the path, as shares. scale : share of strain that counts as one. weight : of both
-    blocks. noise : of one measured strain; None: `EXTENSOMETER` is reckoned with.
+    Strains count from the first load of the path. load, strain : (n, 2) N/mm and shares. scale :
+    strain that counts as one. noise : of one measured strain; None: `EXTENSOMETER`.
     """
 
     #: What the residuals are in after `scale`.
@@ -184,12 +180,7 @@ class PreparedBiaxial:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return a comparison a ratio that masks leave.
-
-        They lead in: a patch has no mesh, and hardly ever fails.
-
-        Raises InputError: no strain at all along a path.
-        """
+        """Return a comparison a ratio that masks leave; a patch hardly ever fails."""
         test, models = self.test, self.test.models()
         kept, found = self.kept(masks), []
         share = weighting.weight / (2 * max(1, len(kept))) if weighting.relative else 1.0

@@ -77,8 +77,8 @@ def _warnings(test: BiaxialTest) -> list[Note]:
 class Loading:
     """One card along one measured path.
 
-    larger : (n,) kN/m, strain : (n, 2) % since the beginning, of the loads that are shown. rms :
-    (2,) % off the measured strains, None where no load is shown. reached : (3,) strains.
+    larger, strain : (n,) kN/m, (n, 2) % of the loads shown. rms : (2,) % or None. reached : (3,)
+    strains.
     """
 
     path: BiaxialPath
@@ -101,7 +101,7 @@ def simulate(
 ) -> Simulation:
     """Write paths.csv and paths.png, also of failed analyses.
 
-    within_range : show each path only to where the card's valid range ends.
+    within_range : show each path only up to the card's valid range.
     """
     found: Loadings = {
         (name, path.ratio): _loading(path, card, runs[name, path.ratio], within_range)

@@ -126,7 +126,7 @@ class BiaxialTest:
     ) -> Mapping[str, PatchModel]:
         """Return a patch for each ratio, driven by the loads as they were measured.
 
-        Nothing is there to be refined: one point of the law, one increment a reading.
+        There is nothing to refine: one point of the law, one increment a reading.
         """
         thick = self.place.fabric.thickness if thickness is None else thickness
         return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}

@@ -28,8 +28,8 @@ class BendingRun:
     """A run that did not fail; frame 0 is the inflated cylinder.
 
     deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3, of the whole cylinder.
-    inflated, bent : (nodes, 3) mm of displacement at the first and the last frame. wrinkled :
-    (frames,) share of the surface, empty where the solver does not say.
+    inflated, bent : (nodes, 3) mm at the first and last frame. wrinkled : (frames,) share of the
+    surface, or empty.
     """
 
     deflection: Array
@@ -49,7 +49,7 @@ def run_of(record: RunRecord) -> BendingRun | None:
 def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
     """Return the arrays of a history that are stored, by the names of `BendingRun`.
 
-    Raises SolverFailure: no gas; fewer frames than asked for, and no word of the solver why.
+    Raises SolverFailure: no gas; fewer frames than asked for without the solver's reason.
     """
     deflection = np.array([0.0, *model.deflections])
     reached = len(history.load)
@@ -94,13 +94,11 @@ Point = tuple[float, float]  # deflection in mm and load in N
 class BendingMeasures:
     """Numbers of one run that ended; None where unknown.
 
-    stiffness : N/mm, initial. loads : N by the name of the place where it is read. knee, limit,
-    wrinkles : (deflection, load) where the slope has halved, of the largest load before the load
-    falls, and where wrinkles appear. straightness : R^2 of a straight line before buckling, and its
-    largest deviation over the load there. body_strain : (eps1, eps2) largest on inflation in the
-    body, away from seam and caps; anywhere_strain : on the tube with seam, its edges and ends.
-    pressure_rise : kPa from inflated to the last frame. reached : mm. error : against what was
-    measured.
+    stiffness : N/mm. loads : N by place. knee, limit, wrinkles : (deflection, load) where the slope
+    has halved, of the largest load before a fall, and where wrinkles appear. straightness : R^2 of
+    a line before buckling, and its largest deviation over the load. body_strain : largest (eps1,
+    eps2) on inflation away from seam and caps; anywhere_strain : on tube and seam. pressure_rise :
+    kPa. reached : mm.
     """
 
     stiffness: float | None
@@ -215,10 +213,9 @@ def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] 
 
 
 def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[Point, Point]:
-    """Return largest (eps1, eps2) in the middle of the quads of the inflated tube.
+    """Return largest (eps1, eps2) of quads of the inflated tube: of the body, and of all.
 
-    First of the body without the quads that touch seam or caps, which the thick seam and the caps
-    bend; then of the whole tube with its seam.
+    The body is without the quads that touch seam or caps, which these bend.
     """
     strain = surface_strain(mesh, inflated)[:, :2]
     others = np.zeros(len(mesh.points), dtype=bool)
@@ -369,7 +366,7 @@ class CylinderOutcome:
 
     @cached_property
     def spreads(self) -> Mapping[int, Array]:
-        """Return the standard deviations (frames,) N of the load due to the card.
+        """Return the standard deviations (frames,) N of the load due to the card; NaN if unknown.
 
         Of the runs with laws around the card's, by number; NaN where that is not known.
         """

@@ -126,7 +126,7 @@ FIGURES, BEAMS = "figures", "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Draw loads, gas and beam of every test, and all loads together.
+    """Draw loads, gas and beam of every test, and all loads; return those of the page.
 
     Those that the page shows, each with its caption: the loads are charts there.
     """

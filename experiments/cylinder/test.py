@@ -35,11 +35,7 @@ from .section import CylinderSection, MeasuredSection
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Read every repetition in the files of a section; none where it lists none.
-
-    Raises InputError: a file that is listed twice or is not there; of a file, naming it and the
-    line.
-    """
+    """Read every repetition in the files of a section; none where it lists none."""
     names = section.files or []
     folder = place.data_folder
     if folder is None:
@@ -82,9 +78,8 @@ KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size"
 class CylinderTest:
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
-    deflections : frames of the bending. measured : repetitions, empty where there are none.
-    listed : whether the section lists files of them. assumed : what the section leaves to the
-    usual values, in words.
+    deflections : frames of the bending. listed : whether the section lists measured files. assumed
+    : what the section leaves to usual values, in words.
     """
 
     name: str
@@ -127,10 +122,7 @@ class CylinderTest:
         return Reach()
 
     def model(self, thickness: float | None = None) -> CylinderModel:
-        """Return the model with a fabric of this thickness (mm), else of the project's.
-
-        Raises InputError: sizes that make no mesh or bodies that do not fit around it.
-        """
+        """Return the model with a fabric of this thickness (mm), else of the project's."""
         thick = self.place.fabric.thickness if thickness is None else thickness
         shape = self.size, self.length, self.seam_width
         bending = self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp
@@ -141,10 +133,7 @@ class CylinderTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, CylinderModel]:
-        """Return the one model; edges, or every increment, divided by a factor.
-
-        Raises InputError: a mesh that cannot be had; increments to be joined.
-        """
+        """Return the one model; edges, or every increment, divided by a factor."""
         if what == "elements":
             return {PART: replace(self, size=self.size / factor).model(thickness)}
         if factor != int(factor):

@@ -115,10 +115,7 @@ def _test(
 def _noise(
     pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
 ) -> float:
-    """Return the noise (N) of independent loads: of the own direction, the others, or usual.
-
-    The largest of the others counts, relative to the largest load.
-    """
+    """Return the noise (N) of independent loads: of the own direction, the others, or usual."""
     if planning.noise is not None:
         return planning.noise
     if template is None:

@@ -42,10 +42,9 @@ Array = NDArray[np.float64]
 class OrderScore:
     """Scores of one order: n points, k coefficients, S the sum of squares left.
 
-    r_squared : 1 - S / (squares about the mean). adjusted_r_squared : the same of S / (n - k) and
-    (squares about the mean) / (n - 1). rmse : N, sqrt(S / n). aic, bic : n ln(S / n) + 2 (k + 1)
-    and n ln(S / n) + (k + 1) ln n. left_out : N, root mean square error at points, or whole
-    specimens, that the fit did not see.
+    adjusted_r_squared : of S / (n - k) and (squares about the mean) / (n - 1). rmse : N, sqrt(S /
+    n). aic, bic : n ln(S / n) + 2 (k + 1) and n ln(S / n) + (k + 1) ln n. left_out : N, RMS error
+    at points, or whole specimens, that the fit did not see.
     """
 
     order: int
@@ -62,8 +61,8 @@ class OrderComparison:
     """Scores by rising order, and the order that each rule chooses.
 
     by_fit : lowest RMSE and highest R^2, the thesis' rule (section 3.2). Each order contains the
-    ones below it, so least squares can only lower the RMSE: the rule chooses the highest order
-    offered, whatever the data. The thesis' fourth order was therefore a choice of what to offer.
+    ones below it, so that it chooses the highest offered: the thesis' fourth was a choice of what
+    to offer.
     """
 
     scores: tuple[OrderScore, ...]
@@ -83,8 +82,8 @@ def compare_orders(
 ) -> OrderComparison:
     """Fit each order to the points (n,) mm and (n,) N and score it.
 
-    specimens : (n,) which specimen each point belongs to. With it a whole specimen is left out at a
-    time: points of one specimen err together, so leaving out one of them flatters.
+    specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
+    specimen err together, so leaving out one of them flatters.
     """
     u, f = checked_points(elongation, load)
     names = list(range(len(u))) if specimens is None else list(specimens)
@@ -151,11 +150,8 @@ PLACES = 40
 def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
     """Return the two breaks of the broken line through the origin nearest to the curve.
 
-    How Ambroziak and Klosowski read the regions of a coated fabric off its curve by eye, by
-    least squares. Of the pairs on a grid of 40 places, the best.
-
-    strain, load : (n,) of one curve, strain above zero.
-    Raises InputError: fewer than five points, or none with strain.
+    By least squares over a grid of 40 places, as Ambroziak and Klosowski read the regions of a
+    coated fabric by eye. strain, load : (n,) of one curve, strain above zero.
     """
     x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
     if len(x) < 5 or not x.max() > 0:
@@ -174,7 +170,7 @@ def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ListedFile:
-    """A file that a section lists.
+    """A file of a section, with its key, and the direction it is listed for or None.
 
     field : its key below the section. direction : the one it is listed for; None where the file
     itself names it.
@@ -186,10 +182,7 @@ class ListedFile:
 
 
 def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
-    """Return the files of [strips.data], there or not, in the order of the section.
-
-    Raises InputError: none in any direction, one that is listed twice for the same.
-    """
+    """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [ListedFile(folder / data.polynomials, "data.polynomials")]
     field = "data.files"
@@ -264,13 +257,10 @@ PLACES = 200  # at which a polynomial is asked for its regions
 class Strip:
     """Data of one direction; lengths mm, loads N.
 
-    direction : warp, fill or bias. gauge_length, final_length : of the virtual strain gauge, at
-    rest and at the end. polynomial : the load curve, given or fitted to the curves; None where a
-    forward analysis does without data. curves : the specimens' points, empty where only the
-    polynomial is given. scatter : standard deviation of the points about the polynomial; None where
-    not known. through_origin : whether a polynomial through the points starts in the origin.
-    open_end : nobody said the final length: it is where the points end. published : the file of a
-    polynomial that was given, None of one fitted to points.
+    gauge_length, final_length : of the virtual strain gauge. polynomial : given or fitted to the
+    curves; None in a forward analysis without data. scatter : standard deviation of points about
+    the polynomial. open_end : the final length is where the points end. published : file of a given
+    polynomial.
     """
 
     direction: str
@@ -315,10 +305,7 @@ class Strip:
         return sum(len(c.load) for c in self.curves) - len(self.points[0])
 
     def noise(self, largest: float, given: float | None = None) -> tuple[float, NoiseIs]:
-        """Return the least noise of a load, N, and its origin.
-
-        largest : load measured. given : what the project says of it.
-        """
+        """Return the least noise of a load, N, and its origin."""
         if given is not None:
             return given, "given"
         if self.scatter is not None:
@@ -342,12 +329,7 @@ class Strip:
         return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
-        """Return the two breaks (shares of strain) of the three lines nearest to the curve.
-
-        mask : of the points, which the curve is to follow; all unless given.
-
-        Raises InputError: the points matched settle no polynomial.
-        """
+        """Return the two breaks (shares of strain) of the three lines nearest to the curve."""
         polynomial = self.polynomial
         if polynomial is None:
             return None
@@ -387,9 +369,9 @@ EXTRAPOLATED = 0.05
 
 
 def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
-    """Return the strips of a section, by direction: those whose table or whose data are there.
+    """Read the strips of a section, by direction: those whose table or whose data are there.
 
-    Files that are not there are done without where the place needs none and all lengths are given.
+    Missing files are no error where the place needs none and all lengths are given.
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):

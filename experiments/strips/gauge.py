@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 class Surface:
     """The correlated points of a frame, triangulated by their reference x and y.
 
-    mesh : Delaunay triangles. places : (points, 2, 3) mm, before and after.
+    places : (points, 2, 3) mm, before and after.
     """
 
     mesh: Delaunay
@@ -48,8 +48,8 @@ class Surface:
 def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
     """Triangulate a frame; None where fewer than three points, or a line, were correlated.
 
-    before : a surface whose triangles are taken where the reference points are the same: most
-        exports have the same points in every frame, and triangulating is what costs.
+    before : a surface whose triangles are taken where the reference points are the same:
+    triangulating is what costs.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -66,7 +66,7 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
 
 
 def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
-    """Return place (2, 3) mm before and after of the point (2,), or why there is none.
+    """Return place (2, 3) mm before and after of the point (2,), or the reason for none.
 
     limit : mm; a triangle with a longer edge spans a hole.
     """
@@ -85,8 +85,8 @@ def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
 def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
     """Return the triangle that holds a point (2,), -1 for none, and its corners' weights (3,).
 
-    By hand: Delaunay.find_simplex first inverts a matrix for every triangle, which costs more
-    than triangulating.
+    Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
+    triangulating.
     """
     x, y = np.moveaxis(surface.places[surface.mesh.simplices, 0, :2] - end, -1, 0)
     # Twice the areas that the point makes with the sides opposite to each corner.
@@ -101,11 +101,8 @@ def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
 class GaugeRecord:
     """A virtual strain gauge through n frames; NaN in the frames where it was lost.
 
-    reference_length : mm, between the two reference places, by x, y and z. length : (n,) mm, by x,
-    y and z. elongation : (n,) mm, length - reference length. strain : (n,) engineering, elongation
-    / reference length. log_strain : (n,) ln(length / reference length). lost : indices of the
-    frames where an end had no correlated surface around it. warnings : one line for each end of the
-    gauge that was lost: in which frames, why, what to do.
+    reference_length, length : mm, by x, y and z. strain : engineering, elongation / reference
+    length; log_strain : ln(length / reference length). lost : frames without surface around an end.
     """
 
     reference_length: float
@@ -123,14 +120,9 @@ def virtual_strain_gauge(
     """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
 
     An end is lost in a frame where it lies outside the triangulated points, or in a triangle with
-    an edge longer than `max_gap` times the usual longest edge: there the points between are
-    missing, and a value would be interpolated over a hole.
-
-    frames : in the order of the test; each with its own points, not necessarily the same. lower,
-    upper : (2,) mm, x and y of the ends in the reference state. max_gap : 1.35 finds one missing
-    point of a square grid (there the ratio is 1.41). Points scattered at random need about 2.5.
-    Raises InputError: no frames, ends that are no points or coincide, an end lost in every frame, a
-    gauge within one triangle of points, a gap that is no number.
+    an edge longer than `max_gap` times the usual longest edge: a value would be interpolated over a
+    hole. lower, upper : (2,) mm, x and y in the reference state. max_gap : 1.35 finds one missing
+    point of a square grid (1.41 there); points scattered at random need about 2.5.
     """
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
@@ -219,14 +211,8 @@ def gauge_load_curve(
 ) -> LoadCurve:
     """Return the machine's load over the gauge's elongation; lost frames are left out.
 
-    Without times, one load a frame. With times, the load is interpolated at the frames' times;
-    frames before the first or after the last load are left out, which is logged.
-
-    loads : (n,) or, with times, (k,) N. direction, specimen, path : of the curve; the direction by
-    any of its names. frame_times, load_times : (n,) and (k,) on the same clock and in the same
-    unit; the latter rising.
-    Raises InputError: counts that do not agree, times that do not rise, numbers that are not
-    finite, fewer than two frames left.
+    loads : (n,) N, or (k,) at rising load_times, interpolated at frame_times (n,); frames before
+    the first or after the last load are left out, which is logged.
     """
     way = direction_named(direction)
     load, count = np.asarray(loads, dtype=float), len(record.length)
@@ -273,13 +259,9 @@ def _at_times(
 class PairedLoads:
     """A machine's loads, and their pairing with the frames of a gauge.
 
-    path : the machine's export. direction, specimen : of the strip; the direction by any of its
-    names. load_column, time_column : names in the export, where they are not found by themselves.
-    load_unit : N or kN, where the export names none. decimal : the mark in the export and in the
-    table of times, where it is not clear. format : of the export, found by its content unless
-    given. frame_times : a table of the frames' times: pairs the loads by time. frame_time_column :
-    name of its column. frame_interval : s between frames, the first at 0: pairs the loads by time
-    too. time_offset : s, the machine's clock less the frames'.
+    load_column, load_unit, decimal, format : of the export, where not found. frame_times : a table
+    of the frames' times, or frame_interval : s between frames, the first at 0: pair the loads by
+    time. time_offset : s, the machine's clock less the frames'.
     """
 
     path: Path
@@ -381,9 +363,8 @@ COLUMNS = {
 class GaugeTable:
     """A gauge through the frames of a test, with the machine's loads where there are any.
 
-    files : names of the frames, one each. lower, upper : (x, y) mm of the ends in the reference
-    state. record : of the gauge. curve : its loads; frames where correlation was lost, or without a
-    load, are not in it. note : what looks unmeant in the order of the frames.
+    lower, upper : (x, y) mm of the ends. curve : without lost frames and those without load. note :
+    on the order of the frames.
     """
 
     files: Sequence[str]

@@ -43,14 +43,10 @@ Array = NDArray[np.float64]
 class LoadObjective:
     """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
 
-    increments : (frames,) mm, elongations that the model reports. elongation, load : (n,) mm, N:
-    what was measured, inside the increments. The model's load is interpolated by a cubic spline
-    from the origin through its increments. scale : N: 1 for errors in N (Eq. 3.7), the largest load
-    for relative errors. weight : of the block in e. least_noise : N, to reckon with at least;
-    noise_is : where it is from. alike : how many of the loads err as one, at least, because their
-    specimen is stiffer or softer. specimens : (n,) number of the specimen of each load, None where
-    that is not known.
-    Raises InputError: nothing measured, or measured outside the increments.
+    increments : (frames,) mm of the model, whose load is interpolated by a cubic spline from the
+    origin. elongation, load : (n,) mm, N, measured. scale : N: 1 for errors in N (Eq. 3.7), the
+    largest load for relative errors. least_noise, noise_is : N, and its origin. alike : number of
+    loads that err as one, at least. specimens : (n,) number of each load's specimen.
     """
 
     unit = "N"
@@ -148,8 +144,7 @@ def loads_alike(
 ) -> float:
     """Return the number of loads of a direction that err as one.
 
-    noise : N, that the project gives of one load: independent of the others' where no two specimens
-    tell. specimens : as for `independent_loads`.
+    noise : N, that the project gives of one load.
     """
     if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
         return 1.0
@@ -160,13 +155,10 @@ def loads_alike(
 def independent_loads(strip: Strip, specimens: int | None = None) -> float:
     """Return the number of independent loads of all specimens of a direction together.
 
-    Of two or more whose points are there: as many places a specimen as do not err as one, by the
-    correlation along it of what it lies beside the polynomial of all, or as the factor says by
-    which it is stiffer, whichever are fewer; times the specimens less one, which that polynomial
-    has taken up. Else `PLACES` a specimen, likewise.
-
-    specimens : how many there are behind a polynomial, or behind points that do not tell them
-    apart; `SPECIMENS` behind a polynomial, and one of points, where nobody says it.
+    Of two or more specimens: places a specimen that do not err as one, by the correlation along it
+    of what it lies beside the polynomial of all, or by the factor by which it is stiffer, whichever
+    are fewer; times the specimens less one. Else `PLACES` a specimen, likewise, with `specimens`,
+    one, or `SPECIMENS` behind a polynomial.
     """
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2 or strip.polynomial is None:
@@ -281,10 +273,7 @@ class PreparedStrips:
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return a comparison a direction that has weight and points.
-
-        Raises InputError: nothing was measured, or no load at all.
-        """
+        """Return a comparison a direction that has weight and points."""
         test, models = self.test, self.test.models()
         share, kept = weighting.weight, self.kept(masks)
         if weighting.relative and kept:

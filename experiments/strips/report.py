@@ -131,8 +131,7 @@ def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
     """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
 
-    valid : (3,) the ends up to which the moduli are fitted, which no strain shown exceeds; they
-    take the place of a strip that is not there.
+    valid : (3,) the ends of the moduli, which no strain shown exceeds.
     """
     ends = np.array(valid, dtype=float)
     for s in strips:

@@ -30,8 +30,8 @@ Mask = NDArray[np.bool_]
 class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
 
-    `strips` and `weights` by direction (warp, fill, bias). `noise` (N) of one measured load, None
-    where it is not given; `specimens` of each direction, None where the files tell or nobody does.
+    strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
+    unknown.
     """
 
     name: str
@@ -72,10 +72,7 @@ class StripsTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
-        """Return the models by direction; edges of quads, or increments, divided by a factor.
-
-        Raises InputError: lengths that do not make a strip.
-        """
+        """Return the models by direction; edges of quads, or increments, divided by a factor."""
         quads = factor if what == "elements" else 1.0
         steps = factor if what == "increments" else 1.0
         thick = self.thickness if thickness is None else thickness
@@ -141,12 +138,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
     """Return the final strains of the strips, and the breaks of their load curves.
 
-    Warp and fill: the logarithmic strain of their gauges at the end. Shear: that of a strip which
-    keeps its area, 2 sin(2 angle) ln(l_f/l_i). Breaks: where three lines follow a load curve best,
-    in shares of the strain of its gauge.
-
-    masks : which of the points a curve follows, by direction; all unless given. A direction whose
-    mask keeps none says nothing.
+    Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks : shares of the
+    strain of the gauge. masks : which points a curve follows, by direction.
     """
     known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
     strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}

@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.cylinder.predicted import (
+    STUDIED,
     BendingRun,
+    arrays_of,
     bending_measures,
+    early_end,
     inflation_strain,
     initial_stiffness,
     knee_point,
     limit_point,
     loads_at,
+    quantities,
     run_of,
     straightness,
     wrinkle_onset,
 )
+from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh, middle_strain, surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.project.project import read_project
+from bubblefit.runs.refinement import edge_length
+from bubblefit.solvers.base import History
 
-from ...cylinder_cases import ran
+from ...cylinder_cases import STUDIED_PROJECT, ran
 
 #: mm over which slopes are taken here.
 OVER = 20.0
@@ -255,3 +267,99 @@ def test_largest_strains_of_body_and_tube_by_hand() -> None:
     assert inflation_strain(whole, u)[0][0] > np.log(1.04)
     alone = {k: v for k, v in mesh.element_sets.items() if k != "seam"}
     assert inflation_strain(replace(mesh, element_sets=alone), u)[1][0] < np.log(1.06)
+
+
+MODEL = SimpleNamespace(deflections=(10.0, 20.0))
+
+
+def history(frames: int = 3, **other: Any) -> History:
+    given = {
+        "cavity_pressure": np.array([0.1, 0.101, 0.102])[:frames],
+        "cavity_volume": 5e7 - np.arange(frames),
+    } | other
+    moved = np.arange(frames * 6.0).reshape(frames, 2, 3)
+    return History(np.arange(frames) * 50.0, moved, np.zeros(3), np.zeros(3), **given)
+
+
+def test_what_is_kept() -> None:
+    kept = arrays_of(MODEL, history(wrinkled=[0.0, 0.1, 0.3]))
+    assert {name: value.tolist() for name, value in kept.items()} == {
+        "deflection": [0.0, 10.0, 20.0],
+        "load": [0.0, 50.0, 100.0],
+        "pressure": [0.1, 0.101, 0.102],
+        "volume": [5e7, 5e7 - 1, 5e7 - 2],
+        "inflated": [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]],
+        "bent": [[12.0, 13.0, 14.0], [15.0, 16.0, 17.0]],
+        "wrinkled": [0.0, 0.1, 0.3],
+    }
+    assert arrays_of(MODEL, history())["wrinkled"].size == 0
+
+
+def test_an_early_end_is_a_result_where_the_solver_says_why() -> None:
+    short = history(2, early="no equilibrium")
+    assert arrays_of(MODEL, short)["deflection"].tolist() == [0.0, 10.0]
+    assert early_end(MODEL, short) == "no equilibrium"
+    assert early_end(MODEL, history(3, early="said after the end")) == ""
+    with pytest.raises(SolverFailure, match="the results end at 10 of 20 mm, and do not say why"):
+        arrays_of(MODEL, history(2))
+
+
+@pytest.mark.parametrize("name", ["cavity_pressure", "cavity_volume"])
+def test_results_without_gas(name: str) -> None:
+    with pytest.raises(SolverFailure, match="no gas pressure or no volume"):
+        arrays_of(MODEL, history(**{name: None}))
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    path = tmp_path / "project.toml"
+    path.write_text(STUDIED_PROJECT)
+    return path
+
+
+def cylinders(project: Path) -> list[CylinderTest]:
+    return list(read_project(project).tests.values())
+
+
+def test_finer_cylinders(project: Path) -> None:
+    narrow, wide = cylinders(project)
+    own, finer = (narrow.models(0.5, "elements", f)["cylinder"] for f in (3.0, 6.0))
+    # What lies between seam, collar and supports is a whole number of rows: nearly a half.
+    assert edge_length(finer.mesh) == pytest.approx(edge_length(own.mesh) / 2, rel=0.05)
+    assert set(np.unique(wide.models(0.5, "elements", 6.0)["cylinder"].thickness)) == {0.5, 1.5}
+
+
+def test_finer_increments_keep_what_is_reported(project: Path) -> None:
+    test, _ = cylinders(project)
+    own, finer = (test.models(0.81, "increments", f)["cylinder"] for f in (1.0, 3.0))
+    assert finer.deflections == own.deflections and len(finer.increments) == 12
+    assert finer.increments[:3] == pytest.approx([10 / 3, 20 / 3, 10.0])
+    assert len(finer.inflation) == 3 * len(own.inflation) and finer.pressure == own.pressure
+    np.testing.assert_array_equal(finer.reported, [2, 5, 8, 11])
+    assert len(STUDIED.steps(finer)) == 42
+    with pytest.raises(InputError, match="--coarser 0"):
+        test.models(0.81, "increments", 0.5)
+
+
+def test_quantities_of_a_history_made_up(project: Path) -> None:
+    """A cylinder that swells by a tenth, then a load that is straight up to a limit and falls."""
+    model = cylinders(project)[0].model()
+    model = replace(model, deflections=np.arange(4.0, 241, 4.0), increments=())
+    d = np.array([0.0, *model.deflections])
+    swollen = 0.1 * model.mesh.points * [1, 1, 0]
+    moves = np.repeat(swollen[None], len(d), axis=0)
+    load = np.where(d < 120, 3.0 * d, 360.0 - 0.5 * (d - 120))
+    history = History(load, moves, np.zeros(3), np.zeros(3), cavity_volume=np.full(len(d), 6.0e7))
+    found = quantities(model, history)
+    assert found["radius at mid-span, inflated, mm"] == pytest.approx(82.5)
+    assert found["volume, inflated, l"] == pytest.approx(60.0)
+    assert found["initial stiffness, N/mm"] == pytest.approx(3.0)
+    assert found["load at 100 mm, N"] == pytest.approx(300.0)
+    assert found["load at 240 mm, N"] == pytest.approx(300.0)
+    assert found["load at the limit point, N"] == pytest.approx(360.0)
+    assert 110 < found["load at the knee point, N"] / 3.0 < 120
+    early = replace(history, load=load[:26], displacement=moves[:26])
+    gone = set(found) - set(quantities(model, early))
+    assert gone == {
+        "load at 240 mm, N", "load at the limit point, N", "load at the knee point, N"
+    }  # fmt: skip
