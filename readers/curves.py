@@ -109,7 +109,13 @@ def read_load_curves(
     found = read_machine_table(path, options, format)
     column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
     elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
-    load = _load(found, column["load"], load_unit, width)
+    units, own = dict(LOAD_UNITS), found.units[column["load"]]
+    if own in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
+        if width is None:
+            problem = f"{own or load_unit} is a load per width; say the strip's width"
+            raise InputError(path, f"line {found.header}, column {column['load']!r}", problem)
+        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
+    load = measured(found, column["load"], "load", units, load_unit)
     notes = found.notes + choice_of(found, "elongation", named)
     asked = {"elongation": length_unit, "load": load_unit}
     source = source_of(found, column, asked, format, notes)
@@ -157,19 +163,6 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
         )
         for number, part in enumerate(parts, start=1)
     )
-
-
-def _load(
-    found: MachineTable, column: str, unit: str | None, width: float | None
-) -> NDArray[np.float64]:
-    """Return loads (rows,) in N of the whole strip."""
-    units = dict(LOAD_UNITS)
-    if found.units[column] in WIDTH_LOAD_UNITS or unit in WIDTH_LOAD_UNITS:
-        if width is None:
-            problem = f"{found.units[column] or unit} is a load per width; say the strip's width"
-            raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
-        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
-    return measured(found, column, "load", units, unit)
 
 
 def _labels(

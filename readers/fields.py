@@ -69,8 +69,9 @@ def read_fields(
     read = read_frames(files, options, format)
     if frames is not None:
         read = tuple(read[number] for number in frames)
-    elif len(read) == len(pressures) + 1 and len(files) == 1 and _at_rest(read[0]):
-        read = read[1:]
+    elif len(read) == len(pressures) + 1 and len(files) == 1:
+        moved = read[0].displacement[np.isfinite(read[0].displacement)]
+        read = read[1:] if moved.size and not moved.any() else read
     if len(read) != len(pressures):
         problem = f"expected one frame for each of {len(pressures)} pressures, found {len(read)}"
         raise InputError(None, "files", problem)
@@ -78,11 +79,6 @@ def read_fields(
         field_of(frame, float(pressure), options)
         for frame, pressure in zip(read, pressures, strict=True)
     )
-
-
-def _at_rest(frame: Frame) -> bool:
-    moved = frame.displacement[np.isfinite(frame.displacement)]
-    return bool(moved.size) and not moved.any()
 
 
 def read_field(

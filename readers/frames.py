@@ -114,15 +114,14 @@ def read_frames(
     """
     if not files:
         raise InputError(None, "files", "expected one file a frame, got none")
-    return tuple(frame for file in files for frame in _frames(Path(file), options, format))
-
-
-def _frames(path: Path, options: FrameOptions, format: str | None) -> Sequence[Frame]:
-    frames: Sequence[Frame] = read_file("frame", path, format, options)
-    for frame in frames:
-        if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
-            raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
-    return frames
+    found: list[Frame] = []
+    for path in map(Path, files):
+        frames: Sequence[Frame] = read_file("frame", path, format, options)
+        for frame in frames:
+            if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
+                raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
+        found += frames
+    return tuple(found)
 
 
 #: mm in one of each unit of length, by its name in small letters.
@@ -381,23 +380,19 @@ def frame_files(
         if file in files[:i]:
             raise InputError(file, field, "is given twice")
     plain = [str(name if folder is None else folder / name) for name in given]
-    return files, _shell_order(files) if list(map(str, files)) == plain else None
+    by_number = sorted(files, key=_numbers)
+    as_shell = list(map(str, files)) == plain and sorted(files, key=str) == files != by_number
+    if not as_shell:  # which sorts frame_10 before frame_2
+        return files, None
+    first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
+    words = (
+        f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
+        " them by number"
+    )
+    return files, Note(NoteKind.ORDER, words)
 
 
 def _numbers(file: Path) -> list[tuple[bool, int, str]]:
     """Return a sort key: digits as numbers, numbers before letters."""
     parts = re.findall(r"\d+|\D+", str(file))
     return [(not p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]
-
-
-def _shell_order(files: list[Path]) -> Note | None:
-    """Return whether files stand as a shell sorts them, frame_10 before frame_2."""
-    by_number = sorted(files, key=_numbers)
-    if by_number == files or sorted(files, key=str) != files:
-        return None
-    first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
-    words = (
-        f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
-        " them by number"
-    )
-    return Note(NoteKind.ORDER, words)

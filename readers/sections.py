@@ -1,8 +1,4 @@
-"""What every section of a project file is made of: the base of its model, numbers, units.
-
-A room's own sections live in that room; what pydantic finds wrong becomes one line by
-`section_errors.first_error`.
-"""
+"""The base of all sections of a project file, its numbers and units, and errors in one line."""
 
 from __future__ import annotations
 
@@ -84,7 +80,14 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         table = field is not None and next(_sections(field.annotation), None) is not None
         return f"this {'section' if table else 'key'} is missing; add it"
     if kind == "extra_forbidden":
-        return _unknown(location, file)
+        table = file
+        for part in location[:-1]:
+            if isinstance(part, str):  # a number counts the tables of a list
+                table = next(_sections(table.model_fields[part].annotation))
+        known = list(table.model_fields)
+        near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
+        meant = f"did you mean {near[0]!r}? " if near else ""
+        return f"unknown key; {meant}allowed here: {', '.join(known)}"
     if kind == "finite_number":
         return f"expected a finite number, got {given!r}"
     if kind in ("too_short", "too_long"):
@@ -93,27 +96,6 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
     return f"expected {expected}, got {_short(given)}"
-
-
-def _unknown(location: Sequence[str | int], file: type[BaseModel]) -> str:
-    known = _keys_beside(location, file)
-    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
-    meant = f"did you mean {near[0]!r}? " if near else ""
-    return f"unknown key; {meant}allowed here: {', '.join(known)}"
-
-
-def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[str]:
-    """Return allowed keys of the table that holds `location`."""
-    table = file
-    for part in location[:-1]:
-        if isinstance(part, str):  # a number counts the tables of a list
-            table = _table(table.model_fields[part].annotation)
-    return list(table.model_fields)
-
-
-def _table(annotation: Any) -> type[BaseModel]:
-    """Return the section class in an annotation such as `list[CaseSection]`."""
-    return next(_sections(annotation))
 
 
 def _sections(annotation: Any) -> Iterator[type[BaseModel]]:

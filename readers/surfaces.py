@@ -202,7 +202,12 @@ def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
 
     Raises InputError: too few points, points in a plane.
     """
-    _check(points, path)
+    if len(points) < LEAST_POINTS:
+        problem = f"expected {LEAST_POINTS} points or more, got {len(points)}"
+        raise InputError(path, "", problem)
+    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spans[2] <= FLAT * spans[0]:
+        raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")
     centre, radius = _start(points)
     kept = _inside(points, centre, radius)
     for _ in range(ROUNDS):
@@ -217,14 +222,6 @@ def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
     variance = float(np.sum(deviation[kept] ** 2)) / freedom
     errors = np.sqrt(variance * np.diag(np.linalg.inv(slopes.T @ slopes)))
     return Sphere(centre, radius, errors[:3], float(errors[3]), deviation, kept, points, path)
-
-
-def _check(points: Array, path: Path | None) -> None:
-    if len(points) < LEAST_POINTS:
-        raise InputError(path, "", f"expected {LEAST_POINTS} points or more, got {len(points)}")
-    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spans[2] <= FLAT * spans[0]:
-        raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")
 
 
 def _start(points: Array) -> tuple[Array, float]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from pydantic import BaseModel
 
 from ...materials.law import HypoelasticLaw
-from ..kinds import Candidate, Kind, MakeSolver, Place, Planning, Predicted, Studied
+from ..kinds import Kind, MakeSolver, Predicted, Studied
 from .prepared import PreparedBiaxial, candidates
 from .section import BiaxialSection
 from .test import BiaxialTest, read
@@ -23,21 +21,15 @@ class Biaxial:
     fitted: bool = True
     predicted: Predicted | None = None
     doubts: tuple[str, ...] = ("strain-unit", "load-unit", "ratio", "modulus", "swapped")
+    read = staticmethod(read)
+    candidates = staticmethod(candidates)
     studied: Studied | None = None
-
-    def read(self, section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-        """Read the section of a test, and its files."""
-        return read(section, place, name)
 
     def prepare(
         self, test: BiaxialTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedBiaxial:
         """Return the test, which was read with its data."""
         return PreparedBiaxial(test)
-
-    def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Return single ratios, up to the strains that the law is known for."""
-        return candidates(planning)
 
 
 KIND: Kind = Biaxial()

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from ..kinds import Place
 from .predicted import STUDIED, CylinderPredicted
 from .section import CylinderSection
-from .test import CylinderTest, read
-
-__all__ = ["KIND", "CylinderKind"]
+from .test import read
 
 
 class CylinderKind:
@@ -20,10 +17,7 @@ class CylinderKind:
     fitted = False
     predicted = CylinderPredicted()
     studied = STUDIED
-
-    def read(self, section: CylinderSection, place: Place, name: str) -> CylinderTest:
-        """Read the section of a test."""
-        return read(section, place, name)
+    read = staticmethod(read)
 
 
 KIND = CylinderKind()

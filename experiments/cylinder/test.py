@@ -124,11 +124,11 @@ class CylinderTest:
     def model(self, thickness: float | None = None) -> CylinderModel:
         """Return the model with a fabric of this thickness (mm), else of the project's."""
         thick = self.place.fabric.thickness if thickness is None else thickness
-        shape = self.size, self.length, self.seam_width
-        bending = self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp
         return inflated_cylinder(
-            self.diameter, self.pressure, thick, *shape, *bending, self.gas, self.reading
-        )
+            self.diameter, self.pressure, thick, self.size, self.length, self.seam_width,
+            self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp, self.gas,
+            self.reading,
+        )  # fmt: skip
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
@@ -140,7 +140,7 @@ class CylinderTest:
             problem = "the cylinder's steps are divided, never joined: use --coarser 0"
             raise InputError(None, "increments", problem)
         model, parts = self.model(thickness), int(factor)
-        finer = {}
+        finer: dict[str, Any] = {}
         for name in ("inflation", "increments"):
             ends = pairwise((0.0, *getattr(model, name)))
             steps = [np.linspace(a, b, parts + 1)[1:] for a, b in ends]

@@ -383,7 +383,8 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     listed = listed_files(place, data, folder)
     missing = next((file for file in listed if not is_file(file.path)), None)
     if missing is not None:
-        if place.need_data or not _complete(tables):
+        lengths = [x for t in tables.values() for x in (t.gauge_length, t.final_length)]
+        if place.need_data or not lengths or None in lengths:
             problem = f"there is no file {missing.path}; --data DIR names another folder"
             raise place.error(missing.field, problem)
         length = place.scales.length
@@ -406,11 +407,6 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     return strips
 
 
-def _complete(tables: Mapping[str, GaugeSection]) -> bool:
-    lengths = [(t.gauge_length, t.final_length) for t in tables.values()]
-    return bool(lengths) and all(a is not None and b is not None for a, b in lengths)
-
-
 def _published(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
 ) -> dict[str, Strip]:
@@ -423,8 +419,8 @@ def _published(
         start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
         end = curve.final_length if own.final_length is None else own.final_length * length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
-        data_of = {"polynomial": curve.polynomial, "scatter": scatter, "published": file.path}
-        strips[direction] = _strip(place, direction, start, end, **data_of)
+        known = {"scatter": scatter, "published": file.path}
+        strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
     return strips
 
 

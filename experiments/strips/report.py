@@ -162,8 +162,11 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
             ).scores
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
-        columns = zip(*((s.order, s.rmse, s.left_out) for s in scores), strict=True)
-        panels.append(OrderErrors(strip.direction, *map(list, columns), strip.polynomial.order))
+        orders, rms, left_out = (
+            [getattr(s, n) for s in scores] for n in ("order", "rmse", "left_out")
+        )
+        order = strip.polynomial.order
+        panels.append(OrderErrors(strip.direction, orders, rms, left_out, order))
     if panels:
         plot_orders(picture, panels)
     return bool(panels)
@@ -292,13 +295,13 @@ def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
     lines = []
     for name, card in cards.items():
         parts = []
-        for direction, told in card["directions"].items():
-            if "failed" in told:
-                parts.append(f"{direction} failed")
-            elif told["rms_N"] is None:
-                parts.append(f"{direction} {told['end_load_N']:.4g} N at the end")
-            else:
-                parts.append(f"{direction} {told['rms_N']:.4g} N to {told['shown_to_mm']:.3g} mm")
+        for direction, numbers in card["directions"].items():
+            words = "failed"
+            if "failed" not in numbers:
+                words = f"{numbers['end_load_N']:.4g} N at the end"
+                if numbers["rms_N"] is not None:
+                    words = f"{numbers['rms_N']:.4g} N to {numbers['shown_to_mm']:.3g} mm"
+            parts.append(f"{direction} {words}")
         total = card["e_uniaxial_N"]
         words = "" if total is None else f"; sum {total:.4g} N"
         lines.append(f"{name}: RMS {', '.join(parts)}{words}")
