@@ -57,7 +57,8 @@ def command(
     same tests by `bubblefit fit`, and made into such constants by `bubblefit export`.
     """
     from ..experiments.biaxial.data import plain_ratio
-    from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of, write_tables
+    from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
+    from ..experiments.biaxial.report import write_tables
     from ..experiments.biaxial.test import BiaxialTest
     from ..experiments.kinds import Output
     from ..files import __version__

@@ -162,7 +162,12 @@ def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScat
     low = min(float(c.deflection[0]) for c in curves)
     high = max(float(c.deflection[-1]) for c in curves)
     grid = np.linspace(low, high, places)
-    loads = np.array([np.interp(grid, *_single(c), left=np.nan, right=np.nan) for c in curves])
+    each = []
+    for c in curves:  # without repeats, with the mean load of each deflection
+        x, which = np.unique(c.deflection, return_inverse=True)
+        mean = np.bincount(which, c.load) / np.bincount(which)
+        each.append(np.interp(grid, x, mean, left=np.nan, right=np.nan))
+    loads = np.array(each)
     there = np.isfinite(loads)
     count = there.sum(axis=0)
     total = np.where(there, loads, 0.0).sum(axis=0)
@@ -191,8 +196,3 @@ def model_error(
     return BendingError(
         rms, float(off.mean()), rms / largest, int(inside.sum()), int((way > x[-1]).sum())
     )
-
-
-def _single(curve: BendingCurve) -> tuple[Array, Array]:
-    x, whose = np.unique(curve.deflection, return_inverse=True)
-    return x, np.bincount(whose, curve.load) / np.bincount(whose)

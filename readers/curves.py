@@ -28,7 +28,7 @@ from .registry import read_file
 
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 
-#: Directions in which a strip can be pulled, in the order in which they are told.
+#: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
 
 #: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
@@ -67,10 +67,7 @@ class LoadCurve:
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
-
-    Raises InputError: a name that is not among them.
-    """
+    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`."""
     plain = re.sub(r"[\W_]+", "", name.casefold())
     if plain not in DIRECTION_ALIASES:
         known = ", ".join(DIRECTION_ALIASES)
@@ -229,11 +226,7 @@ class LoadPolynomial:
 def fit_load_polynomial(
     elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
 ) -> LoadPolynomial:
-    """Fit a polynomial to the points (n,) mm and (n,) N by least squares.
-
-    Raises InputError: an order out of range; points that are not finite, too few, or too close
-    together for the order; loads that are all the same.
-    """
+    """Fit a polynomial to the points (n,) mm and (n,) N by least squares."""
     u, f = checked_points(elongation, load)
     terms, scale, lowest = terms_of(u, order, through_origin)
     solution, _, rank, _ = np.linalg.lstsq(terms, f, rcond=1e-13)
@@ -268,10 +261,7 @@ class SpecimenScatter:
 def specimen_scatter(
     curves: LoadCurve | Sequence[LoadCurve], fitted: LoadPolynomial
 ) -> SpecimenScatter:
-    """Return the scatter of one or several curves about a polynomial.
-
-    Raises InputError: fewer than two points in all.
-    """
+    """Return the scatter of one or several curves about a polynomial."""
     each = [curves] if isinstance(curves, LoadCurve) else list(curves)
     left = [curve.load - fitted(curve.elongation) for curve in each]
     together = np.concatenate([*left, np.zeros(0)])
@@ -287,11 +277,7 @@ def specimen_scatter(
 
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
-    """Return the points as arrays (n,) mm and (n,) N.
-
-    Raises InputError: counts that differ, numbers that are not finite, no elongation, one load
-    only.
-    """
+    """Return the points as arrays (n,) mm and (n,) N, after checks of counts and values."""
     u, f = np.asarray(elongation, dtype=float), np.asarray(load, dtype=float)
     if u.ndim != 1 or u.shape != f.shape:
         problem = f"expected as many elongations as loads, got {u.size} and {f.size}"
@@ -306,10 +292,7 @@ def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array
 
 
 def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, int]:
-    """Return powers (n, terms) of u / scale, the scale, and the lowest power.
-
-    Raises InputError: an order out of range, or fewer points than coefficients.
-    """
+    """Return powers (n, terms) of u / scale, the scale, and the lowest power."""
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
     lowest, scale = int(through_origin), float(np.abs(u).max())
@@ -338,9 +321,6 @@ class PublishedPolynomial:
 def read_published_polynomials(
     path: Path | str, format: str | None = None
 ) -> dict[str, PublishedPolynomial]:
-    """Read load polynomials by direction: N, of the full strip, over mm.
-
-    format : name of the file's format; found by its content unless given.
-    """
+    """Read load polynomials by direction: N, of the full strip, over mm."""
     polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
     return polynomials

@@ -92,13 +92,7 @@ def read_field(
 
 
 def field_of(frame: Frame, pressure: float, options: FrameOptions = PLAIN) -> DisplacementField:
-    """Return the field of a frame, at a pressure in MPa.
-
-    Points where a quantity is not a number, where correlation was lost, are dropped as the doubtful
-    ones are.
-
-    Raises InputError: no point is left.
-    """
+    """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.
     measured = bool(np.isfinite(z).any())

@@ -26,10 +26,7 @@ SECONDS = 60.0
 def check_readable(path: Path, read: Callable[[], object], seconds: float = SECONDS) -> None:
     """Try a reading in another process: HDF5 loops or crashes on some damaged files.
 
-    read : what is about to be done, picklable where processes are spawned; what it raises is left
-    to the caller's own reading.
-
-    Raises InputError: it does not come to an end.
+    read : what is about to be done, picklable; what it raises is left to the caller's own reading.
     """
     if not ends(read, seconds):
         problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
@@ -59,10 +56,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
 
 def member(path: Path, group: Any, name: str) -> Any:
-    """Return the object below a group by its path; None where there is none.
-
-    Raises InputError: a link to another file.
-    """
+    """Return the object below a group by its path; None where there is none."""
     import h5py
 
     here = group

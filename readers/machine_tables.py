@@ -51,11 +51,7 @@ class MachineTable:
 def read_machine_table(
     path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
 ) -> MachineTable:
-    """Read the first table with a column of each quantity that `options` ask for.
-
-    format : its name (`registry.format_names("machine table")`); found by content unless given.
-    Raises InputError: no such file or table, a format that cannot be told.
-    """
+    """Read the first table with a column of each quantity that `options` ask for."""
     table: MachineTable = read_file("machine table", path, format, options)
     return table
 

@@ -235,10 +235,7 @@ class ClockOffset:
 def given_offset(
     offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> ClockOffset:
-    """Return the pressures of frames by a clock offset (s) that is known; else as `find_offset`.
-
-    Raises InputError: no frame lies within the log.
-    """
+    """Return the pressures of frames by a clock offset (s) that is known; else as `find_offset`."""
     there = log_at(offset, times, log_times, pressures)
     if not np.isfinite(there).any():
         problem = (
@@ -252,11 +249,7 @@ def given_offset(
 
 
 def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
-    """Return the offset at which heights rise with the pressures.
-
-    Raises InputError: too few frames, a short log; heights that follow the pressures at no offset;
-    offsets that do equally well and give other pressures.
-    """
+    """Return the offset at which heights rise with the pressures; one that is certain."""
     known = np.isfinite(heights)
     if known.sum() < LEAST_FRAMES:
         problem = f"{known.sum()} frames are too few to find it by; give it in s"

@@ -24,7 +24,7 @@ from ..reading import check_regular
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
 #: machine table : `read(path, machine_tables.TableOptions)`, a `machine_tables.MachineTable`, from
 #:     which load curves, loads and bending curves are taken alike;
-#: load polynomials : `read(path)`, `published_polynomials.PublishedPolynomial` by direction.
+#: load polynomials : `read(path)`, `curves.PublishedPolynomial` by direction.
 Content = Literal["frame", "machine table", "load polynomials"]
 
 #: How much of a file a format may look at to recognise it, bytes.

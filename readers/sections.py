@@ -25,7 +25,7 @@ PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1
 #: mm per unit.
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0}
 
-#: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
+#: Beyond, products of a few numbers overflow.
 HUGE = 1e18
 
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
@@ -80,11 +80,11 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         table = field is not None and next(_sections(field.annotation), None) is not None
         return f"this {'section' if table else 'key'} is missing; add it"
     if kind == "extra_forbidden":
-        table = file
+        holder = file
         for part in location[:-1]:
             if isinstance(part, str):  # a number counts the tables of a list
-                table = next(_sections(table.model_fields[part].annotation))
-        known = list(table.model_fields)
+                holder = next(_sections(holder.model_fields[part].annotation))
+        known = list(holder.model_fields)
         near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
         meant = f"did you mean {near[0]!r}? " if near else ""
         return f"unknown key; {meant}allowed here: {', '.join(known)}"

@@ -61,10 +61,7 @@ class DisplacementSurface:
 
 
 def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
-    """Fit Eq. 4.4, of any degree, to a displacement field by least squares.
-
-    Raises InputError: a degree out of range, or points too few or too regularly placed for it.
-    """
+    """Fit Eq. 4.4, of any degree, to a displacement field by least squares."""
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
     terms, count = (degree + 1) ** 2, len(field.points)
@@ -113,14 +110,12 @@ def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
         problem = "expected three rows a pressure, in the order x, y, z"
         raise InputError(table.path, "column 'direction'", problem)
     each = [np.arange(len(direction)) // 3 == k for k in range(len(direction) // 3)]
-    return tuple(_read(table.rows(rows)) for rows in each)
+    return tuple(_surface_of(table.rows(rows)) for rows in each)
 
 
-def _read(table: TextTable) -> DisplacementSurface:
-    """Return the surface of three rows."""
-    pressure, degree, scale = (
-        table.constant(name) for name in ("pressure_MPa", "degree", "scale_mm")
-    )
+def _surface_of(table: TextTable) -> DisplacementSurface:
+    names = ("pressure_MPa", "degree", "scale_mm")
+    pressure, degree, scale = (table.constant(name) for name in names)
     at = f"line {table.lines[0]}"
     if degree not in range(MAX_DEGREE + 1):
         raise InputError(table.path, at, f"expected a degree 0 to {MAX_DEGREE}, got {degree:g}")
@@ -199,8 +194,6 @@ def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
 
     Points farther off than four robust standard deviations are left out, until those kept stay the
     same.
-
-    Raises InputError: too few points, points in a plane.
     """
     if len(points) < LEAST_POINTS:
         problem = f"expected {LEAST_POINTS} points or more, got {len(points)}"

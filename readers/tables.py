@@ -1,4 +1,4 @@
-"""Comma-separated tables whose every complaint names the file, the column and the line."""
+"""Comma-separated tables; errors name the file, the column and the line."""
 
 from __future__ import annotations
 

@@ -331,7 +331,7 @@ def _slow(
         rows.append((row + [""] * width)[:width])
     names = [heading.name for heading in layout.headings]
     lines = np.array([number for number, _ in layout.body])
-    # By position: names may appear twice where nobody asks for them.
+    # By position: names may appear twice where they are not asked for.
     cells = pd.DataFrame(rows, dtype=str)
     good = np.ones(len(rows), dtype=bool)
     for i, values in flags:

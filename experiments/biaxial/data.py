@@ -126,18 +126,15 @@ def read_biaxial_table(
     ratio = None
     if column["ratio"]:
         cells, lines = found.table.text(column["ratio"]), found.table.lines
-        ratio = tuple(
-            _ratio(path, f"line {line}, column {column['ratio']!r}", cell)
-            for line, cell in zip(lines, cells, strict=True)
-        )
+        names = []
+        for line, cell in zip(lines, cells, strict=True):
+            try:
+                names.append(plain_ratio(cell))
+            except InputError as error:
+                at = f"line {line}, column {column['ratio']!r}"
+                raise InputError(path, at, error.problem) from None
+        ratio = tuple(names)
     return BiaxialTable(path, load, strain, ratio, found.table.lines, source)
-
-
-def _ratio(path: Path, at: str, cell: str) -> str:
-    try:
-        return plain_ratio(cell)
-    except InputError as error:
-        raise InputError(path, at, error.problem) from None
 
 
 #: Of the range of loads of a phase: a smaller turn is none.
@@ -178,18 +175,16 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
     cycles: list[Cycle] = []
     for label, start, stop in _stretches(len(larger), labels):
         for first, last in _loadings(larger[start:stop]):
-            ratio = label or nearest_ratio(load[start + last] - _base(load, start + first))
-            same = bool(cycles) and cycles[-1].ratio == ratio
-            before = cycles[-1] if cycles else None
-            phase = 1 if before is None else before.phase + (0 if same else 1)
-            number = before.number + 1 if before is not None and same else 1
+            # A prestress has no ratio of its own: what is below it does not count.
+            own = np.asarray(load[start + first])
+            ratio = label or nearest_ratio(load[start + last] - np.minimum(own, own.min()))
+            phase, number = 1, 1
+            if cycles:
+                same = cycles[-1].ratio == ratio
+                phase = cycles[-1].phase + (0 if same else 1)
+                number = cycles[-1].number + 1 if same else 1
             cycles.append(Cycle(ratio, phase, number, len(cycles) + 1, start + first, start + last))
     return cycles
-
-
-def _base(load: Array, row: int) -> Array:
-    """Return the load below which nothing counts: a prestress has no ratio of its own."""
-    return np.asarray(np.minimum(load[row], load[row].min()))
 
 
 def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | None, int, int]]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,8 +31,6 @@ from ...materials.designers import (
     spread_of,
 )
 from ...notes import Note, NoteKind, rows
-from ...reports.biaxial import BiaxialPanel, plot_biaxial
-from ...writing import replacing
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialData, BiaxialTest
@@ -83,7 +80,7 @@ def kept_strains(data: BiaxialData) -> tuple[KeptStrain, ...]:
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
 WIDE = 1.1
-#: Of what a spread is told.
+#: Constants and their names.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "nu fill"}
 
 
@@ -294,26 +291,3 @@ def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
         "spread": {name: list(ends) for name, ends in found.spread.items()},
         "notes": rows(found.notes),
     }
-
-
-def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
-    """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
-    written = []
-    for name, table in (
-        ("constants.csv", option_table(found)),
-        ("lines.csv", line_table(found)),
-        ("kept.csv", kept_table(found)),
-    ):
-        with replacing(folder / (prefix + name)) as path:
-            table.to_csv(path, index=False, float_format="%.9g")
-        written.append(folder / (prefix + name))
-    panels = []
-    for measured in found.paths:
-        load = measured.load
-        strain = PERCENT * found.chosen.constants.strain(load - load[0])
-        curves = (("constants", measured.larger, strain),)
-        panels.append(
-            BiaxialPanel(measured.ratio, measured.larger, PERCENT * measured.since, curves)
-        )
-    written.append(plot_biaxial(folder / f"{prefix}constants.png", panels))
-    return written

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from ...reports.content import Exhibit, Table
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
 from .data import BiaxialPath
+from .evaluation import BiaxialEvaluation, kept_table, line_table, option_table
 from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
@@ -109,11 +111,11 @@ def simulate(
         for name, card in cards.items()
     }
     _write_paths(test, found, out)
-    told: dict[str, Any] = {name: {"ratios": {}} for name in cards}
+    numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
     for (name, ratio), one in found.items():
-        told[name]["ratios"][ratio] = _loading_numbers(one)
+        numbers[name]["ratios"][ratio] = _loading_numbers(one)
     figures = [(out.name("paths.png"), "Strain over the larger load")]
-    return Simulation({"cards": told}, _lines_of_cards(found), figures)
+    return Simulation({"cards": numbers}, _lines_of_cards(found), figures)
 
 
 def _loading(
@@ -273,3 +275,26 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
                 )
             )
     return pd.concat(parts, ignore_index=True)
+
+
+def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
+    """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
+    written = []
+    for name, table in (
+        ("constants.csv", option_table(found)),
+        ("lines.csv", line_table(found)),
+        ("kept.csv", kept_table(found)),
+    ):
+        with replacing(folder / (prefix + name)) as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+        written.append(folder / (prefix + name))
+    panels = []
+    for measured in found.paths:
+        load = measured.load
+        strain = PERCENT * found.chosen.constants.strain(load - load[0])
+        curves = (("constants", measured.larger, strain),)
+        panels.append(
+            BiaxialPanel(measured.ratio, measured.larger, PERCENT * measured.since, curves)
+        )
+    written.append(plot_biaxial(folder / f"{prefix}constants.png", panels))
+    return written

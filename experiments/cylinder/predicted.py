@@ -481,6 +481,10 @@ def _point(point: Point | None) -> dict[str, float | None]:
 class CylinderPredicted:
     """Predictions of cylinders."""
 
+    arrays = staticmethod(arrays_of)
+    early = staticmethod(early_end)
+    outcome = CylinderOutcome
+
     def depends_on(self, model: CylinderModel) -> Sequence[object]:
         """Return all of a model that its result depends on."""
         mesh = model.mesh
@@ -489,20 +493,9 @@ class CylinderPredicted:
             model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
         )  # fmt: skip
 
-    def arrays(self, model: CylinderModel, history: History) -> Mapping[str, Array]:
-        """Return the arrays of a history that are stored."""
-        return arrays_of(model, history)
-
-    def early(self, model: CylinderModel, history: History) -> str:
-        return early_end(model, history)
-
     def measured(self, test: CylinderTest) -> bool:
         """Return whether a test has measured loads."""
         return bool(test.measured)
-
-    def outcome(self, runs: Sequence[PredictedRun]) -> CylinderOutcome:
-        """Return the results of runs."""
-        return CylinderOutcome(runs)
 
 
 def deflection_curve(model: CylinderModel, history: History) -> tuple[Array, Array]:

@@ -278,9 +278,9 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
         lines.append(f"The solver's answer lies between walls ({ends}).")
     for words in dict.fromkeys(words for test in tests for words in test.assumed):
         own = [test for test in tests if words in test.assumed]
-        told = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
+        sizes = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
         of = "" if len(own) == len(tests) else f" for {', '.join(t.name for t in own)}"
-        size = f" ({', '.join(told)})" if told else ""
+        size = f" ({', '.join(sizes)})" if sizes else ""
         lines.append(f"Assumed{of}, as the project does not say: the usual {words}{size}.")
     return lines
 

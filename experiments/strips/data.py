@@ -356,11 +356,11 @@ class Strip:
             return np.empty(0), np.empty(0), np.empty(0, np.intp)
         elongation = np.concatenate([c.elongation for c in self.curves])
         load = np.concatenate([c.load for c in self.curves])
-        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
+        owners = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
         end = self.elongation * (1 + 1e-9)
         order = np.argsort(elongation, kind="stable")
         order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
-        return elongation[order], load[order], whose[order].astype(np.intp)
+        return elongation[order], load[order], owners[order].astype(np.intp)
 
 
 #: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
@@ -369,7 +369,7 @@ EXTRAPOLATED = 0.05
 
 
 def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
-    """Read the strips of a section, by direction: those whose table or whose data are there.
+    """Read the strips of a section, by direction: those with a table or data.
 
     Missing files are no error where the place needs none and all lengths are given.
     """

@@ -48,7 +48,7 @@ class Surface:
 def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
     """Triangulate a frame; None where fewer than three points, or a line, were correlated.
 
-    before : a surface whose triangles are taken where the reference points are the same:
+    before : a surface; its triangles are taken where the reference points are the same:
     triangulating is what costs.
     """
     from scipy.spatial import Delaunay, QhullError
@@ -407,10 +407,7 @@ class GaugeTable:
         return table
 
     def write(self, path: Path | str) -> None:
-        """Write the table with its notes; with loads, strips of a project read it as a curve.
-
-        Raises OutputError: it cannot be written; what was there is still there.
-        """
+        """Write the table with its notes; with loads, strips of a project read it as a curve."""
         ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
         about = (
             f"# virtual strain gauge between {ends[0]} and {ends[1]} mm,"

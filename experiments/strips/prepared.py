@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 class LoadObjective:
     """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
 
-    increments : (frames,) mm of the model, whose load is interpolated by a cubic spline from the
+    increments : (frames,) mm of the model; its load is interpolated by a cubic spline from the
     origin. elongation, load : (n,) mm, N, measured. scale : N: 1 for errors in N (Eq. 3.7), the
     largest load for relative errors. least_noise, noise_is : N, and its origin. alike : number of
     loads that err as one, at least. specimens : (n,) number of each load's specimen.
@@ -132,7 +132,7 @@ class LoadObjective:
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
 #: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_certainty.py strips).
 PLACES = 1.25
-#: Specimens behind a polynomial of which nobody says it: as many as ISO 1421 asks for.
+#: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
 SPECIMENS = 5
 #: Distances along a curve, up to its whole length, at which loads are compared: a specimen may have
 #: ten of them.
@@ -311,11 +311,11 @@ class PreparedStrips:
         test, strip = self.test, self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
         alike = loads_alike(strip, len(load), test.noise, test.specimens)
-        whose = strip.specimen_of if test.match_by == "points" else None
+        owners = strip.specimen_of if test.match_by == "points" else None
         mask = masks.get(self.part(direction))
         if mask is not None:
             elongation, load = elongation[mask], load[mask]
-            whose = None if whose is None else whose[mask]
+            owners = None if owners is None else owners[mask]
         largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
@@ -323,7 +323,7 @@ class PreparedStrips:
         weight = share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
         return LoadObjective(
-            model.elongations, elongation, load, scale, weight, *noise, alike, whose
+            model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
     def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
@@ -369,5 +369,5 @@ def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
     names = [strip.curves[number].specimen for number in numbers]
     if len(set(names)) < len(names):  # files may name theirs alike
         names = [str(number + 1) for number in numbers]
-    whose = strip.specimen_of
-    return {f"specimen {name}": whose != n for name, n in zip(names, numbers, strict=True)}
+    owners = strip.specimen_of
+    return {f"specimen {name}": owners != n for name, n in zip(names, numbers, strict=True)}

@@ -154,8 +154,8 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
     for strip in strips:
         if strip.polynomial is None:
             continue
-        whose = strip.specimen_of.tolist()
-        specimens = whose if len(set(whose)) > 1 else None
+        owners = strip.specimen_of.tolist()
+        specimens = owners if len(set(owners)) > 1 else None
         try:
             scores = compare_orders(
                 *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
@@ -214,10 +214,10 @@ def simulate(
         (name, direction): _pull(test, cards[name], direction, run, within_range)
         for (name, direction), run in runs.items()
     }
-    told = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
+    numbers = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
     _write_loads(test, list(cards), pulls, out)
     figures = [(out.name("loads.png"), "Load over gauge elongation")]
-    return Simulation({"cards": told}, _lines_of_cards(told), figures)
+    return Simulation({"cards": numbers}, _lines_of_cards(numbers), figures)
 
 
 def _pull(

@@ -7,7 +7,7 @@ Source: the public readers of such files in crackpy (windows-1252, semicolons, p
 reference state and displacements, NaN since 2020), aramis_cdt (undeformed coordinates and
 displacements as exports of their own) and pypif (two lines of title, units in square brackets). The
 German headings (`Verschiebung X`), the row of units and the decimal comma could not be confirmed
-from a file; the words in `frame_headings` stand for them. What is called "deformed" or "verformt"
+from a file; the words in `frames` stand for them. What is called "deformed" or "verformt"
 is taken for a place after the motion, all else for one before it.
 """
 

@@ -29,6 +29,7 @@ Rows = list[tuple[int, list[str]]]
 
 SEPARATORS = ("\t", ";", ",")
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
+_LETTERS = re.compile(r"[^\W\d_]")
 _LETTER = re.compile(r"[^\W\d_eE]")
 
 
@@ -103,7 +104,9 @@ def find_blocks(
         line, names = rows[head]
         needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
         units, body = {name: split_unit(name)[1] for name in names}, head + 1
-        if body < end and _is_unit_row(rows[body][1], needed):
+        below = rows[body][1] if body < end else []
+        letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
+        if letters and not any(_is_number(below, i) for i in needed):
             units |= _unit_row(path, rows[body], names, units)
             body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
@@ -120,12 +123,6 @@ def find_blocks(
 
 def _is_number(row: list[str], column: int) -> bool:
     return column < len(row) and is_number(row[column])
-
-
-def _is_unit_row(row: list[str], needed: list[int]) -> bool:
-    cells = [row[i] for i in needed if i < len(row)]
-    letters = [cell for cell in cells if re.search("[^\\W\\d_]", cell)]
-    return bool(letters) and not any(_is_number(row, i) for i in needed)
 
 
 def _unit_row(
@@ -169,7 +166,7 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     """Read the first table with a column of each of the quantities asked for.
 
     Raises InputError: no such table, nothing below it, two units for one column (also where its
-    names come again), rows longer than the header, a decimal mark that cannot be told from a mark
+    names come again), rows longer than the header, a decimal mark that may be a mark
     of thousands.
     """
     import pandas as pd

@@ -5,7 +5,7 @@
 
 Source: pyALDIC-3D's own export (tables.py) and reconstruction (points3D and X_mm are the places in
 the frame itself, displacements those since the first frame, NaN where correlation was lost; the
-left camera's axes, so that y points down and z away from it). Its .mat cannot be told from its
+left camera's axes, so that y points down and z away from it). Its .mat cannot be recognised by its
 names alone unless points3D is among them.
 """
 

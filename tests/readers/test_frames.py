@@ -1,7 +1,5 @@
 """Frames of a camera: rows, files, choice of frames, words of files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Values that files tell: units, columns, names, flags; each at its limit, each complaint whole."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

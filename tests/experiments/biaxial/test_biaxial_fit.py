@@ -1,7 +1,5 @@
 """Biaxial tests in fits: the law behind computed data, ratios foretold, what is said."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

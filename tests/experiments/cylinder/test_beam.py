@@ -1,7 +1,5 @@
 """The whole beam of a run that meshed a part of it, and where the bodies are."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -35,7 +33,7 @@ def run(m: CylinderModel) -> BendingRun:
     return ended
 
 
-def test_a_quarter_makes_the_whole_beam() -> None:
+def test_a_quarter_makes_the_whole_beam():
     whole, quarter = run(model("full")), run(model())
     beam, same = whole_beam(model(), quarter), whole_beam(model("full"), whole)
     for one, other in ((beam.bent, same.bent), (beam.inflated, same.inflated)):
@@ -53,7 +51,7 @@ def test_a_quarter_makes_the_whole_beam() -> None:
         )
 
 
-def test_bodies_touch_the_inflated_beam() -> None:
+def test_bodies_touch_the_inflated_beam():
     m = model()
     beam = whole_beam(m, run(m))
     bodies = bodies_of(m, beam, 30.0)
@@ -81,7 +79,7 @@ def test_bodies_touch_the_inflated_beam() -> None:
         ([[0.0, 20.0, 0.0], [0.0, -99.0, 250.0]], 10.0, -80.0),
     ],
 )
-def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float) -> None:
+def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float):
     """Beside a node that stands on a support 60 mm high."""
     rest = np.array([*points, [0.0, 60.0, 200.0]])
     made: Any = SimpleNamespace(
@@ -133,7 +131,7 @@ def length(line: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(line, axis=1), axis=0).sum())
 
 
-def test_the_dashed_outline_is_the_inflated_tube_from_the_side(beam: Drawn) -> None:
+def test_the_dashed_outline_is_the_inflated_tube_from_the_side(beam: Drawn):
     model, run, figure = beam
     lines = ("top_line", "bottom_line")
     expected = set().union(*(places(model, run.inflated, name, [2, 1]) for name in lines))
@@ -148,7 +146,7 @@ def test_the_dashed_outline_is_the_inflated_tube_from_the_side(beam: Drawn) -> N
         assert length(outline) == pytest.approx(around)
 
 
-def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(beam: Drawn) -> None:
+def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(beam: Drawn):
     model, run, figure = beam
     before, now = data(figure.axes[2])
     for ring, moved in ((before, run.inflated), (now, run.bent)):
@@ -160,7 +158,7 @@ def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(beam: Drawn) ->
     assert now[1].max() < before[1].max() - 200.0  # went down with the collar
 
 
-def test_the_colours_are_strains_along_the_axis_at_the_end(beam: Drawn) -> None:
+def test_the_colours_are_strains_along_the_axis_at_the_end(beam: Drawn):
     model, run, figure = beam
     strain = surface_strain(model.mesh, run.bent)[:, 0]
     at = model.mesh.points + run.bent
@@ -175,7 +173,7 @@ def test_the_colours_are_strains_along_the_axis_at_the_end(beam: Drawn) -> None:
     assert figure.axes[0].get_title("left") == "150 mm, 140 kPa"
 
 
-def test_supports_and_collar_stand_where_the_test_has_them(beam: Drawn) -> None:
+def test_supports_and_collar_stand_where_the_test_has_them(beam: Drawn):
     model, run, figure = beam
     inflated = model.mesh.points + run.inflated
     whole, _, cut, _ = figure.axes

@@ -1,9 +1,6 @@
 """Numbers of made-up runs of cylinders: in result.json, the table of runs and on the terminal."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -54,7 +51,7 @@ def run(name: str, card: str, early: str = "", *kinds: NoteKind):
     return SimpleNamespace(test=test, card=card, notes=notes, record=said, wall="")
 
 
-def test_numbers_for_result_json() -> None:
+def test_numbers_for_result_json():
     outcome = CylinderOutcome(())
     outcome.__dict__["measures"] = {0: MEASURES, 1: replace(MEASURES, limit=None, error=None)}
     found = outcome.numbers(0)
@@ -83,7 +80,7 @@ def test_numbers_for_result_json() -> None:
     assert outcome.error(0) == 0.0519 and outcome.error(1) is None and outcome.error(2) is None
 
 
-def test_a_row_of_the_table_of_runs() -> None:
+def test_a_row_of_the_table_of_runs():
     row = columns_of(MEASURES, ["20 mm", "a long way"])
     assert row == {
         "stiffness_N_per_mm": 4.256,
@@ -99,7 +96,7 @@ def test_a_row_of_the_table_of_runs() -> None:
     assert list(empty) == list(row) and set(empty.values()) == {None}
 
 
-def test_curves_and_readings() -> None:
+def test_curves_and_readings():
     """Lists of rows as they go into load_deflection.csv and measured.csv."""
     way = np.array([0.0, 30.0])
     read = [BendingCurve("a", way, np.array([0.0, 58.0])), BendingCurve("b", way, 2.0 * way)]
@@ -126,7 +123,7 @@ def test_curves_and_readings() -> None:
     assert list(curve_of(None).columns) == list(curve.columns) and len(curve_of(None)) == 0
 
 
-def test_the_terminals_table() -> None:
+def test_the_terminals_table():
     runs = [
         run("150/140", "soft", "", NoteKind.SNAP, NoteKind.GAS),
         run("200", "a stiff card"),
@@ -147,7 +144,7 @@ def test_the_terminals_table() -> None:
 
 
 @pytest.mark.parametrize(("limit", "knee", "word"), [(1, 1, "limit point"), (0, 1, "knee")])
-def test_what_buckling_is(limit: int, knee: int, word: str) -> None:
+def test_what_buckling_is(limit: int, knee: int, word: str):
     found = replace(
         MEASURES, limit=(9.0, 1.0) if limit else None, knee=(8.0, 2.0) if knee else None
     )
@@ -210,7 +207,7 @@ def outcome() -> CylinderOutcome:
     return found
 
 
-def test_every_cell(outcome: CylinderOutcome, tmp_path: Path, monkeypatch) -> None:
+def test_every_cell(outcome, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "draw_figures", lambda *_: [("a.png", "a picture")])
     monkeypatch.setattr(page, "write_beams", lambda *_: [("b.vtu", "a beam")])
     shown = page.show_outcome(outcome, Output(tmp_path / "out", "c/"))
@@ -277,9 +274,7 @@ def unbroken(row: list[object]) -> list[object]:
     return [c.replace("\u00a0", " ") if isinstance(c, str) else c for c in row]
 
 
-def test_without_readings_there_is_nothing_to_compare(
-    outcome: CylinderOutcome, tmp_path, monkeypatch
-):
+def test_without_readings_there_is_nothing_to_compare(outcome, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "draw_figures", lambda *_: [])
     monkeypatch.setattr(page, "write_beams", lambda *_: [])
     plain = CylinderOutcome(
@@ -304,7 +299,7 @@ def test_without_readings_there_is_nothing_to_compare(
         (((150.0, 20.0), (200.0, 20.00001)), "20 to 20 mm"),
     ],
 )
-def test_over_what_a_slope_is_taken(cases, words: str) -> None:
+def test_over_what_a_slope_is_taken(cases, words: str):
     tests = [
         case("a", diameter, reading=SimpleNamespace(places={}, slope_over=over))
         for diameter, over in cases
@@ -312,14 +307,14 @@ def test_over_what_a_slope_is_taken(cases, words: str) -> None:
     assert page._slopes(tests) == words
 
 
-def test_names_of_files_differ_whatever_the_tests_are_called() -> None:
+def test_names_of_files_differ_whatever_the_tests_are_called():
     found = figures.file_names(["150 mm, 90 kPa", "150 mm; 90 kPa", "150 MM 90 kpa", "???", "-x."])
     assert list(found.values()) == [
         "150-mm-90-kPa", "150-mm-90-kPa-2", "150-MM-90-kpa-3", "4", "x"
     ]  # fmt: skip
 
 
-def test_every_test_once(outcome: CylinderOutcome) -> None:
+def test_every_test_once(outcome):
     assert [test.name for test in figures.tests_of(outcome)] == ["150/90", "the wide one"]
 
 
@@ -328,7 +323,7 @@ READ = (BendingCurve("1", WAY, 2 * WAY), BendingCurve("2", WAY[:2], 2 * WAY[:2] 
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
+def drawn(monkeypatch) -> dict[str, list[Any]]:
     names = ("plot_bending", "plot_bending_cases", "plot_gas", "draw_beam", "write_beam")
     calls: dict[str, list[Any]] = {name: [] for name in names}
     for name in names:
@@ -347,7 +342,7 @@ def outcome_figures(*runs: Any, bent: tuple[int, ...]) -> CylinderOutcome:
     return found
 
 
-def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
+def test_figures_of_every_test(tmp_path, drawn):
     first, second = case("a b", measured=READ), case("a/b", 200.0)
     failed = case("broken")
     found = outcome_figures(
@@ -388,7 +383,7 @@ def test_figures_of_every_test(tmp_path: Path, drawn) -> None:
     assert [panel.title for panel in laid] == ["a b", "broken", "a/b", ""]
 
 
-def test_one_test_has_no_figure_of_all(tmp_path: Path, drawn) -> None:
+def test_one_test_has_no_figure_of_all(tmp_path, drawn):
     both = outcome_figures(run_page(case("a"), "soft"), run_page(case("b"), "soft"), bent=(0,))
     assert len(figures.draw_figures(both, Output(tmp_path))) == 2
     assert not drawn["plot_bending_cases"]
@@ -405,14 +400,14 @@ def test_one_test_has_no_figure_of_all(tmp_path: Path, drawn) -> None:
         ((150.0,), [1]),
     ],
 )
-def test_rows_of_a_figure_of_all(diameters: tuple[float, ...], rows: list[int]) -> None:
+def test_rows_of_a_figure_of_all(diameters: tuple[float, ...], rows: list[int]):
     tests: Any = [case(str(k), diameter) for k, diameter in enumerate(diameters)]
     found = figures._rows(tests)
     assert [len(row) for row in found] == rows
     assert sorted(test.name for row in found for test in row) == [t.name for t in tests]
 
 
-def test_beams_for_paraview(tmp_path: Path, drawn) -> None:
+def test_beams_for_paraview(tmp_path, drawn):
     first = case("a b")
     found = outcome_figures(
         run_page(first, "soft card"),
@@ -444,9 +439,7 @@ def outcome_band() -> CylinderOutcome:
     return found
 
 
-def test_every_row_says_which_wall(
-    outcome_band: CylinderOutcome, tmp_path: Path, monkeypatch
-) -> None:
+def test_every_row_says_which_wall(outcome_band, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "draw_figures", lambda *_: [])
     monkeypatch.setattr(page, "write_beams", lambda *_: [])
     shown = page.show_outcome(outcome_band, Output(tmp_path))
@@ -469,7 +462,7 @@ def test_every_row_says_which_wall(
     assert curves["load_N"].tolist() == [*LOAD, *1.5 * LOAD, *LOAD]
 
 
-def test_the_terminal_says_which_wall(outcome_band: CylinderOutcome) -> None:
+def test_the_terminal_says_which_wall(outcome_band):
     head, *rows = outcome_band.lines()
     assert head.startswith("test    card  wall         N/mm   buckles at")
     assert [row[: head.index("N/mm") - 2].rstrip() for row in rows] == [
@@ -480,8 +473,8 @@ def test_the_terminal_says_which_wall(outcome_band: CylinderOutcome) -> None:
 
 
 def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
-    outcome_band: CylinderOutcome, tmp_path: Path, monkeypatch
-) -> None:
+    outcome_band, tmp_path, monkeypatch
+):
     panels: list[BendPanel] = []
     monkeypatch.setattr(figures, "plot_bending", lambda path, panel: panels.append(panel))
     monkeypatch.setattr(figures, "plot_gas", lambda *_: None)

@@ -1,9 +1,5 @@
 """What strips, and a bubble, determine of the moduli."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from bubblefit.experiments.strips.data import Strip
@@ -20,7 +16,7 @@ from ...projects import constant_strips
 from .problems import CONSTANT, CONSTANTS, CUBIC, LAW, STRIPS, joint, near, strips
 
 
-def test_certainty_predicts_the_scatter_of_noisy_strip_fits() -> None:
+def test_certainty_predicts_the_scatter_of_noisy_strip_fits():
     """Sigma is the scatter of linear estimates from drawn noise; a real fit goes where they do."""
     noise, moduli = 5.0, np.array([20.0, 200.0, 500.0])
     fit, truth = strips(CONSTANTS, CONSTANT, noise=noise, seed=1), near(CONSTANTS, CONSTANT, 1.0)
@@ -37,7 +33,7 @@ def test_certainty_predicts_the_scatter_of_noisy_strip_fits() -> None:
     assert np.abs(off / scatter).max() < 0.05
 
 
-def test_what_each_data_set_pins_down() -> None:
+def test_what_each_data_set_pins_down():
     fit = joint(noise=10.0, bubble_noise=0.1)
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
     reached, noise = np.array([0.1, 0.1, 0.3]), Noise.of(fit, point.residual).rows
@@ -72,18 +68,18 @@ def strip(loads: np.ndarray) -> Strip:
     return Strip("warp", 20.0, 23.0, polynomial, tuple(curves), scatter)
 
 
-def test_specimens_that_differ_by_a_factor_count_as_specimens() -> None:
+def test_specimens_that_differ_by_a_factor_count_as_specimens():
     factors = np.array([0.9, 0.97, 1.0, 1.02, 1.11])
     assert independent_loads(strip(factors[:, None] * WHOLE)) == pytest.approx(4.0, rel=1e-6)
 
 
-def test_loads_that_err_by_themselves_count_by_themselves() -> None:
+def test_loads_that_err_by_themselves_count_by_themselves():
     random = np.random.default_rng(4)
     noise = 5.0 * random.standard_normal((6, len(WHOLE)))
     assert independent_loads(strip(WHOLE + noise)) > 0.6 * 5 * len(WHOLE)
 
 
-def test_sigma_is_the_scatter_of_what_specimens_say() -> None:
+def test_sigma_is_the_scatter_of_what_specimens_say():
     """Of 300 sets of five specimens, each stiffer by its own factor and a little uneven."""
     random = np.random.default_rng(6)
     shape = WHOLE / np.sqrt(WHOLE @ WHOLE)
@@ -100,7 +96,7 @@ def test_sigma_is_the_scatter_of_what_specimens_say() -> None:
     assert np.sqrt(np.mean(np.square(said))) == pytest.approx(np.std(found), rel=0.15)
 
 
-def test_what_nobody_knows() -> None:
+def test_what_nobody_knows():
     """One curve, or a polynomial: a few places of it; as many times as specimens are said."""
     one = strip(WHOLE[None] + 1.0)
     assert independent_loads(one) == PLACES and independent_loads(one, 4) == 3 * PLACES
@@ -116,7 +112,7 @@ def test_what_nobody_knows() -> None:
     assert independent_loads(strip(np.tile(WHOLE, (3, 1)))) >= 2.0
 
 
-def test_a_fit_reckons_with_specimens(tmp_path: Path) -> None:
+def test_a_fit_reckons_with_specimens(tmp_path):
     """Two specimens of constant moduli: all of their loads count as one."""
     project = read_project(constant_strips(tmp_path))
     one = project.tests["one"]

@@ -1,7 +1,5 @@
 """Fits to loads that a law gave, alone and beside a bubble, find the law."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -41,7 +39,7 @@ from .problems import (
 
 @pytest.mark.parametrize("number", range(3))
 @pytest.mark.parametrize("form", FORMS)
-def test_strips_find_the_law_that_made_them(form: str, number: int) -> None:
+def test_strips_find_the_law_that_made_them(form: str, number: int):
     unknowns, law = FORMS[form]
     fit = strips(unknowns, law)
     found = levenberg_marquardt(fit, feasible_start(fit, 2, number), 1e-7, 100)
@@ -52,7 +50,7 @@ def test_strips_find_the_law_that_made_them(form: str, number: int) -> None:
 
 
 @pytest.mark.parametrize("number", range(3))
-def test_bubble_and_strips_find_the_law_that_made_them(number: int) -> None:
+def test_bubble_and_strips_find_the_law_that_made_them(number: int):
     fit = joint()
     found = levenberg_marquardt(fit, feasible_start(fit, 2, number), 1e-9, 100)
     assert found is not None and found.value < 1e-7, found
@@ -60,7 +58,7 @@ def test_bubble_and_strips_find_the_law_that_made_them(number: int) -> None:
     assert max(error.values()) < 1e-4, error
 
 
-def test_offsets_of_the_bubble_are_found_beside_the_strips() -> None:
+def test_offsets_of_the_bubble_are_found_beside_the_strips():
     fit = joint(SHIFTED)
     shift, offset = np.array([0.2, -0.1, 0.8]), 0.003
     model = BUBBLE.with_parameters({"pressure_offset": offset})
@@ -73,7 +71,7 @@ def test_offsets_of_the_bubble_are_found_beside_the_strips() -> None:
 
 
 @pytest.mark.parametrize("method, share", [("slsqp", 0.05), ("cobyla", 1.0)])
-def test_other_methods_go_down_on_strips(method: str, share: float) -> None:
+def test_other_methods_go_down_on_strips(method: str, share: float):
     fit = strips()
     start = feasible_start(fit, 2, 0)
     first = fit.evaluate(start, False).value
@@ -81,7 +79,7 @@ def test_other_methods_go_down_on_strips(method: str, share: float) -> None:
     assert found is not None and found.value < share * first
 
 
-def test_a_warm_start_changes_nothing() -> None:
+def test_a_warm_start_changes_nothing():
     """The same residual on the way, and the same optimum at its end."""
     fit, cold = strips(), strips()
     cold.warm_starts = False
@@ -99,7 +97,7 @@ def test_a_warm_start_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_starts_have_moduli_between_the_bounds_and_the_box_holds_them(form: str) -> None:
+def test_starts_have_moduli_between_the_bounds_and_the_box_holds_them(form: str):
     unknowns, _ = FORMS[form]
     draws = draw(unknowns, np.random.default_rng(1), 4000)
     lower, upper = unknowns.box
@@ -127,7 +125,7 @@ def full(unknowns: Unknowns, coefficients: np.ndarray) -> np.ndarray:
     return beta
 
 
-def test_no_analysis_of_a_fit_leaves_the_bounds() -> None:
+def test_no_analysis_of_a_fit_leaves_the_bounds():
     """Also where the data ask for more: E1 at its upper, E2 at its lower bound."""
     ranges = {"E1": (100.0, 700.0), "E2": (150.0, 500.0), "G12": (5.0, 300.0)}
     tight = replace(CUBIC, bounds=LawBounds.of_moduli(ranges))
@@ -143,7 +141,7 @@ def test_no_analysis_of_a_fit_leaves_the_bounds() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_strips_keep_the_law_positive_definite(form: str) -> None:
+def test_strips_keep_the_law_positive_definite(form: str):
     """E1 E2 > (nu12 E2)^2 with the modulus across at zero strain, because a strip contracts."""
     unknowns, _ = FORMS[form]
     bounded = replace(unknowns, definite_nu12=0.4)
@@ -163,7 +161,7 @@ def test_strips_keep_the_law_positive_definite(form: str) -> None:
 
 
 @pytest.mark.parametrize("build", [strips, joint], ids=["strips", "joint"])
-def test_the_membrane_leads_another_solver_of_strips(build: Any) -> None:
+def test_the_membrane_leads_another_solver_of_strips(build: Any):
     fit = led(build())
     originals = [e.objective for e in fit.surrogate.comparisons]
     found = fit_from(fit, feasible_start(fit, 2, 1), FitOptions())
@@ -174,7 +172,7 @@ def test_the_membrane_leads_another_solver_of_strips(build: Any) -> None:
     assert [e.objective for e in fit.surrogate.comparisons] == originals
 
 
-def test_a_failed_run_of_a_strip_shortens_the_step() -> None:
+def test_a_failed_run_of_a_strip_shortens_the_step():
     fit = led(strips(), fails=(2,))
     told: list[tuple[float | None, str]] = []
     fit.watch = lambda y, value, status, solver: told.append((value, status))
@@ -183,7 +181,7 @@ def test_a_failed_run_of_a_strip_shortens_the_step() -> None:
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_a_test_that_fails_is_named_and_the_point_is_refused(number: int) -> None:
+def test_a_test_that_fails_is_named_and_the_point_is_refused(number: int):
     fit = joint()
     told: list[tuple[float | None, str]] = []
     fit.watch = lambda y, value, status, solver: told.append((value, status))
@@ -194,7 +192,7 @@ def test_a_test_that_fails_is_named_and_the_point_is_refused(number: int) -> Non
     assert fit.evaluate(y, True) is not None and fit.analyses == 2
 
 
-def test_a_single_strip_needs_no_name_in_its_failure() -> None:
+def test_a_single_strip_needs_no_name_in_its_failure():
     whole = strips()
     fit = FitProblem(whole.comparisons[:1], LAW, CUBIC)
     told: list[str] = []
@@ -204,14 +202,14 @@ def test_a_single_strip_needs_no_name_in_its_failure() -> None:
     assert told == ["on purpose"]
 
 
-def test_a_fit_steps_round_strips_that_fail() -> None:
+def test_a_fit_steps_round_strips_that_fail():
     fit = strips()
     fit.comparisons[2].solver = Failing([3, 5, 6])
     found = levenberg_marquardt(fit, feasible_start(strips(), 2, 0), 1e-7, 150)
     assert found is not None and found.value < 1e-5
 
 
-def test_strips_lead_into_a_joint_fit() -> None:
+def test_strips_lead_into_a_joint_fit():
     """First the strips alone, told as such and counted; then all tests from their optimum."""
     fit = joint(noise=5.0, bubble_noise=0.1, stages=True)
     told: list[tuple[float | None, str]] = []
@@ -230,7 +228,7 @@ def test_strips_lead_into_a_joint_fit() -> None:
     assert found.value == pytest.approx(direct.value, rel=1e-3)
 
 
-def test_a_joint_fit_starts_where_it_was_told_when_the_strips_lead_astray() -> None:
+def test_a_joint_fit_starts_where_it_was_told_when_the_strips_lead_astray():
     fit = joint(stages=True)
     start = near(CUBIC, LAW)
     fit.comparisons[0].solver = Failing([1])  # the bubble, at the optimum of the strips
@@ -240,7 +238,7 @@ def test_a_joint_fit_starts_where_it_was_told_when_the_strips_lead_astray() -> N
     assert (approach(joint(), start, METHODS["lm"], FitOptions()) == start).all()
 
 
-def test_the_surrogate_of_a_joint_fit_leads_in_too() -> None:
+def test_the_surrogate_of_a_joint_fit_leads_in_too():
     fit = led(joint(stages=True))
     told: list[tuple[str, str]] = []
     for problem in (fit, fit.surrogate):

@@ -1,7 +1,5 @@
 """Strips in a fit: comparisons, weights, folds; what a finished fit says, shows and writes."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,7 +32,7 @@ POINTS = ("[warp]", 'match = "points"\nincrements = 5\n[warp]')
 
 
 @pytest.fixture
-def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
+def published(tmp_path) -> Callable[..., PreparedStrips]:
     """The published polynomials, five increments."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
 
@@ -46,7 +44,7 @@ def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
 
 
 @pytest.fixture
-def exported(tmp_path: Path) -> Callable[..., PreparedStrips]:
+def exported(tmp_path) -> Callable[..., PreparedStrips]:
     """Measured points of one or two specimens a direction, five increments."""
     write_exports(tmp_path)
 
@@ -292,7 +290,7 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
     assert (min(told[0].rmse) < 1.0) == (not through_origin)
 
 
-def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path: Path) -> None:
+def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path):
     """Many specimens read at the same seven places settle no polynomial of order eight."""
     u = np.linspace(0.5, 3.5, 7)
     curves = tuple(LoadCurve("warp", s, u, 100 * u + i, None) for i, s in enumerate("abc"))
@@ -301,7 +299,7 @@ def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path: Path) -> 
     assert not (tmp_path / "orders.png").exists()
 
 
-def test_what_the_panels_of_loads_show() -> None:
+def test_what_the_panels_of_loads_show():
     """The polynomial from rest to the end of the model; points only where there are any."""
     u = np.linspace(0.5, 4.5, 9)
     polynomial = fit_load_polynomial(u, 100 * u + 3 * u**2)
@@ -333,7 +331,7 @@ def bias(*shear: float) -> tuple[Any, Any]:
     return SimpleNamespace(mesh=mesh, warp="warp"), SimpleNamespace(displacement=frames)
 
 
-def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> None:
+def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
     model, history = bias(0.9, 0.2, -0.3, 0.8)
     strain = np.column_stack([np.ones(4), np.ones(4), [0.9, 0.2, -0.3, 0.8]])
 
@@ -356,7 +354,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> Non
     assert more == {"cell_data": {"log_strain_1_2_12": strain}}
 
 
-def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> None:
+def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch):
     drawn: list[Any] = []
     monkeypatch.setattr(figures, "plot_moduli_together", lambda *what: drawn.append(what))
     law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), strain_range=np.full(3, 0.13))
@@ -375,7 +373,7 @@ def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> No
         np.testing.assert_allclose(y, law.modulus(name, x))
 
 
-def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeypatch) -> None:
+def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeypatch):
     told: list[Any] = []
     monkeypatch.setattr(figures, "plot_orders", lambda path, panels: told.extend(panels))
     test = exported(("[data]", "[data]\norder = 3")).test
@@ -398,7 +396,7 @@ def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeyp
     assert not figures.draw_orders(strips[1:2], Path("o.png"))
 
 
-def write_offset(folder: Path) -> None:
+def write_offset(folder: Path):
     """Two warp specimens that are pretensioned by 50 N."""
     u = np.linspace(0, 4, 21)
     for number, name in enumerate(("w1.csv", "w2.csv")):

@@ -1,9 +1,6 @@
 """[[strips]] of a project: units, defaults, data by direction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +15,7 @@ Edit = Callable[..., StripsTest]
 
 
 @pytest.fixture
-def small(tmp_path: Path) -> Edit:
+def small(tmp_path) -> Edit:
     """Read the small section beside its exports after replacing some texts."""
     write_exports(tmp_path)
 
@@ -29,7 +26,7 @@ def small(tmp_path: Path) -> Edit:
 
 
 @pytest.fixture
-def example(tmp_path: Path) -> Edit:
+def example(tmp_path) -> Edit:
     """Read the published polynomials after replacing some texts."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
 
@@ -269,7 +266,7 @@ TOP = "[warp]\n"
 
 
 @pytest.fixture
-def small_sections(tmp_path: Path) -> Callable[..., StripsTest]:
+def small_sections(tmp_path) -> Callable[..., StripsTest]:
     """Read the small_sections section beside its exports after replacing some texts."""
     write_exports(tmp_path)
 
@@ -409,7 +406,7 @@ def test_points_are_needed_where_they_are_to_be_matched(small_sections, tmp_path
     )
 
 
-def test_defaults() -> None:
+def test_defaults():
     said = StripsSection(data=CurvesSection())
     assert (said.bias_angle, said.increments) == (45.0, 100)
     assert (said.match, said.objective, said.weight) == ("polynomial", "N", 1.0)

@@ -1,7 +1,5 @@
 """What is told of strips whose numbers are known: findings, tables, cards side by side, noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -64,7 +62,7 @@ def findings(test: Any, strips: list[FittedStrip]) -> Any:
 BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
 
 
-def test_findings() -> None:
+def test_findings():
     test: Any = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
     found = findings(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
     rms = np.sqrt(12.5), np.sqrt(50.0)
@@ -96,7 +94,7 @@ def test_findings() -> None:
     assert [n.kind for n in findings(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
 
 
-def test_tables() -> None:
+def test_tables():
     both = [fitted(), fitted(BIAS, (200.0, 410.0))]
     table = misfit_table(both)
     assert table.header == [
@@ -122,7 +120,7 @@ def test_tables() -> None:
                                      pytest.approx(-4.0), "N"]  # fmt: skip
 
 
-def test_points_of_a_strip_and_those_left_out() -> None:
+def test_points_of_a_strip_and_those_left_out():
     elongation, load = WARP.points
     assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
     assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
@@ -139,7 +137,7 @@ def test_points_of_a_strip_and_those_left_out() -> None:
     assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.beyond == 0
 
 
-def test_lengths_and_noise_of_a_strip() -> None:
+def test_lengths_and_noise_of_a_strip():
     assert WARP.elongation == 4.0 and WARP.strain == pytest.approx(np.log(1.2))
     some = np.array([True, True, True, True, True, False])
     assert WARP.strain_by(some) == WARP.strain
@@ -153,7 +151,7 @@ def test_lengths_and_noise_of_a_strip() -> None:
     assert BIAS.break_shares() is None
 
 
-def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
+def test_breaks_of_a_strip_are_shares_of_its_strain():
     """A load that bends at a quarter and at two thirds of the strain, and one that is cut there."""
     strain = np.log1p(np.linspace(0, 4, 400) / 20.0)
     end = strain[-1]
@@ -165,7 +163,7 @@ def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
+def drawn(monkeypatch) -> dict[str, list[Any]]:
     calls: dict[str, list[Any]] = {"plot_loads": [], "draw_bias": []}
     for name, found in calls.items():
         monkeypatch.setattr(report, name, lambda *what, found=found: found.append(what))
@@ -181,7 +179,7 @@ def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = Fals
     return report.simulate(test, cards, runs, Output(folder), within)
 
 
-def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
+def test_cards_side_by_side(tmp_path, drawn):
     """The polynomial says 220 and 440 N at 2 and 4 mm."""
     broken = SolverFailure("no equilibrium", "membrane")
     said = told(tmp_path, {
@@ -221,7 +219,7 @@ def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
     assert [call[3].name for call in drawn["draw_bias"]] == ["bias-1.vtu", "bias-2.vtu"]
 
 
-def test_one_card_has_a_sum_and_files_without_a_number(tmp_path: Path, drawn) -> None:
+def test_one_card_has_a_sum_and_files_without_a_number(tmp_path, drawn):
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)})
     assert said.numbers["cards"]["soft"]["e_uniaxial_N"] == pytest.approx(np.sqrt(12.5))
     assert said.lines == ["soft: RMS warp 3.536 N to 4 mm; sum 3.536 N"]
@@ -237,8 +235,8 @@ def test_one_card_has_a_sum_and_files_without_a_number(tmp_path: Path, drawn) ->
     ],
 )  # fmt: skip
 def test_curves_end_where_the_range_of_the_card_does(
-    tmp_path: Path, drawn, monkeypatch: pytest.MonkeyPatch, strains, shown: int
-) -> None:
+    tmp_path, drawn, monkeypatch, strains, shown: int
+):
     """At the first increment nothing is strained, at the second so much."""
     strain = iter([np.zeros((1, 3)), np.array([strains])])
     monkeypatch.setattr(report, "middle_strain", lambda *_: next(strain))
@@ -253,7 +251,7 @@ def test_curves_end_where_the_range_of_the_card_does(
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
 
 
-def test_a_card_whose_range_ends_at_once(tmp_path: Path, drawn, monkeypatch) -> None:
+def test_a_card_whose_range_ends_at_once(tmp_path, drawn, monkeypatch):
     monkeypatch.setattr(report, "middle_strain", lambda *_: np.ones((1, 3)))
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     warp = said.numbers["cards"]["soft"]["directions"]["warp"]
@@ -266,7 +264,7 @@ WAY_EXAMINED = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
 LOAD = np.array([2.0, 50.0, 90.0, 160.0, 120.0])
 
 
-def test_every_cell(tmp_path: Path) -> None:
+def test_every_cell(tmp_path):
     curve = LoadCurve("warp", "W1", WAY_EXAMINED, LOAD, None)
     line = fit_load_polynomial(np.linspace(0, 6, 9), 30 * np.linspace(0, 6, 9), 1)
     test = SimpleNamespace(
@@ -296,7 +294,7 @@ LINEAR = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 
 
 @pytest.fixture
-def test(tmp_path: Path) -> StripsTest:
+def test(tmp_path) -> StripsTest:
     (tmp_path / "curves.csv").write_bytes((EXAMPLE / "curves.csv").read_bytes())
     return read(project_file(tmp_path, PUBLISHED, ("increments = 100", "increments = 10")))
 

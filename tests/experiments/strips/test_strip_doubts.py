@@ -1,7 +1,5 @@
 """Traps made from good load curves are named; good ones raise no doubt."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
