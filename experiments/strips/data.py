@@ -144,7 +144,7 @@ def _left_out_squares(rows: Array, left: Array) -> float:
 
 
 #: Places that a break may take between zero and the last strain.
-PLACES = 40
+BREAKS = 40
 
 
 def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
@@ -156,10 +156,10 @@ def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
     x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
     if len(x) < 5 or not x.max() > 0:
         raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
-    places = np.linspace(0.0, x.max(), PLACES + 2)[1:-1]
+    places = np.linspace(0.0, x.max(), BREAKS + 2)[1:-1]
     hinges = np.maximum(x[:, None] - places, 0.0)
     best, least = (places[0], places[-1]), np.inf
-    for a, b in itertools.combinations(range(PLACES), 2):
+    for a, b in itertools.combinations(range(BREAKS), 2):
         terms = np.stack([x, hinges[:, a], hinges[:, b]], axis=1)
         slopes, *_ = np.linalg.lstsq(terms, f, rcond=None)
         error = float(np.sum((terms @ slopes - f) ** 2))
