@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.experiments.biaxial.candidates import candidates as biaxial_candidates
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
+from bubblefit.experiments.biaxial.prepared import candidates as biaxial_candidates
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.kinds import Planning, PreparedTest
 from bubblefit.experiments.strips.candidates import candidates

@@ -25,7 +25,7 @@ from ..notes import lines as note_lines
 from ..project.project import read_project
 from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
-from ..readers.spheres import Sphere, fit_sphere, points_of
+from ..readers.surfaces import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save

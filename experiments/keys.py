@@ -10,7 +10,7 @@ from .kinds import Place
 
 
 class ChannelSection(Section):
-    """How a column of a measured file is meant."""
+    """A column of a measured file."""
 
     column: str | None = None
     unit: str | None = None
@@ -19,20 +19,16 @@ class ChannelSection(Section):
 
 
 def channel_of(section: ChannelSection) -> Channel:
-    """The channel that a section describes."""
+    """Return the channel of a section."""
     return Channel(**section.model_dump())
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
-    """The name, if there is such a format; None where the section leaves it to the files.
+    """Return the name after a check that there is such a format; None where none is given.
 
-    Parameters
-    ----------
     field : dotted key of the name below the section.
-
-    Raises
-    ------
-    InputError : naming file and key. PlugInFailure : a reader of a plug-in that does not work.
+    Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
+    work.
     """
     if name is not None:
         try:

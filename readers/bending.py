@@ -42,10 +42,7 @@ UNLOADING = "after the largest deflection"
 class BendingCurve:
     """One repetition of a bending test, as far as it was loaded.
 
-    Parameters
-    ----------
-    repetition : its name. deflection, load : (n,) mm and N, by rising deflection. path : the file.
-    dropped : how many readings of it are left out, by why. source : what of the file was read.
+    deflection, load : (n,) mm and N, by rising deflection. dropped : counts of readings left out.
     """
 
     repetition: str
@@ -70,22 +67,10 @@ def read_bending_curves(
 ) -> tuple[BendingCurve, ...]:
     """Read the repetitions in one file, in its order; one where no column tells them apart.
 
-    The table is found as in the exports of test machines (`machine_tables`). Of each repetition
-    the readings up to the largest deflection are kept: what comes after is unloading.
-
-    Parameters
-    ----------
-    repetition : name of the column of repetitions, where there is one of another name.
-    preload : N on the beam beside what the readings say: collar and strap.
-    zero : of each repetition's deflection: "none", as read; "first", the first reading is zero;
-        "line", the straight line through the first four readings goes through the origin.
-    format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : naming file and line: columns that are not there or may be several, no or unknown
-        units, cells that are not numbers, a repetition of one reading, or whose first readings
-        show no stiffness to find a zero by.
+    Of each repetition the readings up to the largest deflection are kept: the rest is unloading.
+    repetition : name of the column of repetitions. preload : N beside the readings: collar and
+    strap. zero : of the deflection: "none", as read; "first", the first reading is zero; "line",
+    the straight line through the first four readings goes through the origin.
     """
     path = Path(path)
     named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
@@ -126,7 +111,7 @@ def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
 
 
 def _loading(curve: BendingCurve) -> BendingCurve:
-    """The readings up to the largest deflection, sorted: a sensor's noise is no unloading."""
+    """Return the readings up to the largest deflection, sorted (noise is no unloading)."""
     part = slice(int(np.argmax(curve.deflection)) + 1)
     order = np.argsort(curve.deflection[part], kind="stable")
     after = len(curve.load) - len(order)
@@ -145,8 +130,8 @@ PLACES = 61  # of the grid
 class BendingScatter:
     """Repetitions on one grid of deflections (k,) mm.
 
-    mean, deviation : (k,) N over the repetitions that reach so far; the deviation is NaN where
-    that is one. count : (k,) how many do.
+    mean, deviation : (k,) N over the `count` (k,) repetitions that reach so far; deviation NaN for
+    one.
     """
 
     deflection: Array
@@ -157,11 +142,10 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """How far a model's curve is from all readings that it reaches.
+    """Errors of a model's curve at the readings that it reaches.
 
     rms, mean : N; the mean is positive where the model is too stiff. relative : rms over the
-    largest load among these readings. compared, beyond : readings up to the model's last
-    deflection, and after it.
+    largest load read. compared, beyond : readings up to the model's last deflection, and after it.
     """
 
     rms: float
@@ -172,20 +156,18 @@ class BendingError:
 
 
 def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScatter:
-    """Mean and sample standard deviation of the repetitions, interpolated between readings.
-
-    The grid goes from the smallest to the largest deflection read.
-
-    Raises
-    ------
-    ValueError : no curves.
-    """
+    """Return mean and sample standard deviation of the repetitions, interpolated linearly."""
     if not curves:
         raise ValueError("scatter: no repetitions")
     low = min(float(c.deflection[0]) for c in curves)
     high = max(float(c.deflection[-1]) for c in curves)
     grid = np.linspace(low, high, places)
-    loads = np.array([np.interp(grid, *_single(c), left=np.nan, right=np.nan) for c in curves])
+    each = []
+    for c in curves:  # without repeats, with the mean load of each deflection
+        x, which = np.unique(c.deflection, return_inverse=True)
+        mean = np.bincount(which, c.load) / np.bincount(which)
+        each.append(np.interp(grid, x, mean, left=np.nan, right=np.nan))
+    loads = np.array(each)
     there = np.isfinite(loads)
     count = there.sum(axis=0)
     total = np.where(there, loads, 0.0).sum(axis=0)
@@ -198,15 +180,9 @@ def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScat
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """The model's load less that read, at every reading from zero to the model's end.
+    """Return the model's load less that read, over its range; None where it reaches no load.
 
-    Parameters
-    ----------
     deflection, load : (frames,) mm, rising, and N, of the model.
-
-    Returns
-    -------
-    None where the model reaches no reading of a load.
     """
     x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
     way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
@@ -220,9 +196,3 @@ def model_error(
     return BendingError(
         rms, float(off.mean()), rms / largest, int(inside.sum()), int((way > x[-1]).sum())
     )
-
-
-def _single(curve: BendingCurve) -> tuple[Array, Array]:
-    """Deflections without repeats, with the mean load of each."""
-    x, whose = np.unique(curve.deflection, return_inverse=True)
-    return x, np.bincount(whose, curve.load) / np.bincount(whose)

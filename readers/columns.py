@@ -77,7 +77,7 @@ _AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A column's name without its unit, and the unit, "" when it names none.
+    """Return a column's name without its unit, and the unit, "" when it names none.
 
     >>> split_unit("Load (kN)"), split_unit("Weg in mm"), split_unit("load_N"), split_unit("Time")
     (('Load', 'kN'), ('Weg', 'mm'), ('load', 'N'), ('Time', ''))
@@ -89,7 +89,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def means(name: str, quantity: str) -> bool:
-    """Whether a column holds `quantity`, one of those in `WORDS`, `PAIRS` and `LABELS`."""
+    """Return whether a column holds `quantity`, one of those in `WORDS`, `PAIRS` and `LABELS`."""
     if len(name) > LONGEST:
         return False
     plain = split_unit(name)[0].casefold()
@@ -106,7 +106,7 @@ def means(name: str, quantity: str) -> bool:
 
 
 def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
-    """Which of the columns hold a quantity: by the name given for it, else by what names mean."""
+    """Return the columns that hold a quantity, by the name given for it, else by meaning."""
     if quantity not in named:
         return [i for i, name in enumerate(names) if name and means(name, quantity)]
     asked = named[quantity].strip()
@@ -116,7 +116,7 @@ def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> lis
 
 
 def nearest_to_strip(names: list[str], which: list[int]) -> list[int]:
-    """Of columns of elongation, those measured nearest to the strip."""
+    """Return those columns of elongation that were measured nearest to the strip."""
 
     def rank(index: int) -> int:
         words = set(re.split(r"[\W\d_]+", split_unit(names[index])[0].casefold()))
@@ -127,6 +127,6 @@ def nearest_to_strip(names: list[str], which: list[int]) -> list[int]:
 
 
 def scale_of(unit: str, units: dict[str, float]) -> float | None:
-    """What one `unit` is in mm or N; None for a unit that is not in `units`."""
+    """Return what one `unit` is in mm or N; None for a unit that is not in `units`."""
     plain = {"n": "N", "kn": "kN", "KN": "kN"}.get(unit, unit)
     return units.get(plain)

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial import polynomial
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .columns import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
@@ -23,10 +24,11 @@ from .machine_tables import (
     read_machine_table,
     source_of,
 )
+from .registry import read_file
 
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 
-#: Directions in which a strip can be pulled, in the order in which they are told.
+#: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
 
 #: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
@@ -47,19 +49,10 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class LoadCurve:
-    """Load against elongation of one specimen, or of several in one series.
+    """Load (n,) N of the whole strip over elongation (n,) mm of one specimen or series.
 
-    Parameters
-    ----------
-    direction : warp, fill or bias.
-    specimen : its name in the file, else the series', else the file's.
-    elongation : (n,) mm, in the order of the file.
-    load : (n,) N, of the whole strip.
-    path : the file, None when the curve did not come from one.
-    time : (n,) in the file's unit, None unless asked for by name.
-    frame : (n,) number from 0 of the frame each point is from, None but for a strain gauge.
-    notes : one sentence each: what was chosen where the file leaves a choice.
-    source : what of the file was read; None where nothing was.
+    specimen : its name in the file, else the series', else the file's. time : (n,) only where asked
+    for. frame : (n,) number of the frame from 0, of a strain gauge. notes : choices that were made.
     """
 
     direction: str
@@ -74,12 +67,7 @@ class LoadCurve:
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
-
-    Raises
-    ------
-    InputError : a name that is not among them.
-    """
+    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`."""
     plain = re.sub(r"[\W_]+", "", name.casefold())
     if plain not in DIRECTION_ALIASES:
         known = ", ".join(DIRECTION_ALIASES)
@@ -101,25 +89,10 @@ def read_load_curves(
 ) -> tuple[LoadCurve, ...]:
     """Read the curves of one export: one a direction and specimen, in the order of the file.
 
-    In text, lines before the row of names are passed over; names, unit row, separator and decimal
-    mark are found (see `formats.machine_text`).
-
-    Parameters
-    ----------
-    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with
-        or without the unit; needed where finding is ambiguous. `time` is read only when named.
-    load_unit, length_unit : needed where the file names none.
-    width : of the strip, mm, by which a load per width (kN/m, N/mm) is multiplied.
-    comment : lines that start so are skipped.
-    direction : of a file without a column of directions; in a file with one, the rows to keep.
-    decimal : needed where 1,234 may be a thousand or little more than one.
-    format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and the columns there are: nothing or several things found for
-        a quantity, no unit or a different one, no or an unknown direction, cells that are not
-        finite numbers.
+    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with or
+    without unit; time is read only when named. load_unit, length_unit : where the file names none.
+    width : mm of the strip, for loads per width. direction : of a file without such a column; else
+    the rows to keep. decimal : needed where 1,234 may be a thousand or little more than one.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in QUANTITIES]
@@ -133,7 +106,13 @@ def read_load_curves(
     found = read_machine_table(path, options, format)
     column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
     elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
-    load = _load(found, column["load"], load_unit, width)
+    units, own = dict(LOAD_UNITS), found.units[column["load"]]
+    if own in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
+        if width is None:
+            problem = f"{own or load_unit} is a load per width; say the strip's width"
+            raise InputError(path, f"line {found.header}, column {column['load']!r}", problem)
+        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
+    load = measured(found, column["load"], "load", units, load_unit)
     notes = found.notes + choice_of(found, "elongation", named)
     asked = {"elongation": length_unit, "load": load_unit}
     source = source_of(found, column, asked, format, notes)
@@ -155,10 +134,10 @@ def read_load_curves(
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
-    """The specimens of a series that lists them one after the other without naming them.
+    """Return the specimens of a series that lists them one after the other without names.
 
-    A new specimen starts where the elongation falls below half of the largest before; so not for
-    tests that unload. They are called by the series' name and a number from 1.
+    A specimen starts where the elongation falls below half of the largest before; so not for tests
+    that unload. They are called by the series' name and a number from 1.
     """
     u, starts, reached = curve.elongation, [0], 0.0
     for i, value in enumerate(u):
@@ -183,23 +162,10 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     )
 
 
-def _load(
-    found: MachineTable, column: str, unit: str | None, width: float | None
-) -> NDArray[np.float64]:
-    """Loads (rows,) in N of the whole strip."""
-    units = dict(LOAD_UNITS)
-    if found.units[column] in WIDTH_LOAD_UNITS or unit in WIDTH_LOAD_UNITS:
-        if width is None:
-            problem = f"{found.units[column] or unit} is a load per width; say the strip's width"
-            raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
-        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
-    return measured(found, column, "load", units, unit)
-
-
 def _labels(
     found: MachineTable, column: Mapping[str, str], wanted: str | None
 ) -> Sequence[tuple[str, str]]:
-    """Direction and specimen of each row."""
+    """Return direction and specimen of each row."""
     table = found.table
     if not column["direction"] and wanted is None:
         there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
@@ -220,3 +186,141 @@ def _labels(
             raise InputError(table.path, at, "expected the specimen's name, found nothing")
         labels.append((way, specimen))
     return labels
+
+
+Array = NDArray[np.float64]
+
+MAX_ORDER = 12  # beyond, the powers of one elongation tell nothing apart
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPolynomial:
+    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ...
+
+    coefficients : (order + 1,) N, N/mm ..., lowest power first. end : mm, the largest elongation
+    fitted. r_squared : about the mean load, as in Table 3.1; rmse : N; both NaN, and points 0,
+    where unknown.
+    """
+
+    coefficients: Array
+    end: float
+    r_squared: float
+    rmse: float
+    points: int
+
+    @property
+    def order(self) -> int:
+        return len(self.coefficients) - 1
+
+    def __call__(self, elongation: ArrayLike) -> Array:
+        """Return the load in N at elongations in mm, of the same shape."""
+        at = np.asarray(elongation, dtype=float)
+        return np.asarray(polynomial.polyval(at, self.coefficients))
+
+    def slope(self, elongation: ArrayLike) -> Array:
+        """Return dP/du in N/mm at elongations in mm, of the same shape."""
+        at = np.asarray(elongation, dtype=float)
+        return np.asarray(polynomial.polyval(at, polynomial.polyder(self.coefficients)))
+
+
+def fit_load_polynomial(
+    elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
+) -> LoadPolynomial:
+    """Fit a polynomial to the points (n,) mm and (n,) N by least squares."""
+    u, f = checked_points(elongation, load)
+    terms, scale, lowest = terms_of(u, order, through_origin)
+    solution, _, rank, _ = np.linalg.lstsq(terms, f, rcond=1e-13)
+    if rank < terms.shape[1]:
+        problem = f"the elongations settle only {rank} of {terms.shape[1]} coefficients; lower it"
+        raise InputError(None, f"order {order}", problem)
+    left = f - terms @ solution
+    coefficients = np.zeros(order + 1)
+    coefficients[lowest:] = solution / scale ** np.arange(lowest, order + 1)
+    about_mean = ((f - f.mean()) ** 2).sum()
+    r_squared = float(1.0 - (left**2).sum() / about_mean)
+    return LoadPolynomial(
+        coefficients, float(u.max()), r_squared, float(np.sqrt((left**2).mean())), len(u)
+    )
+
+
+@dataclass(frozen=True)
+class SpecimenScatter:
+    """Deviations of specimens from one polynomial, in N.
+
+    rms, mean : of load - P(u), one a specimen. rmse : over all points. deviation : standard
+    deviation over all points about their own mean (n - 1): the published 21.7, 64.1 and 40.3 N.
+    """
+
+    specimens: tuple[str, ...]
+    rms: tuple[float, ...]
+    mean: tuple[float, ...]
+    rmse: float
+    deviation: float
+
+
+def specimen_scatter(
+    curves: LoadCurve | Sequence[LoadCurve], fitted: LoadPolynomial
+) -> SpecimenScatter:
+    """Return the scatter of one or several curves about a polynomial."""
+    each = [curves] if isinstance(curves, LoadCurve) else list(curves)
+    left = [curve.load - fitted(curve.elongation) for curve in each]
+    together = np.concatenate([*left, np.zeros(0)])
+    if len(together) < 2:
+        raise InputError(None, "curves", f"scatter needs two points, there are {len(together)}")
+    return SpecimenScatter(
+        tuple(curve.specimen for curve in each),
+        tuple(float(np.sqrt((one**2).mean())) for one in left),
+        tuple(float(one.mean()) for one in left),
+        float(np.sqrt((together**2).mean())),
+        float(together.std(ddof=1)),
+    )
+
+
+def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
+    """Return the points as arrays (n,) mm and (n,) N, after checks of counts and values."""
+    u, f = np.asarray(elongation, dtype=float), np.asarray(load, dtype=float)
+    if u.ndim != 1 or u.shape != f.shape:
+        problem = f"expected as many elongations as loads, got {u.size} and {f.size}"
+        raise InputError(None, "elongation", problem)
+    if not (np.isfinite(u).all() and np.isfinite(f).all()):
+        raise InputError(None, "elongation", "expected finite numbers; leave out lost frames")
+    if not len(u) or u.max() <= 0:
+        raise InputError(None, "elongation", "expected points with elongation above 0 mm")
+    if np.ptp(f) == 0:
+        raise InputError(None, "load", f"all {len(f)} loads are {f[0]:g} N: nothing to fit")
+    return u, f
+
+
+def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, int]:
+    """Return powers (n, terms) of u / scale, the scale, and the lowest power."""
+    if not 1 <= order <= MAX_ORDER:
+        raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
+    lowest, scale = int(through_origin), float(np.abs(u).max())
+    count = order + 1 - lowest
+    if len(u) < count:
+        problem = f"{count} coefficients need as many points, there are {len(u)}; lower it"
+        raise InputError(None, f"order {order}", problem)
+    return np.vander(u / scale, order + 1, increasing=True)[:, lowest:], scale, lowest
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedPolynomial:
+    """One direction's load over gauge elongation.
+
+    gauge_length, final_length : mm, of the virtual strain gauge. polynomial : without R^2, RMSE and
+    points. scatter : N, standard deviation of the specimens, or NaN.
+    """
+
+    direction: str
+    gauge_length: float
+    final_length: float
+    polynomial: LoadPolynomial
+    scatter: float
+
+
+def read_published_polynomials(
+    path: Path | str, format: str | None = None
+) -> dict[str, PublishedPolynomial]:
+    """Read load polynomials by direction: N, of the full strip, over mm."""
+    polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
+    return polynomials

@@ -21,19 +21,11 @@ PLAIN = FrameOptions(QUANTITIES)
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacements measured (or computed) at one pressure.
+    """Displacements measured (or computed) at one pressure (MPa).
 
-    Parameters
-    ----------
-    pressure : MPa.
-    points : (n, 2) mm, places in the reference state; x is warp, y is fill.
-    displacement : (n, 3) mm.
-    dropped : how many rows of the file were left out, by why (`frames.FLAGGED` and others).
-    z : (n,) mm, height in the reference state; None where it was not measured.
-    sigma : (n,) what the correlation says of its own error, in the file's own measure, NaN where
-        it says nothing; None where it does so nowhere.
-    path : the file, None when the field did not come from one.
-    source : what of the file was read.
+    points : (n, 2) mm in the reference state; x is warp, y is fill. displacement : (n, 3) mm. z :
+    (n,) mm, height in the reference state; None where unknown. sigma : (n,) as `Frame.sigma`.
+    dropped : counts of rows left out, by reason.
     """
 
     pressure: float
@@ -47,7 +39,7 @@ class DisplacementField:
 
     @property
     def frame(self) -> Frame:
-        """The same as a frame; the sheet lies at z = 0 where its height was not measured."""
+        """Return the field as a frame; z is 0 where the height was not measured."""
         z = np.zeros(len(self.points)) if self.z is None else self.z
         return Frame(np.column_stack([self.points, z]), self.displacement, self.path)
 
@@ -65,24 +57,9 @@ def read_fields(
 ) -> tuple[DisplacementField, ...]:
     """Read one frame a pressure.
 
-    Parameters
-    ----------
-    files : the frames in order, one a file or several; columns that are not asked for are ignored.
-        A first frame in which nothing moves is left out where there is one frame too many: it is
-        the reference of a file that holds them all.
-    pressures : MPa, one a frame.
-    columns, flag_column, comment, length_scale : see `frames.FrameOptions`; quantities are `x`,
-        `y`, `dx`, `dy`, `dz`, and `z` where it is there.
-    format : its name; found by the files' content unless given.
-    options : in place of the four before, where there is more to say of the files.
-    frames : numbers from 0 of the frames taken, one a pressure, among all of the files; all of
-        them unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and column: no such file, missing columns, an empty table,
-        cells that are not finite numbers, nothing left without the doubtful rows, more or fewer
-        frames than pressures.
+    A first frame in which nothing moves is left out where there is one frame too many in one file.
+    pressures : MPa. columns, flag_column, comment, length_scale : see `frames.FrameOptions`;
+    options stands in their place. frames : numbers from 0 of the frames taken; all unless given.
     """
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
@@ -92,8 +69,9 @@ def read_fields(
     read = read_frames(files, options, format)
     if frames is not None:
         read = tuple(read[number] for number in frames)
-    elif len(read) == len(pressures) + 1 and len(files) == 1 and _at_rest(read[0]):
-        read = read[1:]
+    elif len(read) == len(pressures) + 1 and len(files) == 1:
+        moved = read[0].displacement[np.isfinite(read[0].displacement)]
+        read = read[1:] if moved.size and not moved.any() else read
     if len(read) != len(pressures):
         problem = f"expected one frame for each of {len(pressures)} pressures, found {len(read)}"
         raise InputError(None, "files", problem)
@@ -103,23 +81,10 @@ def read_fields(
     )
 
 
-def _at_rest(frame: Frame) -> bool:
-    moved = frame.displacement[np.isfinite(frame.displacement)]
-    return bool(moved.size) and not moved.any()
-
-
 def read_field(
-    path: Path | str,
-    pressure: float,
-    options: FrameOptions = PLAIN,
-    format: str | None = None,
+    path: Path | str, pressure: float, options: FrameOptions = PLAIN, format: str | None = None
 ) -> DisplacementField:
-    """Read the field of one file, at a pressure in MPa.
-
-    Raises
-    ------
-    InputError : as `read_fields`; several frames in the file.
-    """
+    """Read the field of one file, at a pressure in MPa."""
     frames = read_frames([path], options, format)
     if len(frames) != 1:
         raise InputError(path, "", f"expected one frame, one a pressure; found {len(frames)}")
@@ -127,15 +92,7 @@ def read_field(
 
 
 def field_of(frame: Frame, pressure: float, options: FrameOptions = PLAIN) -> DisplacementField:
-    """The field of a frame, at a pressure in MPa.
-
-    Points where a quantity is not a number, where correlation was lost, are dropped as the doubtful
-    ones are.
-
-    Raises
-    ------
-    InputError : no point is left.
-    """
+    """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.
     measured = bool(np.isfinite(z).any())

@@ -1,4 +1,8 @@
-"""Frames of image correlation (DIC): places in the reference picture, and how they moved."""
+"""Frames of image correlation (DIC): reference places and displacements, and their columns.
+
+The words of headings are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports (the
+readers in `formats` name sources), and of plain tables in English and German.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,8 @@ from ..notes import Note, NoteKind
 from .columns import LONGEST, split_unit
 from .registry import read_file
 
+Array = NDArray[np.float64]
+
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
 
@@ -31,15 +37,9 @@ LOST = "without a value"
 
 @dataclass(frozen=True)
 class FrameSource:
-    """What was taken from a file, for the record.
+    """A record of what was read from a file.
 
-    Parameters
-    ----------
-    format : name of the file's format, "" where its reader does not say.
-    columns : for each quantity that was read, what the file calls it.
-    units : for each of them the unit that the file names; a quantity is missing where the file
-        names none.
-    notes : one sentence each: what was chosen where the file leaves a choice.
+    columns, units : by quantity, as the file names them. notes : choices that were made.
     """
 
     format: str = ""
@@ -52,16 +52,9 @@ class FrameSource:
 class Frame:
     """A surface in one frame.
 
-    Parameters
-    ----------
-    points : (m, 3) mm, reference places; NaN where correlation was lost, z also where it was not
-        asked for.
-    displacement : (m, 3) mm; NaN where correlation was lost.
-    path : the file, None when the frame did not come from one.
-    dropped : how many rows of the file are not among the points, by why.
-    sigma : (m,) what the correlation says of its own error, in the file's own measure; None where
-        it says nothing.
-    source : what of the file was read.
+    points, displacement : (m, 3) mm, in the reference state; NaN where correlation was lost.
+    dropped : counts of rows left out, by reason. sigma : (m,) the correlation's own measure of
+    error.
     """
 
     points: NDArray[np.float64]
@@ -81,27 +74,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class FrameOptions:
-    """What a reader of frames is told beside the file.
+    """Options of a reader of frames.
 
-    Parameters
-    ----------
-    quantities : of `QUANTITIES`, those that the file must hold; others are read where they are
-        there.
-    columns : the file's own name of some quantities; the others are found by their headings.
-    flag_column : rows where this column is not zero are doubtful and left out, whatever they hold.
-    valid_column : the same for a column that is zero in doubtful rows.
-    comment : lines that start so are skipped, where the format has no comments of its own.
-    length_scale : mm in one unit of length of columns that do not name theirs.
-    decimal : the decimal mark, "." or ","; None finds it.
-    coordinates : whether the places in the file are those before or after the motion; None where
-        the format tells.
-    camera_axes : whether y points down in the file and z away from the camera, so that both are
-        turned over; None where the format tells.
-    planar : whether z and dz may be missing, and are then zero.
-
-    Raises
-    ------
-    InputError : a name for what is no quantity, a scale that is not above zero.
+    quantities : of `QUANTITIES`, those that the file must hold. columns : the file's own names of
+    some. flag_column, valid_column : rows where the first is not zero, or the second is, are left
+    out. length_scale : mm per unit of columns without a unit. coordinates, camera_axes : state of
+    the places, and whether y points down and z away; None where the format tells. planar : z and dz
+    may be missing, and are then zero.
     """
 
     quantities: tuple[str, ...] = QUANTITIES
@@ -126,41 +105,24 @@ class FrameOptions:
 
 
 def read_frames(
-    files: Sequence[Path | str],
-    options: FrameOptions = FrameOptions(),
-    format: str | None = None,
+    files: Sequence[Path | str], options: FrameOptions = FrameOptions(), format: str | None = None
 ) -> tuple[Frame, ...]:
     """Read frames in the order of the files; most formats have one a file.
 
     Exports that write zeros for the displacement only where correlation was lost need a flag
-    column: such a point cannot be told from one that did not move.
-
-    Parameters
-    ----------
-    format : its name (`registry.format_names("frame")`); found by the files' content unless given.
-
-    Raises
-    ------
-    InputError : naming file, line and column: no files, no such file, a format that cannot be
-        told, missing columns, cells that are not numbers.
+    column.
     """
     if not files:
         raise InputError(None, "files", "expected one file a frame, got none")
-    return tuple(frame for file in files for frame in _frames(Path(file), options, format))
+    found: list[Frame] = []
+    for path in map(Path, files):
+        frames: Sequence[Frame] = read_file("frame", path, format, options)
+        for frame in frames:
+            if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
+                raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
+        found += frames
+    return tuple(found)
 
-
-def _frames(path: Path, options: FrameOptions, format: str | None) -> Sequence[Frame]:
-    frames: Sequence[Frame] = read_file("frame", path, format, options)
-    for frame in frames:
-        if np.isinf(frame.points).any() or np.isinf(frame.displacement).any():
-            raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
-    return frames
-
-
-# What the columns of an image correlation's export are called, and the units they name.
-#
-# The words are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports, whose readers
-# in `formats` name the source of each, and of plain tables in English and German.
 
 #: mm in one of each unit of length, by its name in small letters.
 LENGTHS = {
@@ -193,14 +155,10 @@ _UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGN
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading.
+    """A column's heading: name and unit of the file, quantity, and state of a coordinate.
 
-    Parameters
-    ----------
-    name : as the file has it.
-    unit : as the file has it, "" for none.
-    quantity : x, y, z, dx, dy, dz, sigma, valid, invalid; "" for anything else.
-    state : of a coordinate, "reference" or "deformed" where the heading says so, else "".
+    quantity : one of `QUANTITIES`, sigma, valid, invalid, or "". state : "reference", "deformed" or
+    "".
     """
 
     name: str
@@ -210,12 +168,12 @@ class Heading:
 
     @property
     def scale(self) -> float | None:
-        """mm in one unit; None where no unit of length is named."""
+        """Return mm in one unit; None where no unit of length is named."""
         return LENGTHS.get(self.unit.casefold())
 
 
 def heading_of(name: str, unit: str = "") -> Heading:
-    """What a column holds.
+    """Return what a column holds.
 
     >>> heading_of("disp.Horizontal Displacement U [mm]").quantity
     'dx'
@@ -254,15 +212,10 @@ def heading_of(name: str, unit: str = "") -> Heading:
 def columns_of(
     headings: Sequence[Heading], named: Mapping[str, str], upper: bool = False
 ) -> dict[str, list[int]]:
-    """The columns that may hold each quantity; deformed coordinates are those of "x deformed".
+    """Return the columns that may hold each quantity, with deformed places as "x deformed".
 
-    Of several, those with a unit of length come before those without, which come before pixels;
-    a column of exactly the quantity's own name before all, unless `upper`.
-
-    Parameters
-    ----------
-    named : the file's own names of some quantities, with or without the unit.
-    upper : of two names that differ only in their letters' size, the large one is the length.
+    Lengths come before columns without a unit, those before pixels; a quantity's own name before
+    all, unless `upper`: then, of two names that differ in case, the large one is the length.
     """
     places: dict[str, list[int]] = {}
     taken = [name.strip() for name in named.values()]
@@ -294,22 +247,14 @@ def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) 
     return [i for i in where if rank(i) == best]
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class FrameRows:
     """One frame as its file has it.
 
-    Parameters
-    ----------
-    values : (rows,) of x, y, z, dx, dy, dz, those that there are; NaN where correlation was lost.
-        Of "x deformed" and so on where the file has places after the motion.
-    names, units : what the file calls each, and the unit it names, "" or missing for none.
-    valid : (rows,) what the file's own flag says; None without one.
-    sigma : (rows,) below zero where correlation was lost; None without one.
-    camera_axes : whether y points down and z away from the camera, as in an image.
-    dropped : rows that are not in `values`, by why.
+    values : (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
+    valid, sigma : (rows,) flags of the file, and its measure of error, below zero where correlation
+    was lost. camera_axes : whether y points down and z away from the camera. dropped : counts of
+    rows that are not in `values`, by reason.
     """
 
     values: Mapping[str, Array]
@@ -323,15 +268,10 @@ class FrameRows:
 
 
 def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
-    """The frame of the rows: reference places and displacements in mm.
+    """Return the frame of the rows: reference places and displacements in mm.
 
-    Rows that the file's flag rejects, those with a sigma below zero and those that are zero
-    throughout are left out and counted. One row of zeros is a point in a frame in which nothing
-    moves.
-
-    Raises
-    ------
-    InputError : a quantity that is asked for is not there, or is in pixels.
+    Rows that a flag rejects, with a sigma below zero, or zero throughout are left out and counted.
+    One row of zeros is a point in a frame in which nothing moves.
     """
     notes = list(rows.notes)
     values = {name: _in_mm(rows, name, options, path) for name in rows.values}
@@ -371,7 +311,7 @@ def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path) -> Arr
 
 
 def _kept(rows: FrameRows, values: Mapping[str, Array]) -> tuple[NDArray[np.bool_], dict[str, int]]:
-    """Which rows are points, and how many are not, by why."""
+    """Return the mask of rows that are points, and counts of the others by reason."""
     count = len(next(iter(values.values())))
     keep = np.ones(count, dtype=bool)
     dropped = {name: number for name, number in rows.dropped.items() if number}
@@ -390,7 +330,7 @@ def _kept(rows: FrameRows, values: Mapping[str, Array]) -> tuple[NDArray[np.bool
 
 
 def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str]) -> None:
-    """Reference places and displacements from each other; the planes of a planar correlation."""
+    """Return reference places and displacements, each computed from the other where missing."""
     if options.coordinates == "deformed":
         for axis in "xyz":
             if axis in values:
@@ -416,16 +356,10 @@ def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str])
 def frame_files(
     given: Sequence[str], field: str = "files", folder: Path | None = None
 ) -> tuple[list[Path], Note | None]:
-    """The files, and a note where their order looks unmeant.
+    """Return the files, and a note where their order may be unintended.
 
-    given : names of files, taken in this order, and patterns, whose files are sorted by the
-        numbers in their names (frame 2 before frame 10).
-    field : what complaints call them.
-    folder : where they are; the working folder unless given.
-
-    Raises
-    ------
-    InputError : a pattern that nothing matches, no such file, a folder, a file given twice.
+    Files of patterns are sorted by the numbers in their names (frame 2 before frame 10). Raises
+    InputError: no match, no such file, a folder, a file given twice.
     """
     files: list[Path] = []
     for own in given:
@@ -446,23 +380,19 @@ def frame_files(
         if file in files[:i]:
             raise InputError(file, field, "is given twice")
     plain = [str(name if folder is None else folder / name) for name in given]
-    return files, _shell_order(files) if list(map(str, files)) == plain else None
-
-
-def _numbers(file: Path) -> list[tuple[bool, int, str]]:
-    """Sorts digits as numbers, and numbers before letters."""
-    parts = re.findall(r"\d+|\D+", str(file))
-    return [(not p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]
-
-
-def _shell_order(files: list[Path]) -> Note | None:
-    """A shell sorts frame_10 before frame_2: perhaps not the order of the test."""
     by_number = sorted(files, key=_numbers)
-    if by_number == files or sorted(files, key=str) != files:
-        return None
+    as_shell = list(map(str, files)) == plain and sorted(files, key=str) == files != by_number
+    if not as_shell:  # which sorts frame_10 before frame_2
+        return files, None
     first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
     words = (
         f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
         " them by number"
     )
-    return Note(NoteKind.ORDER, words)
+    return files, Note(NoteKind.ORDER, words)
+
+
+def _numbers(file: Path) -> list[tuple[bool, int, str]]:
+    """Return a sort key: digits as numbers, numbers before letters."""
+    parts = re.findall(r"\d+|\D+", str(file))
+    return [(not p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts]

@@ -24,14 +24,9 @@ SECONDS = 60.0
 
 
 def check_readable(path: Path, read: Callable[[], object], seconds: float = SECONDS) -> None:
-    """Try a reading in a process of its own: on some damaged files HDF5 loops for ever, or crashes.
+    """Try a reading in another process: HDF5 loops or crashes on some damaged files.
 
-    read : what is about to be done, picklable where processes are spawned; what it raises is left
-    to the caller's own reading.
-
-    Raises
-    ------
-    InputError : it does not come to an end.
+    read : what is about to be done, picklable; what it raises is left to the caller's own reading.
     """
     if not ends(read, seconds):
         problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
@@ -40,12 +35,7 @@ def check_readable(path: Path, read: Callable[[], object], seconds: float = SECO
 
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
-    """Open a file, as an `h5py.File`.
-
-    Raises
-    ------
-    InputError : h5py is missing, no such file, no HDF5 file, a damaged one.
-    """
+    """Open a file, as an `h5py.File`."""
     try:
         import h5py
     except ImportError:
@@ -66,12 +56,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
 
 def member(path: Path, group: Any, name: str) -> Any:
-    """Return the object below a group by its path; None where there is none.
-
-    Raises
-    ------
-    InputError : a link to another file.
-    """
+    """Return the object below a group by its path; None where there is none."""
     import h5py
 
     here = group
@@ -85,12 +70,7 @@ def member(path: Path, group: Any, name: str) -> Any:
 
 
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
-    """Read a dataset's numbers.
-
-    Raises
-    ------
-    InputError : no dataset of numbers, one whose numbers lie in other files, or that is too large.
-    """
+    """Read a dataset's numbers, which must lie in this file."""
     import h5py
 
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiub":

@@ -17,19 +17,16 @@ from .frames import FrameSource
 from .registry import format_of, read_file
 from .tables import TextTable
 
+Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
 
 
 @dataclass(frozen=True)
 class TableOptions:
-    """What a reader of machine tables is told beside the file.
+    """Options of a reader of machine tables.
 
-    Parameters
-    ----------
-    columns : quantities whose column is known by name.
-    quantities : of elongation, load, deflection and time, those that the table must hold.
-    comment : lines that start so are skipped, where the format has no comments of its own.
-    decimal : the decimal mark, "." or ","; None finds it.
+    columns : the file's names of some quantities. quantities : those that the table must hold.
+    comment : of lines to skip. decimal : the mark; None finds it.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -42,9 +39,7 @@ class TableOptions:
 class MachineTable:
     """A table as the file has it.
 
-    table : the rows of numbers. units : for each column name the unit that the file names, "" for
-    none. header : line number of the row of names. notes : one sentence each: what was chosen where
-    the file leaves a choice.
+    units : by column, "" for none. header : line of the names. notes : choices that were made.
     """
 
     table: TextTable
@@ -56,34 +51,18 @@ class MachineTable:
 def read_machine_table(
     path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
 ) -> MachineTable:
-    """Read the first table with a column of each quantity that `options` ask for.
-
-    Parameters
-    ----------
-    format : its name (`registry.format_names("machine table")`); found by content unless given.
-
-    Raises
-    ------
-    InputError : no such file or table, a format that cannot be told.
-    """
+    """Read the first table with a column of each quantity that `options` ask for."""
     table: MachineTable = read_file("machine table", path, format, options)
     return table
 
 
 def column_of(
-    found: MachineTable,
-    quantity: str,
-    named: Mapping[str, str],
-    needed: Sequence[str] = NEEDED,
+    found: MachineTable, quantity: str, named: Mapping[str, str], needed: Sequence[str] = NEEDED
 ) -> str:
-    """The name of the one column that holds a quantity; "" where it may be absent and is.
+    """Return the name of the one column that holds a quantity; "" where it may be absent and is.
 
     Times are looked for only where they are named or needed. Of several elongations, the one that
     was measured nearest to the strip (`choice_of`).
-
-    Raises
-    ------
-    InputError : several columns, or none of one that is needed or was named.
     """
     names = [str(name) for name in found.table.cells.columns]
     if quantity == "time" and quantity not in (*named, *needed):
@@ -103,7 +82,7 @@ def column_of(
 
 
 def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> tuple[str, ...]:
-    """A sentence where `column_of` chose one column among several; else nothing."""
+    """Return a note where `column_of` chose one of several columns, else nothing."""
     names = [str(name) for name in found.table.cells.columns]
     which = [] if quantity in named else columns_of(names, quantity, named)
     if len(which) < 2:
@@ -123,12 +102,10 @@ def source_of(
     format: str | None,
     notes: Sequence[str] = (),
 ) -> FrameSource:
-    """What of a table was taken, for the record.
+    """Return the record of what was read from a table.
 
-    Parameters
-    ----------
-    columns : the file's name of each quantity, "" for those that it lacks. asked : units that the
-        caller said, by quantity, for columns that name none. format : as it was asked for.
+    columns : by quantity, "" for absent ones. asked : units by quantity, for columns that name
+    none.
     """
     taken = {quantity: column for quantity, column in columns.items() if column}
     units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
@@ -138,24 +115,15 @@ def source_of(
 
 def measured(
     found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
-) -> NDArray[np.float64]:
-    """One column (rows,) in mm or N.
+) -> Array:
+    """Return one column (rows,) in mm or N.
 
-    Parameters
-    ----------
-    kind : length or load, for complaints.
-    units : mm or N in one of each unit.
-    asked : the unit the caller says, None to take the file's.
-
-    Raises
-    ------
-    InputError : no unit, an unknown one, or one that differs from `asked`; cells that are not
-        finite numbers.
+    kind : length or load. units : mm or N per unit. asked : the caller's unit, None to take the
+    file's. Raises InputError: no, an unknown or another unit; cells that are not finite numbers.
     """
     path, at = found.table.path, f"line {found.header}, column {column!r}"
     if asked is not None and asked not in units:
-        problem = f"expected one of {', '.join(units)}, got {asked!r}"
-        raise InputError(None, f"{kind}_unit", problem)
+        raise InputError(None, f"{kind}_unit", f"expected one of {', '.join(units)}, got {asked!r}")
     unit = found.units[column]
     if not unit and asked is None:
         problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
@@ -174,12 +142,9 @@ def measured(
     return value
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class MachineLoads:
-    """What a machine recorded. load (k,) N; time (k,) s, None unless asked for; path the file."""
+    """Loads of a machine: load (k,) N; time (k,) s, None unless asked for; path of the file."""
 
     load: Array
     time: Array | None
@@ -198,16 +163,8 @@ def read_machine_loads(
 ) -> MachineLoads:
     """Read the loads of an export, whatever else it holds; the table is found as for curves.
 
-    Parameters
-    ----------
-    columns : the file's own names of `load` and `time`, where finding is ambiguous.
-    timed : read the times too.
-    load_unit : needed where the file names none.
-    format : name of the file's format; found by its content unless given.
-
-    Raises
-    ------
-    InputError : as `curves.read_load_curves`; a unit of time that is not known.
+    columns : the file's own names of `load` and `time`. timed : read the times too. load_unit :
+    where the file names none.
     """
     path, named = Path(path), dict(columns or {})
     needed = ("load", "time") if timed else ("load",)
@@ -223,13 +180,9 @@ def read_times(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> Array:
-    """Times (n,) in s, one a row: of the pictures, from the camera's log.
+    """Read times (n,) in s, one a row, such as those of pictures in the camera's log.
 
     column : its name in the file, where finding is ambiguous.
-
-    Raises
-    ------
-    InputError : naming file and line: no or several columns of time, no numbers.
     """
     named = {} if column is None else {"time": column}
     found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
@@ -237,7 +190,7 @@ def read_times(
 
 
 def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
-    """The column of times in s; where no unit is named, they are seconds."""
+    """Return the column of times in s; where no unit is named, they are seconds."""
     name = column_of(found, "time", named, needed)
     unit = found.units[name]
     at_the_end = re.search(rf"[_\s]({'|'.join(TIME_UNITS)})$", name)
@@ -253,13 +206,10 @@ def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...
 
 @dataclass(frozen=True)
 class Channel:
-    """What a column of readings means: scale * reading + offset, in `unit`.
+    """A column of readings: the value is scale * reading + offset, in `unit`.
 
-    Parameters
-    ----------
-    column : its name in the file; found by what names mean unless given.
-    unit : such as mm, N or kPa. The file's own unless given; needed with a scale.
-    scale, offset : of a sensor, such as 200 mm per volt. None: the readings are no volts.
+    column : found by meaning unless given. unit : the file's own unless given; needed with a scale.
+    scale : of a sensor, such as 200 mm per volt; None: the readings are no volts.
     """
 
     column: str | None = None
@@ -275,12 +225,7 @@ AS_FOUND = Channel()
 def channel_values(
     found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
 ) -> Array:
-    """A column (rows,) in the unit of which `units` says how many each unit has.
-
-    Raises
-    ------
-    InputError : naming file and line: as `in_unit`; cells that are not finite numbers.
-    """
+    """Return a column (rows,), converted by the table `units`."""
     path, at = found.table.path, f"line {found.header}, column {column!r}"
     return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
 
@@ -288,24 +233,17 @@ def channel_values(
 def in_unit(
     readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
 ) -> Array:
-    """Readings (rows,) in the unit of which `units` says how many each unit has.
+    """Return readings (rows,), converted by the table `units`.
 
-    Parameters
-    ----------
-    own : the unit that the file names, "" for none.
-    path, at : where they stand, for complaints.
-
-    Raises
-    ------
-    InputError : no unit, one that is not known, a scale for what needs none, two units.
+    own : the unit that the file names, "" for none. Raises InputError: no or an unknown unit, two
+    units, a scale for what needs none.
     """
     known = dict(units)
     said = scale_of(own, known) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
     if factor != 1.0 and said is not None:
-        problem = f"is in {own} already: leave the scale {factor:g} out"
-        raise InputError(path, at, problem)
+        raise InputError(path, at, f"is in {own} already: leave the scale {factor:g} out")
     unit = channel.unit or ("" if raw and said is None else own)
     if not unit:
         what = "after scaling" if raw else "of the readings"

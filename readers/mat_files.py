@@ -6,7 +6,7 @@ cannot be read without MATLAB.
 
 Version 5 is parsed here, after MathWorks' "MAT-File Format", and not by scipy.io: on a damaged or
 hostile file scipy 1.17 crashes the process (an unknown type of numbers, deep nesting) or runs for
-minutes (counts of 2^31 cells); tests/data/test_mat_files.py holds these files.
+minutes (counts of 2^31 cells); tests/readers/test_mat_files.py holds these files.
 """
 
 from __future__ import annotations
@@ -52,12 +52,7 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
 
 
 def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    """Read the variables of these names, those that there are.
-
-    Raises
-    ------
-    InputError : no such file, a damaged one, HDF5 without h5py, counts beyond what it can hold.
-    """
+    """Read the variables of these names, those that there are."""
     try:
         with path.open("rb") as file:
             head = file.read(520)
@@ -72,12 +67,7 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
 
 
 def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return an array of numbers among variables or fields.
-
-    Raises
-    ------
-    InputError : it is missing or holds no numbers.
-    """
+    """Return an array of numbers among variables or fields."""
     value = where.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
         there = ", ".join(where)[:200]
@@ -130,10 +120,9 @@ def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tupl
 
 
 class MatrixParts:
-    """Read the parts of one matrix in turn.
+    """Read the parts of one matrix in turn; ValueError or struct.error where it is damaged.
 
-    content : from behind the matrix' own tag. order : of the bytes, "<" or ">". Every method takes
-    what comes next, and raises ValueError or struct.error where the content is damaged.
+    content : from behind the matrix' own tag. order : of the bytes, "<" or ">".
     """
 
     def __init__(self, content: bytes, order: str) -> None:
@@ -146,7 +135,7 @@ class MatrixParts:
         return self.part()[1].decode("latin-1")
 
     def part(self) -> tuple[int, bytes]:
-        """Type and content of the next part."""
+        """Return type and content of the next part."""
         kind, size = struct.unpack_from(f"{self.order}II", self.content, self.at)
         if kind >> 16:
             size, kind, start, step = kind >> 16, kind & 0xFFFF, self.at + 4, 8
@@ -269,7 +258,7 @@ def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int])
 
 
 def _structs(values: dict[str, Any], fields: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the elements of a struct array, each field of which is a list of references."""
+    """Return the elements of a struct array; each field is a list of references."""
     import h5py
 
     listed = [

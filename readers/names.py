@@ -30,18 +30,11 @@ def number_in_name(
     unit: str | None = None,
     field: str = "",
 ) -> float:
-    """The number in a file's name, times what its unit is in `units`.
+    """Return the number in a file's name, times what its unit is in `units`.
 
-    Parameters
-    ----------
-    pattern : regular expression with one group, which holds the number; None looks for the one
-        number that is followed by a unit, as in `step_012_35.5kPa.csv`.
-    unit : of the number that the pattern finds; one in `units`, or a number without a unit (1).
-    field : what complaints call the pattern.
-
-    Raises
-    ------
-    InputError : no such number in the name, or several.
+    pattern : regular expression with one group; None looks for the one number that is followed by a
+    unit, as in `step_012_35.5kPa.csv`. unit : of the number of the pattern; none is 1. field : name
+    of the pattern in errors.
     """
     if pattern is not None:
         hard = len(_REPEATS.findall(pattern)) > 1
@@ -76,7 +69,7 @@ def _searched(pattern: str, path: Path) -> re.Match[str] | None:
 
 
 def check_pattern(pattern: str) -> str | None:
-    """What is wrong with a pattern, None where nothing is."""
+    """Return the fault of a pattern, None where there is none."""
     try:
         groups = re.compile(pattern).groups
     except re.error as error:
@@ -94,14 +87,10 @@ _NUMBER_FILE_VALUES = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
 
 
 def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> float:
-    """The value that `channel.column` names, in the unit of `units`.
+    """Return the value that `channel.column` names, in the unit of `units`.
 
-    A column must hold the same value in each row. Else a line above the numbers says it, such as
-    `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
-
-    Raises
-    ------
-    InputError : naming file and line: no such column or line, several values, no or unknown units.
+    A column must hold the same value in each row. Else a line above the numbers says it, such as `#
+    pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
     """
     name = channel.column or ""
     # Comments are kept: a value may stand in one.
@@ -147,7 +136,7 @@ def _is_of_numbers(row: list[str], names: list[str]) -> bool:
 def _constant(
     path: Path, lines: Lines, separator: str | None, name: str, column: int
 ) -> tuple[float, str, str]:
-    """The one value of a column, its unit, and where it stands. `lines` begin with the names."""
+    """Return the one value of a column, its unit and place; `lines` begin with the names."""
     unit, first = split_unit(name)[1], None
     for number, text in lines[1:]:
         row = cells_of(text, separator) or []
@@ -174,7 +163,7 @@ def _constant(
 def _above(
     path: Path, lines: Lines, name: str, units: Sequence[str]
 ) -> tuple[float, str, str] | None:
-    """A line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
+    """Find a line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
     known = "|".join(sorted(units, key=len, reverse=True))
     says = re.compile(
         rf"(?<!\w){re.escape(name)}(?:_({known}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
@@ -186,8 +175,7 @@ def _above(
     values = {float(found[3].replace(",", ".")) for found, _ in every}
     if len(values) > 1:
         first, second = every[0][1], every[1][1]
-        problem = f"says another {name!r} than line {first}"
-        raise InputError(path, f"line {second}", problem)
+        raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
     found, line = every[0]
     own = found[1] or found[2] or found[4] or split_unit(name)[1]
     return values.pop(), own.strip(), f"line {line}"

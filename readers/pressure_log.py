@@ -1,4 +1,11 @@
-"""A log of pressures with its own clock, and what it says of the frames of a camera."""
+"""A log of pressures with its own clock, and the pressures of a camera's frames.
+
+At the right offset of the clocks, heights of the frames and pressures are rising functions of each
+other; at a wrong one they are not, wherever the pressure was held, released, or raised faster or
+slower. Both functions are found by isotonic regression, with the sheet at rest at the least
+pressure of the log: where the pressure was raised in equal steps, a step later would else do as
+well.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +37,7 @@ APEX = 0.98
 
 @dataclass(frozen=True, eq=False)
 class PressureLog:
-    """Readings: time (k,) s, rising; pressure (k,) MPa; path the file."""
+    """Readings: time (k,) s, rising; pressure (k,) MPa; path of the file."""
 
     time: Array
     pressure: Array
@@ -39,13 +46,9 @@ class PressureLog:
 
 @dataclass(frozen=True)
 class LogOptions:
-    """How a log is read; what is not given is found.
+    """Options of a log; what is not given is found.
 
-    Parameters
-    ----------
-    pressure : its column; volts become a pressure by its scale, offset and unit.
-    time : its column; seconds where neither file nor channel names a unit.
-    format, comment, decimal : as for machine tables.
+    pressure : volts become a pressure by its scale, offset and unit. time : seconds unless named.
     """
 
     pressure: Channel = AS_FOUND
@@ -56,13 +59,7 @@ class LogOptions:
 
 
 def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
-    """Read a log as a test machine's table.
-
-    Raises
-    ------
-    InputError : naming file and line: no or several columns, no or unknown units, cells that are
-        not numbers, times that go back.
-    """
+    """Read a log as a test machine's table."""
     channels: Mapping[str, Channel] = {"time": options.time, "pressure": options.pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
     needed = ("time", "pressure")
@@ -84,14 +81,13 @@ def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> Pressur
 
 
 def apex_height(frame: Frame) -> float:
-    """How far the apex of a frame has moved, mm, whatever axes the camera has; NaN if unknown."""
+    """Return the distance (mm) that the apex of a frame has moved; NaN if unknown."""
     moved = np.linalg.norm(frame.displacement, axis=1)
     moved = moved[np.isfinite(moved)]
     return float(np.quantile(moved, APEX)) if len(moved) else float("nan")
 
 
 def apex_heights(frames: Sequence[Frame]) -> Array:
-    """(frames,) mm, see `apex_height`."""
     return np.array([apex_height(frame) for frame in frames])
 
 
@@ -103,7 +99,7 @@ POWERS = (1, 2, 3)
 
 
 def straightest(h: Array, pressures: Sequence[Array]) -> int:
-    """The power of the heights that correlates best with the pressures at any offset."""
+    """Return the power of the heights that correlates best with the pressures at any offset."""
     best = {}
     for power in POWERS:
         raised, best[power] = h**power, 0.0
@@ -117,7 +113,7 @@ def straightest(h: Array, pressures: Sequence[Array]) -> int:
 
 
 def misfit_of(p: Array, h: Array, rest: float) -> float:
-    """What rising functions leave of the variances: mean of both, 1 where there is none.
+    """Return the share of the variances that rising functions leave, 1 without variance.
 
     p : (frames,) MPa, NaN beyond the log. h : (frames,) mm, 0 at rest. rest : MPa, at rest.
     """
@@ -131,7 +127,7 @@ def misfit_of(p: Array, h: Array, rest: float) -> float:
 
 
 def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
-    """Share of the variance of y that no rising function of x through the rest explains."""
+    """Return share of the variance of y that no rising function of x through the rest explains."""
     from scipy.optimize import isotonic_regression
 
     total = float(np.sum((y - y.mean()) ** 2))
@@ -154,22 +150,16 @@ SIGMAS, AT_REST, BELOW = 6.0, 0.02, 0.01
 
 
 def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
-    """(frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
+    """Return (frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
     return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
 
 
 def offset_misfits(
     times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> tuple[Array, Array]:
-    """Offsets (s), rising, closer together about the best; and the misfit at each.
+    """Return offsets (s), rising, closer together about the best; and the misfit at each.
 
-    Parameters
-    ----------
     times, heights : (frames,) s and mm, all known. log_times, pressures : (k,) s, rising, and MPa.
-
-    Raises
-    ------
-    InputError : a log that is shorter than the frames.
     """
     order = np.argsort(times, kind="stable")
     t, h = times[order], heights[order]
@@ -192,7 +182,7 @@ def offset_misfits(
 
 
 def _offsets(t: Array, log_times: Array) -> Array:
-    """The offsets at which enough frames lie within the log, half a frame apart."""
+    """Return the offsets at which enough frames lie within the log, half a frame apart."""
     enough = int(np.ceil(WITHIN * len(t)))
     least = log_times[0] - t[len(t) - enough]
     most = log_times[-1] - t[enough - 1]
@@ -209,19 +199,10 @@ def _offsets(t: Array, log_times: Array) -> Array:
 
 
 def _rest_height(h: Array) -> float:
-    """Up to where a frame is at rest, by the noise from one frame to the next."""
+    """Return the height up to which a frame is at rest, from the noise between frames."""
     noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
     return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
 
-
-# How far two clocks are apart: the log's of the pressures, and the camera's of the frames.
-#
-# The sheet rises while the pressure does, by a law that is not known here. At the right offset the
-# heights of the frames are therefore some rising function of the pressures, and the pressures one
-# of the heights; at a wrong one they are not, wherever the pressure was held, released, or raised
-# faster or slower. Both functions are found by isotonic regression, which supposes nothing else of
-# them but that a sheet that has not risen is at the least pressure of the log: where the pressure
-# was raised in equal steps, a step later would else do as well.
 
 #: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
 FLOOR = 1e-6
@@ -236,16 +217,9 @@ WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
 class ClockOffset:
     """The log's clock less that of the frames.
 
-    Parameters
-    ----------
-    offset : s. lower, upper : s, the least and the largest offset that may be right; the offset
-        itself where it was given.
-    misfit : share of the variance of heights and pressures that no rising function explains; None
-        where the offset was given.
-    pressure : (frames,) MPa, of each frame; NaN beyond the log.
-    doubt : (frames,) MPa, half of the range of each frame's pressure over all offsets that may be
-        right.
-    times : (frames,) s, by the frames' own clock. heights : (frames,) mm, NaN where none is known.
+    offset : s; lower, upper : of offsets that may be right. misfit : share of the variance that no
+    rising function explains; None where given. pressure, doubt : (frames,) MPa, NaN beyond the log;
+    half its range over all offsets that may be right. times, heights : (frames,) s and mm.
     """
 
     offset: float
@@ -261,12 +235,7 @@ class ClockOffset:
 def given_offset(
     offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> ClockOffset:
-    """The pressures of frames by a clock offset (s) that is known; else as `find_offset`.
-
-    Raises
-    ------
-    InputError : no frame lies within the log.
-    """
+    """Return the pressures of frames by a clock offset (s) that is known; else as `find_offset`."""
     there = log_at(offset, times, log_times, pressures)
     if not np.isfinite(there).any():
         problem = (
@@ -280,18 +249,7 @@ def given_offset(
 
 
 def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
-    """The offset at which heights rise with the pressures.
-
-    Parameters
-    ----------
-    times : (frames,) s, by the frames' clock. heights : (frames,) mm; NaN where none is known.
-    log_times, pressures : (k,) s, rising, and MPa.
-
-    Raises
-    ------
-    InputError : too few frames, a log that is shorter than the frames; heights that follow the
-        pressures at no offset; offsets that do equally well and give other pressures.
-    """
+    """Return the offset at which heights rise with the pressures; one that is certain."""
     known = np.isfinite(heights)
     if known.sum() < LEAST_FRAMES:
         problem = f"{known.sum()} frames are too few to find it by; give it in s"
@@ -316,7 +274,10 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     some = np.append(may_be[:: max(1, len(may_be) // 200)], may_be[-1])
     each = np.array([log_at(s, times, log_times, pressures) for s in some])
     there = log_at(offset, times, log_times, pressures)
-    doubt = _half_range(each)
+    inside = np.isfinite(each)
+    most, least = np.where(inside, each, -np.inf), np.where(inside, each, np.inf)
+    some, doubt = inside.any(axis=0), np.full(each.shape[1], np.nan)
+    doubt[some] = (most.max(axis=0) - least.min(axis=0))[some] / 2
     span = float(np.ptp(there[np.isfinite(there)]))
     if float(np.nanmean(doubt)) > MOST_DOUBT * span:
         problem = (
@@ -327,19 +288,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
         )
         raise InputError(None, "offset", problem)
     lower, upper = float(may_be[0]), float(may_be[-1])
-    least = float(misfits[best])
-    return ClockOffset(offset, lower, upper, least, there, doubt, times, heights)
-
-
-def _half_range(each: Array) -> Array:
-    """(frames,) of pressures (offsets, frames); NaN where a frame is never within the log."""
-    inside = np.isfinite(each)
-    most = np.where(inside, each, -np.inf).max(axis=0)
-    least = np.where(inside, each, np.inf).min(axis=0)
-    half = np.full(each.shape[1], np.nan)
-    some = inside.any(axis=0)
-    half[some] = (most - least)[some] / 2
-    return half
+    return ClockOffset(offset, lower, upper, float(misfits[best]), there, doubt, times, heights)
 
 
 #: Why frames are not looked at.
@@ -355,7 +304,7 @@ TOLERANCE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class FrameChoice:
-    """Numbers of the frames taken, by rising pressure, and how many were not looked at, by why."""
+    """Numbers of the chosen frames, by rising pressure, and counts of the others by reason."""
 
     frames: tuple[int, ...]
     left_out: dict[str, int] = field(default_factory=dict)
@@ -368,20 +317,11 @@ def choose_frames(
     tolerance: float | None = None,
     in_time: bool = False,
 ) -> FrameChoice:
-    """The frame nearest to each asked pressure, or `count` evenly spread in pressure, or all.
+    """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
-    Parameters
-    ----------
-    pressures : (frames,) MPa, of every frame; NaN where it is not known.
-    asked : MPa, rising. tolerance : MPa, how far a frame may be from the asked pressure; 2 % of the
-        largest asked one unless given.
-    in_time : whether the frames are in the order of time: those after the largest pressure are then
-        of the release, and not taken.
-
-    Raises
-    ------
-    InputError : no frame under pressure, none near an asked pressure, one that is nearest to two;
-        fewer frames than `count`.
+    pressures : (frames,) MPa, NaN where unknown. asked : MPa, rising. tolerance : MPa; 2 % of the
+    largest asked one unless given. in_time : leave out frames after the largest pressure, those of
+    the release.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)
@@ -399,12 +339,9 @@ def choose_frames(
     apart = np.diff(pressures[order], prepend=-np.inf) > SAME * pressures[top]
     if asked is not None:
         frames = _nearest(pressures, order, asked, tolerance)
-    elif count is not None:
-        left_out[REPEATED] = int((~apart).sum())
-        frames = _spread(pressures, order[apart], count)
     else:
-        left_out[REPEATED] = int((~apart).sum())
-        frames = order[apart].tolist()
+        left_out[REPEATED], order = int((~apart).sum()), order[apart]
+        frames = order.tolist() if count is None else _spread(pressures, order, count)
     return FrameChoice(tuple(frames), {why: n for why, n in left_out.items() if n})
 
 

@@ -7,7 +7,7 @@ that says how a file is recognised by its content and how it is read. Nothing el
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -23,7 +23,7 @@ from ..files import PlugIn, check_regular, names_with, plug_in_named, plug_ins
 #: frame : `read(path, frames.FrameOptions)`, a sequence of `frames.Frame`;
 #: machine table : `read(path, machine_tables.TableOptions)`, a `machine_tables.MachineTable`, from
 #:     which load curves, loads and bending curves are taken alike;
-#: load polynomials : `read(path)`, `published_polynomials.PublishedPolynomial` by direction.
+#: load polynomials : `read(path)`, `curves.PublishedPolynomial` by direction.
 Content = Literal["frame", "machine table", "load polynomials"]
 
 #: How much of a file a format may look at to recognise it, bytes.
@@ -36,14 +36,8 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of data files.
 
-    Parameters
-    ----------
-    name : what `format =` in a project calls it.
-    content : what such a file holds.
-    title : what it is, in a few words.
-    read : reads a file; see `Content`. An `InputError` names what is wrong with it.
-    recognises : whether a file, by its path and its first `HEAD` bytes, is of this format. None
-        for the one of its content that takes what no other recognises.
+    name : of `format =` in a project. read : see `Content`. recognises : tests a file by its path
+    and first `HEAD` bytes; None for the format that takes what no other recognises.
     """
 
     name: str
@@ -62,24 +56,22 @@ def register_format(one: Format) -> None:
 
 
 def formats(content: Content) -> tuple[Format, ...]:
-    """Our own formats of a content, by name."""
+    """Return our own formats of a content, by name."""
     _import_formats()
     ours = [one for one in _FORMATS.values() if one.content == content]
     return tuple(sorted(ours, key=lambda one: one.name))
 
 
 def format_names(content: Content) -> tuple[str, ...]:
-    """What `format =` may say: our own formats of a content, then every reader of plug-ins."""
+    """Return the values of `format =`: our formats of a content, then readers of plug-ins."""
     return names_with("bubblefit.readers", [one.name for one in formats(content)])
 
 
 def format_named(content: Content, name: str) -> Format:
-    """The format of this name, ours or that of a plug-in.
+    """Return the format of this name, ours or that of a plug-in.
 
-    Raises
-    ------
-    InputError : there is none of that name, or it is of another content.
-    PlugInFailure : a plug-in that does not work.
+    Raises InputError: there is none of that name, or it is of another content. PlugInFailure: a
+    plug-in that does not work.
     """
     for one in formats(content):
         if one.name == name:
@@ -95,19 +87,14 @@ def format_named(content: Content, name: str) -> Format:
 
 
 def format_of(content: Content, path: Path | str) -> Format:
-    """The format of a file, by its content: ours first, then those of plug-ins.
+    """Return the format of a file by its content: ours first, then those of plug-ins.
 
     Plug-ins that do not work are logged and passed over.
-
-    Raises
-    ------
-    InputError : several formats recognise it.
     """
     path = Path(path)
     head = _head(path)
     ours = formats(content)
-    theirs = (one for one in _working() if one.content == content)
-    for group in (ours, tuple(theirs)):
+    for group in (ours, _working(content)):
         able = [one for one in group if one.recognises is not None and one.recognises(path, head)]
         if len(able) > 1:
             names = " or ".join(repr(one.name) for one in able)
@@ -118,13 +105,7 @@ def format_of(content: Content, path: Path | str) -> Format:
 
 
 def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
-    """What a file holds, by the format named, else by the one that is found; see `Content`.
-
-    Raises
-    ------
-    InputError : the format cannot be told, or something is wrong with the file.
-    PlugInFailure : the plug-in named does not work.
-    """
+    """Read a file by the format named, else by the one that its content shows; see `Content`."""
     with suppress(OSError):  # the reader says why
         check_regular(path)
     chosen = format_of(content, path) if name is None else format_named(content, name)
@@ -133,7 +114,7 @@ def read_file(content: Content, path: Path | str, name: str | None, *options: An
 
 @cache
 def _import_formats() -> None:
-    """Each module registers its own when it is imported."""
+    """Import every module of `formats`, which registers its own."""
     from . import formats as folder
 
     for module in iter_modules(folder.__path__):
@@ -141,7 +122,7 @@ def _import_formats() -> None:
 
 
 def _head(path: Path) -> bytes:
-    """The first bytes; of a file that cannot be read none: its reader says why."""
+    """Return the first bytes; none of a file that cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(HEAD)
@@ -149,14 +130,15 @@ def _head(path: Path) -> bytes:
         return b""
 
 
-def _working() -> list[Format]:
-    able = []
+def _working(content: Content) -> Iterator[Format]:
     for plug_in in plug_ins("bubblefit.readers"):
         try:
-            able.append(_format_of(plug_in))
+            one = _format_of(plug_in)
         except PlugInFailure as error:
             log.warning("%s", error)
-    return able
+        else:
+            if one.content == content:
+                yield one
 
 
 def _format_of(plug_in: PlugIn) -> Format:

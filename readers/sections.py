@@ -1,8 +1,4 @@
-"""What every section of a project file is made of: the base of its model, numbers, units.
-
-A room's own sections live in that room; what pydantic finds wrong becomes one line by
-`section_errors.first_error`.
-"""
+"""The base of all sections of a project file, its numbers and units, and errors in one line."""
 
 from __future__ import annotations
 
@@ -29,7 +25,7 @@ PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1
 #: mm per unit.
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0}
 
-#: Beyond, products of a few numbers overflow; nobody means such a number in any unit.
+#: Beyond, products of a few numbers overflow.
 HUGE = 1e18
 
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
@@ -49,12 +45,12 @@ class Section(BaseModel):
 
 
 def beside(folder: Path, given: str) -> Path:
-    """The path that a file in `folder` names: beside it, unless absolute or below the home (~)."""
+    """Return the path of a file in `folder`, unless it is absolute or below the home (~)."""
     return folder / os.path.expanduser(given)
 
 
 def dotted(location: Sequence[str | int]) -> str:
-    """('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
+    """Return a dotted key: ('bounds', 'lower', 3) -> 'bounds.lower[3]'."""
     text = ""
     for part in location:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -64,7 +60,7 @@ def dotted(location: Sequence[str | int]) -> str:
 def first_error(
     path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
 ) -> InputError:
-    """The first finding as an InputError; unknown keys first, as they explain missing ones.
+    """Return the first finding as an InputError; unknown keys first, as they explain missing ones.
 
     file : the sections and keys there are. at : dotted key of the table that was checked, "" for
     the whole file.
@@ -84,7 +80,14 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         table = field is not None and next(_sections(field.annotation), None) is not None
         return f"this {'section' if table else 'key'} is missing; add it"
     if kind == "extra_forbidden":
-        return _unknown(location, file)
+        holder = file
+        for part in location[:-1]:
+            if isinstance(part, str):  # a number counts the tables of a list
+                holder = next(_sections(holder.model_fields[part].annotation))
+        known = list(holder.model_fields)
+        near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
+        meant = f"did you mean {near[0]!r}? " if near else ""
+        return f"unknown key; {meant}allowed here: {', '.join(known)}"
     if kind == "finite_number":
         return f"expected a finite number, got {given!r}"
     if kind in ("too_short", "too_long"):
@@ -93,27 +96,6 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
     return f"expected {expected}, got {_short(given)}"
-
-
-def _unknown(location: Sequence[str | int], file: type[BaseModel]) -> str:
-    known = _keys_beside(location, file)
-    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
-    meant = f"did you mean {near[0]!r}? " if near else ""
-    return f"unknown key; {meant}allowed here: {', '.join(known)}"
-
-
-def _keys_beside(location: Sequence[str | int], file: type[BaseModel]) -> list[str]:
-    """Allowed keys of the table that holds `location`."""
-    table = file
-    for part in location[:-1]:
-        if isinstance(part, str):  # a number counts the tables of a list
-            table = _table(table.model_fields[part].annotation)
-    return list(table.model_fields)
-
-
-def _table(annotation: Any) -> type[BaseModel]:
-    """The section class of an annotation such as `PointsSection | None` or `list[CaseSection]`."""
-    return next(_sections(annotation))
 
 
 def _sections(annotation: Any) -> Iterator[type[BaseModel]]:

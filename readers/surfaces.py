@@ -11,23 +11,24 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .fields import DisplacementField
+from .frames import Frame
 from .tables import TextTable, read_table, write_table
 
+Array = NDArray[np.float64]
 
-def powers(points: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
-    """Terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2): x^d y^d first, the constant last."""
+
+def powers(points: Array, degree: int) -> Array:
+    """Return terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2), highest powers first."""
     x = np.vander(points[:, 0], degree + 1)
     y = np.vander(points[:, 1], degree + 1)
     return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
 
 
 def total_power(degree: int) -> NDArray[np.intp]:
-    """i + j of each term x^i y^j, ((degree + 1)^2,)."""
+    """Return i + j of each term x^i y^j, ((degree + 1)^2,)."""
     falling = np.arange(degree, -1, -1)
     return (falling[:, None] + falling).ravel()
 
-
-Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
@@ -36,16 +37,11 @@ LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfac
 
 @dataclass(frozen=True, eq=False)
 class DisplacementSurface:
-    """Three polynomials F(x, y), one a direction of displacement, at one pressure.
+    """Three polynomials F(x, y), one a direction of displacement, at one pressure (MPa).
 
-    Parameters
-    ----------
-    pressure : MPa.
-    degree : highest power of x and of y; 4 in the thesis.
-    coefficients : (3, (degree + 1)^2) mm, C_0 ... in the order of Eq. 4.4: x^d y^d first, powers
-        of x falling fastest, the constant last. They belong to x / scale and y / scale.
-    scale : mm, the largest coordinate fitted: it keeps high powers near one.
-    r_squared : (3,) coefficient of determination of each direction (Table 4.1).
+    coefficients : (3, (degree + 1)^2) mm, of x / scale and y / scale in the order of Eq. 4.4: x^d
+    y^d first, powers of x falling fastest. scale : mm, the largest coordinate fitted. r_squared :
+    (3,) as in Table 4.1.
     """
 
     pressure: float
@@ -55,22 +51,17 @@ class DisplacementSurface:
     r_squared: Array
 
     def evaluate(self, points: Array) -> Array:
-        """Displacement (n, 3) mm at reference points (n, 2) mm."""
+        """Return displacement (n, 3) mm at reference points (n, 2) mm."""
         return powers(np.asarray(points) / self.scale, self.degree) @ self.coefficients.T
 
     @property
     def physical(self) -> Array:
-        """Coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
+        """Return coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
         return self.coefficients / self.scale ** total_power(self.degree)
 
 
 def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
-    """Least-squares fit of Eq. 4.4, of any degree, to a displacement field.
-
-    Raises
-    ------
-    InputError : a degree out of range, or points too few or too regularly placed for it.
-    """
+    """Fit Eq. 4.4, of any degree, to a displacement field by least squares."""
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
     terms, count = (degree + 1) ** 2, len(field.points)
@@ -100,12 +91,7 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
 def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) -> None:
     """Write surfaces.csv, a row a pressure and direction: R^2, degree, scale, C0 ... of Eq. 4.4.
 
-    These coefficients take x and y in mm and give mm, so the file can be used as it stands. Beyond
-    `scale_mm`, the largest coordinate fitted, a polynomial means nothing.
-
-    Raises
-    ------
-    OSError : the file cannot be written; what was there may be lost.
+    The coefficients take x and y in mm and give mm. Beyond `scale_mm` a polynomial means nothing.
     """
     most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
     rows: list[list[object]] = []
@@ -117,27 +103,19 @@ def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) ->
 
 
 def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
-    """Read what `write_surfaces` wrote, equal to rounding.
-
-    Raises
-    ------
-    InputError : naming file, line and column: missing columns, cells that are not numbers,
-        directions that do not come as x, y, z, degrees without their coefficients.
-    """
+    """Read what `write_surfaces` wrote, equal to rounding."""
     table = read_table(path)
     direction = table.text("direction")
     if len(direction) % 3 or tuple(direction) != AXES * (len(direction) // 3):
         problem = "expected three rows a pressure, in the order x, y, z"
         raise InputError(table.path, "column 'direction'", problem)
     each = [np.arange(len(direction)) // 3 == k for k in range(len(direction) // 3)]
-    return tuple(_read(table.rows(rows)) for rows in each)
+    return tuple(_surface_of(table.rows(rows)) for rows in each)
 
 
-def _read(table: TextTable) -> DisplacementSurface:
-    """The surface of three rows."""
-    pressure, degree, scale = (
-        table.constant(name) for name in ("pressure_MPa", "degree", "scale_mm")
-    )
+def _surface_of(table: TextTable) -> DisplacementSurface:
+    names = ("pressure_MPa", "degree", "scale_mm")
+    pressure, degree, scale = (table.constant(name) for name in names)
     at = f"line {table.lines[0]}"
     if degree not in range(MAX_DEGREE + 1):
         raise InputError(table.path, at, f"expected a degree 0 to {MAX_DEGREE}, got {degree:g}")
@@ -153,10 +131,141 @@ def _read(table: TextTable) -> DisplacementSurface:
 
 
 def _r_squared(value: Array, left: Array) -> Array:
-    """1 - (sum of squares left) / (that about the mean), by column; 1 for a constant met."""
+    """Return 1 - (sum of squares left) / (that about the mean), by column; 1 for a constant met."""
     about_mean = ((value - value.mean(axis=0)) ** 2).sum(axis=0)
     remaining = (left**2).sum(axis=0)
     # A constant direction (a clamped one, all zeros) has nothing to explain.
     nothing = about_mean <= 1e-24 * (value**2).sum(axis=0)
     share = np.divide(remaining, about_mean, out=np.zeros_like(remaining), where=~nothing)
     return np.asarray(1.0 - share)
+
+
+#: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.
+LEAST_POINTS = 10
+#: Points farther off than so many robust standard deviations are left out, at most so many times.
+SIGMAS, ROUNDS = 4.0, 20
+#: So many spheres, through so many points each, are tried for a start, and judged by so many.
+TRIES, FEW, JUDGES = 200, 8, 2000
+#: Median of |normal deviate|.
+MEDIAN = 0.6744897501960817
+#: Of the points in the plane across their thinnest direction: below, they are flat for any noise.
+FLAT = 1e-9
+#: A radius larger than so many times the points' extent is noise of points in a plane.
+LARGEST = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """The sphere through the points (n, 3) mm of one frame.
+
+    centre : (3,) mm. centre_error, radius_error : standard errors, as if the errors of the points
+    were independent. deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
+    """
+
+    centre: Array
+    radius: float
+    centre_error: Array
+    radius_error: float
+    deviation: Array
+    kept: NDArray[np.bool_]
+    points: Array
+    path: Path | None = None
+
+    @property
+    def rms(self) -> float:
+        """Return the RMS deviation of the points used, mm."""
+        return float(np.sqrt(np.mean(self.deviation[self.kept] ** 2)))
+
+    @property
+    def left_out(self) -> int:
+        """Return the number of points too far off to be used."""
+        return int((~self.kept).sum())
+
+
+def points_of(frame: Frame) -> Array:
+    """Return the surface (n, 3) mm in this frame: reference places, moved where known."""
+    moved = np.isfinite(frame.displacement).any()
+    places = frame.points + frame.displacement if moved else frame.points
+    return np.asarray(places[np.isfinite(places).all(axis=1)])
+
+
+def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
+    """Fit the sphere with the least sum of squared distances from points (n, 3) in mm.
+
+    Points farther off than four robust standard deviations are left out, until those kept stay the
+    same.
+    """
+    if len(points) < LEAST_POINTS:
+        problem = f"expected {LEAST_POINTS} points or more, got {len(points)}"
+        raise InputError(path, "", problem)
+    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spans[2] <= FLAT * spans[0]:
+        raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")
+    centre, radius = _start(points)
+    kept = _inside(points, centre, radius)
+    for _ in range(ROUNDS):
+        centre, radius = _distances_least(points[kept], *_linear(points[kept]), path)
+        inside = _inside(points, centre, radius)
+        if (inside == kept).all():
+            break
+        kept = inside
+    deviation = np.linalg.norm(points - centre, axis=1) - radius
+    slopes = _slopes(points[kept], centre)
+    freedom = int(kept.sum()) - 4
+    variance = float(np.sum(deviation[kept] ** 2)) / freedom
+    errors = np.sqrt(variance * np.diag(np.linalg.inv(slopes.T @ slopes)))
+    return Sphere(centre, radius, errors[:3], float(errors[3]), deviation, kept, points, path)
+
+
+def _start(points: Array) -> tuple[Array, float]:
+    """Return the best of spheres through a few points each, by the median distance.
+
+    A point far astray, such as one at the camera, would carry the fit through all of them away.
+    """
+    draw = np.random.default_rng(0)
+    some = points[draw.permutation(len(points))[:JUDGES]]
+    found = [_linear(points[draw.choice(len(points), FEW, replace=False)]) for _ in range(TRIES)]
+    found.append(_linear(points))
+    off = [np.median(np.abs(np.linalg.norm(some - c, axis=1) - r)) for c, r in found]
+    return found[int(np.argmin(off))]
+
+
+def _inside(points: Array, centre: Array, radius: float) -> NDArray[np.bool_]:
+    """Return the mask (n,) of points that are not too far off."""
+    off = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
+    # Points without noise are off by rounding: none of them is astray.
+    return np.asarray(off <= max(SIGMAS * float(np.median(off)) / MEDIAN, 1e-9 * radius))
+
+
+def _linear(points: Array) -> tuple[Array, float]:
+    """Solve Eq. A.6, about the mean of the points so that it is well conditioned."""
+    middle = points.mean(axis=0)
+    near = points - middle
+    matrix = np.column_stack([2 * near, np.ones(len(near))])
+    found = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
+    centre = found[:3]
+    return middle + centre, float(np.sqrt(max(found[3] + centre @ centre, 0.0)))
+
+
+def _slopes(points: Array, centre: Array) -> Array:
+    """Return (n, 4) d distance / d (centre, radius)."""
+    arms = points - centre
+    lengths = np.linalg.norm(arms, axis=1)
+    return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])
+
+
+def _distances_least(
+    points: Array, centre: Array, radius: float, path: Path | None
+) -> tuple[Array, float]:
+    for _ in range(100):
+        slopes = _slopes(points, centre)
+        off = np.linalg.norm(points - centre, axis=1) - radius
+        step = np.linalg.lstsq(slopes, -off, rcond=None)[0]
+        centre, radius = centre + step[:3], radius + float(step[3])
+        if np.linalg.norm(step) <= 1e-12 * max(abs(radius), 1.0):
+            break
+    extent = float(np.ptp(points, axis=0).max())
+    if not 0 < radius < LARGEST * extent:
+        problem = "the points are so nearly in a plane that no sphere is told by them"
+        raise InputError(path, "", problem)
+    return centre, radius

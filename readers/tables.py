@@ -1,4 +1,4 @@
-"""Comma-separated tables whose every complaint names the file, the column and the line."""
+"""Comma-separated tables; errors name the file, the column and the line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HOLES = ("", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind", "n. def.", "n/a",
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """Cells as text, and where each row stood.
+    """Cells as text, with the line of each row from 1, and the decimal mark.
 
     path : the file. cells : one column a name of the header. lines : (rows,) line numbers in the
     file, from 1. decimal : the decimal mark, a point or a comma.
@@ -37,12 +37,7 @@ class TextTable:
     decimal: str = "."
 
     def numbers(self, column: str, holes: bool = False) -> NDArray[np.float64]:
-        """One column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN.
-
-        Raises
-        ------
-        InputError : no such column, or two; a cell that is not a finite number.
-        """
+        """Return one column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN."""
         import pandas as pd
 
         text = self.text(column)
@@ -68,12 +63,7 @@ class TextTable:
         return value
 
     def constant(self, column: str) -> float:
-        """One column that holds the same number in each row.
-
-        Raises
-        ------
-        InputError : as for `numbers`, or numbers that differ.
-        """
+        """Return one column that holds the same number in each row."""
         value = self.numbers(column)
         if (value != value[0]).any():
             line = self.lines[int(np.argmax(value != value[0]))]
@@ -82,12 +72,7 @@ class TextTable:
         return float(value[0])
 
     def text(self, column: str) -> pd.Series:
-        """One column as it stands in the file.
-
-        Raises
-        ------
-        InputError : no such column, or two.
-        """
+        """Return one column as it stands in the file."""
         names = [str(name) for name in self.cells.columns]
         if names.count(column) != 1:
             what = "appears twice" if column in names else "is missing"
@@ -96,7 +81,7 @@ class TextTable:
         return self.cells[column]
 
     def rows(self, keep: NDArray[np.bool_]) -> TextTable:
-        """The table with only the rows where `keep` (rows,) is true."""
+        """Return the table with only the rows where `keep` (rows,) is true."""
         return TextTable(self.path, self.cells[keep], self.lines[keep], self.decimal)
 
 
@@ -105,34 +90,21 @@ MOST_MISSING = 10**7
 
 
 def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> None:
-    """That a table is not mostly holes: a long row of names makes cells for every short row.
-
-    line : of the names. width : how many. rows : below them, of so many letters in all.
-
-    Raises
-    ------
-    InputError : it is.
-    """
+    """Refuse a table that is mostly holes: a long row of names, far shorter rows."""
     if width * rows > letters + MOST_MISSING:
         problem = f"{width} names, and {rows} rows that are far shorter; is it a table?"
         raise InputError(path, f"line {line}", problem)
 
 
 def read_table(path: Path | str, comment: str = "#") -> TextTable:
-    """Read a table with a header line; blank lines and those that start with `comment` are skipped.
-
-    Raises
-    ------
-    InputError : no such file, not text, empty, a row with too many cells.
-    """
+    """Read a table with a header line, without blank lines and those that start with `comment`."""
     import pandas as pd
 
     path = Path(path)
     numbered = read_lines(path, comment)
     if len(numbered) < 2:
         found = "only a header line" if numbered else "nothing"
-        problem = f"expected a header line and rows of numbers, found {found}"
-        raise InputError(path, "", problem)
+        raise InputError(path, "", f"expected a header line and rows of numbers, found {found}")
     letters = sum(len(text) for _, text in numbered)
     check_width(path, numbered[0][0], numbered[0][1].count(",") + 1, len(numbered), letters)
     lines = np.array([number for number, _ in numbered])
@@ -145,7 +117,7 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
             body, header=None, dtype=str, keep_default_na=False, skip_blank_lines=False
         )
     except (ValueError, OverflowError) as error:
-        raise InputError(path, _where(error, lines), _what(error)) from None
+        raise InputError(path, *_complaint(error, lines)) from None
     if len(cells) != len(lines):
         raise InputError(path, "", "a quotation mark that is opened and not closed on its line")
     cells = cells.fillna("")
@@ -154,58 +126,47 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
 
 
 def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> list[tuple[int, str]]:
-    """Line numbers from 1 and text of the lines that are neither blank nor a comment.
+    """Read the lines that are neither blank nor a comment, with their numbers from 1.
 
-    any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit, as test
-        machines write them.
-
-    Raises
-    ------
-    InputError : no such file, not text.
+    any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit.
     """
     try:
         content = content_of(path)
-        text = content.decode(_encoding(content) if any_encoding else "utf-8-sig")
+        text = _decoded(content) if any_encoding else content.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        problem = "is not text in UTF-8; save it as a comma-separated table"
-        raise InputError(path, "", problem) from None
+        raise InputError(
+            path, "", "is not text in UTF-8; save it as a comma-separated table"
+        ) from None
     if "\0" in text:
         raise InputError(path, "", "is not a text file; save it as a comma-separated table")
     kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
 
 
-def _encoding(content: bytes) -> str:
+def _decoded(content: bytes) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
+        return content.decode("utf-16")
     try:
-        content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8-sig"
+        return content.decode("latin-1")
 
 
-def _where(error: Exception, lines: NDArray[np.intp]) -> str:
-    """pandas counts the lines that it was given; say the file's own number."""
-    found = re.search(r"(line|row) (\d+)", str(error))
-    if not found:
-        return ""
-    # "row" counts from 0, "line" from 1.
-    index = int(found[2]) - (found[1] == "line")
-    return f"line {lines[min(max(index, 0), len(lines) - 1)]}"
-
-
-def _what(error: Exception) -> str:
-    found = re.search(r"Expected (\d+) fields in line \d+, saw (\d+)", str(error))
-    if found:
-        return f"expected {found[1]} cells as in the header, found {found[2]}"
-    if "EOF inside string" in str(error):
-        return "a quotation mark that is opened and not closed"
-    return f"is not a comma-separated table ({' '.join(str(error).split())[:200]})"
+def _complaint(error: Exception, lines: NDArray[np.intp]) -> tuple[str, str]:
+    """Return place and problem of an error of pandas, which counts the lines it was given."""
+    text, at = " ".join(str(error).split()), ""
+    if found := re.search(r"(line|row) (\d+)", text):
+        index = int(found[2]) - (found[1] == "line")  # "row" counts from 0, "line" from 1
+        at = f"line {lines[min(max(index, 0), len(lines) - 1)]}"
+    if found := re.search(r"Expected (\d+) fields in line \d+, saw (\d+)", text):
+        return at, f"expected {found[1]} cells as in the header, found {found[2]}"
+    if "EOF inside string" in text:
+        return at, "a quotation mark that is opened and not closed"
+    return at, f"is not a comma-separated table ({text[:200]})"
 
 
 def write_table(
@@ -214,14 +175,7 @@ def write_table(
     rows: Sequence[Sequence[object]],
     comment: str | None = None,
 ) -> None:
-    """Write a comma-separated table; floats so that they read back exactly.
-
-    comment : one line above the header, after "# ".
-
-    Raises
-    ------
-    OSError : the file cannot be written; what was there may be lost.
-    """
+    """Write a comma-separated table; floats so that they read back exactly."""
     with open(path, "w", encoding="utf-8", newline="") as stream:
         if comment is not None:
             stream.write(f"# {comment}\n")
@@ -236,17 +190,12 @@ _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds one number, with either mark."""
+    """Return whether a cell holds one number, with either mark."""
     return bool(_NUMBER.fullmatch(cell))
 
 
 def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
-    """The mark, "." or ",", of cells that should be numbers: line, name of the column, text.
-
-    Raises
-    ------
-    InputError : commas that may be marks of thousands.
-    """
+    """Return the decimal mark of cells that should be numbers: (line, column, text)."""
     commas = [one for one in cells if _COMMA.fullmatch(one[2])]
     points = any("." in cell and is_number(cell) for _, _, cell in cells)
     if not commas or points:

@@ -1,12 +1,18 @@
-"""The points of a frame from a table in a text file."""
+"""The points of a frame from a table in a text file.
+
+Header, row of units, separator and decimal mark are found by the meaning of the names. Whole
+columns are read by pandas; what does not fit it is read cell by cell, so that an error names its
+line.
+"""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +23,17 @@ from .frames import (
     FLAGGED,
     LENGTHS,
     PIXELS,
+    Frame,
     FrameOptions,
     FrameRows,
     Heading,
     columns_of,
+    frame_of,
     heading_of,
 )
 from .tables import HOLES, TextTable, check_width, decimal_mark, is_number, read_lines
 
-# Where the numbers of a table of points stand in a text file: header, units, separator, mark.
-#
-# Exports differ in what stands above the row of names, in whether a row of units follows it, and
-# in the separator. All of it is found by what the names mean (`frame_headings`).
-
+Array = NDArray[np.float64]
 #: Line number from 1 and text.
 Lines = list[tuple[int, str]]
 
@@ -43,11 +47,10 @@ SAMPLE = 500
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Where the numbers stand.
+    """Layout of the numbers in a file.
 
-    separator : None for blanks. headings : of the columns. columns : those of each quantity, see
-    `frame_headings.columns_of`. header : line number of the names. body : the rows of numbers.
-    decimal : the mark.
+    separator : None for blanks. columns : by quantity. header : line of the names. decimal : the
+    mark.
     """
 
     separator: str | None
@@ -59,7 +62,7 @@ class TextLayout:
 
 
 def cells_of(text: str, separator: str | None) -> list[str] | None:
-    """The cells of one line; None where a quotation mark is opened and not closed on it."""
+    """Return the cells of one line; None where a quotation mark is not closed on it."""
     if separator is None and '"' not in text:
         return text.split()
     if '"' not in text:
@@ -81,19 +84,9 @@ def find_layout(
     decimal: str | None = None,
     upper: bool = False,
 ) -> TextLayout:
-    """The layout of a file.
+    """Find the layout of a file; a row of names may be a comment.
 
-    Parameters
-    ----------
-    quantities : what its rows must hold.
-    named : the file's own names of some of them.
-    comment : lines that start so are passed over; a row of names may be one of them.
-    decimal : the mark, where it is known.
-    upper : see `frame_headings.columns_of`.
-
-    Raises
-    ------
-    InputError : no such file, no text, no row of names, a mark that may be one of thousands.
+    named : the file's own names of some quantities. upper : see `frames.columns_of`.
     """
     lines = read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
@@ -126,7 +119,7 @@ def find_layout(
 def _best_header(
     lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
 ) -> tuple[int, str | None, list[str]] | None:
-    """The row of names that tells most quantities, by any separator: index, separator, names."""
+    """Return the row of names with most quantities: index, separator, names."""
     best: tuple[tuple[int, bool, bool, bool, int], int, str | None, list[str]] | None = None
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:TOP]):
@@ -148,12 +141,12 @@ def _best_header(
 
 
 def _is_numbers(row: Sequence[str]) -> bool:
-    """Whether half of the cells or more are numbers."""
+    """Return whether half of the cells or more are numbers."""
     return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
 
 
 def _is_units(row: Sequence[str]) -> bool:
-    """Whether a row below the names is one of units: some are lengths, and none is a number."""
+    """Return whether a row is one of units: some are lengths, none a number."""
     plain = [cell.strip("()[]<>{} ").casefold() for cell in row]
     known = any(cell in LENGTHS or cell in PIXELS for cell in plain)
     return known and not any(is_number(cell) for cell in plain)
@@ -192,20 +185,6 @@ def _nothing_found(lines: Lines) -> str:
 Flag = tuple[int, Sequence[int] | None]
 
 
-def quantity_columns(
-    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
-) -> dict[str, int]:
-    """The one column of each quantity and flag that the headings tell; `named` : the file's own.
-
-    Raises
-    ------
-    InputError : a quantity that was asked for is missing, or may be in several columns.
-    """
-    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
-    _check_there(path, layout, columns, options)
-    return columns
-
-
 def flag_columns(
     path: Path,
     layout: TextLayout,
@@ -213,13 +192,9 @@ def flag_columns(
     options: FrameOptions,
     status: tuple[str, Sequence[int]] | None,
 ) -> list[Flag]:
-    """The flags that are named; those the headings tell only where none is.
+    """Return the flags that are named, else those that the headings show.
 
     status : a column of states, and the values of good rows.
-
-    Raises
-    ------
-    InputError : a column that is named is missing, or there are two of the name.
     """
     names = [heading.name for heading in layout.headings]
     asked = [(options.flag_column, (0,)), (options.valid_column, None)]
@@ -238,7 +213,7 @@ def flag_columns(
 def _one(
     path: Path, layout: TextLayout, key: str, where: Sequence[int], named: Mapping[str, str]
 ) -> int:
-    """The one column of a quantity."""
+    """Return the one column of a quantity."""
     if len(where) == 1:
         return where[0]
     names = [heading.name for heading in layout.headings]
@@ -260,10 +235,11 @@ def _named(path: Path, names: Sequence[str], name: str) -> int:
     raise InputError(path, f"column {name!r}", problem)
 
 
-def _check_there(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions
-) -> None:
-    """Every quantity asked for is there, or can be had of the places before and after."""
+def quantity_columns(
+    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
+) -> dict[str, int]:
+    """Return the one column of each quantity and flag; `named` gives the file's own names."""
+    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
     spare = {"z", "dz"} if options.planar else set()
     for quantity in options.quantities:
         axis = quantity[-1]
@@ -275,15 +251,9 @@ def _check_there(
         there = ", ".join(heading.name for heading in layout.headings)[:300]
         problem = f"this column is missing; the file has: {there}"
         raise InputError(path, f"column {quantity!r}", problem)
+    return columns
 
 
-# The numbers of a table in a text file, at the speed of pandas' reader where it can.
-#
-# The quick way takes whole columns as numbers; whatever does not fit it (a comment amidst the
-# rows, a cell that is no number, a row with a cell too many) is read again cell by cell, so that a
-# complaint names its line.
-
-Array = NDArray[np.float64]
 #: Flags in words, in small letters.
 WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
 
@@ -291,19 +261,14 @@ WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invali
 def read_numbers(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """The numbers (good rows,) of each quantity, and which rows (rows,) the flags call good.
-
-    Raises
-    ------
-    InputError : naming line and column.
-    """
+    """Return the numbers (good rows,) by quantity, and the mask (rows,) of rows that flags pass."""
     return _quick(layout, columns, flags) or _slow(path, layout, columns, flags)
 
 
 def _quick(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
-    """All rows by pandas' reader; None where they have to be looked at one by one."""
+    """Read all rows by pandas; None where they have to be read one by one."""
     import pandas as pd
 
     separator, width = layout.separator, len(layout.headings)
@@ -348,12 +313,7 @@ def _quick(
 def _slow(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Row by row; flags first: a doubtful row may hold anything.
-
-    Raises
-    ------
-    InputError : naming line and column.
-    """
+    """Read row by row, flags first: a doubtful row may hold anything."""
     import pandas as pd
 
     width, rows = len(layout.headings), []
@@ -371,7 +331,7 @@ def _slow(
         rows.append((row + [""] * width)[:width])
     names = [heading.name for heading in layout.headings]
     lines = np.array([number for number, _ in layout.body])
-    # By position: names may appear twice where nobody asks for them.
+    # By position: names may appear twice where they are not asked for.
     cells = pd.DataFrame(rows, dtype=str)
     good = np.ones(len(rows), dtype=bool)
     for i, values in flags:
@@ -391,6 +351,15 @@ def _slow(
 UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
 
 
+def text_reader(format: str, **settings: Any) -> Callable[[Path, FrameOptions], Sequence[Frame]]:
+    """Return the reader of a format with one frame a text file; settings of `read_text_rows`."""
+
+    def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
+        return [frame_of(read_text_rows(path, options, **settings), options, path, format)]
+
+    return read
+
+
 def read_text_rows(
     path: Path,
     options: FrameOptions,
@@ -401,19 +370,11 @@ def read_text_rows(
     names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
 ) -> FrameRows:
-    """The rows of the one frame in a text file.
+    """Read the rows of the one frame in a text file.
 
-    Parameters
-    ----------
-    comment : that of the format, where it has one of its own.
-    upper : of two names that differ only in their letters' size, the large one is the length.
-    names : what the format calls some quantities; the user's own come first.
-    status : a column of states, and the values of good rows.
-
-    Raises
-    ------
-    InputError : naming file, line and column: no such file, missing columns, cells that are not
-        numbers.
+    comment : that of the format. upper : see `frames.columns_of`. names : the format's names of
+    some quantities; the user's come first. status : a column of states, and the values of good
+    rows.
     """
     own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **own}

@@ -13,8 +13,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from bubblefit.experiments.biaxial.data import cycles_of, evaluated_paths, read_biaxial_table
 from bubblefit.materials.designers import LinearPath, Options, evaluate, line_of
-from bubblefit.readers.biaxial import cycles_of, evaluated_paths, read_biaxial_table
 
 LOWEST, HIGHEST = 2.0, 30.0
 #: Published: E_x t, E_y t (kN/m), nu_xy, nu_yx, S (%^2) by options.

@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from pydantic import BaseModel
 
 from ...materials.law import HypoelasticLaw
-from ..kinds import (
-    Candidate,
-    Kind,
-    MakeSolver,
-    Place,
-    Planning,
-    Predicted,
-    Studied,
-)
-from .candidates import candidates
-from .prepared import PreparedBiaxial
+from ..kinds import Kind, MakeSolver, Predicted, Studied
+from .prepared import PreparedBiaxial, candidates
 from .section import BiaxialSection
 from .test import BiaxialTest, read
 
@@ -32,26 +21,15 @@ class Biaxial:
     fitted: bool = True
     predicted: Predicted | None = None
     doubts: tuple[str, ...] = ("strain-unit", "load-unit", "ratio", "modulus", "swapped")
+    read = staticmethod(read)
+    candidates = staticmethod(candidates)
     studied: Studied | None = None
-
-    def read(self, section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-        """The test of a section, and its files.
-
-        Raises
-        ------
-        InputError : naming the file and the dotted key, or a data file.
-        """
-        return read(section, place, name)
 
     def prepare(
         self, test: BiaxialTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedBiaxial:
-        """Return the test as it is: its data were read with its section."""
+        """Return the test, which was read with its data."""
         return PreparedBiaxial(test)
-
-    def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Single ratios, up to the strains that the law is known for."""
-        return candidates(planning)
 
 
 KIND: Kind = Biaxial()

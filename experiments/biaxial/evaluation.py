@@ -1,10 +1,15 @@
-"""The linear evaluation of a biaxial test: designers' constants, and what they hang on."""
+"""The linear evaluation of a biaxial test: designers' constants, their dependence on options.
+
+Residual strain, for which a cutting pattern is compensated, is the strain at the beginning of a
+loading, or after the last one, less that of the file's first row, where the test was under its
+prestress. It is known only where both loads are the same as there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -12,7 +17,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import replacing
 from ...materials.designers import (
     POINTS,
     USUAL,
@@ -27,18 +31,9 @@ from ...materials.designers import (
     spread_of,
 )
 from ...notes import Note, NoteKind, rows
-from ...readers.biaxial import BiaxialPath, BiaxialTable, Cycle, Which, evaluated_paths
-from ...reports.strips import BiaxialPanel, biaxial_charts
-from ...reports.vega import save
-from .objective import PERCENT
+from .data import BiaxialPath, Which, evaluated_paths
+from .prepared import PERCENT
 from .test import BiaxialData, BiaxialTest
-
-# Strain that a fabric keeps of a biaxial test: what a cutting pattern is compensated for.
-#
-# It is by how much the strain at the beginning of a loading, or after the last one, differs from
-# that of the file's first row, where the test was under its prestress. It is told only where both
-# loads are what they were there: a fabric under other loads has other strains, and keeps nothing
-# by that.
 
 Array = NDArray[np.float64]
 #: Of a loading's range: how near both loads must be to those of the first row.
@@ -47,10 +42,10 @@ BACK = 0.01
 
 @dataclass(frozen=True, eq=False)
 class KeptStrain:
-    """Of one phase of cycles, (2,) along warp and fill, as shares.
+    """Residual strains of one phase of cycles, (2,) along warp and fill, as shares.
 
-    before : at the beginning of its first loading; after : when the loads are back after its last
-    one. None where they are not what they were in the first row. load : (2,) kN/m, of that row.
+    before, after : at the beginning of its first loading, and when the loads are back after its
+    last; None where they are not those of the first row, load (2,) kN/m.
     """
 
     file: str
@@ -63,57 +58,38 @@ class KeptStrain:
 
 
 def kept_strains(data: BiaxialData) -> tuple[KeptStrain, ...]:
-    """Phase by phase in the order of the files."""
-    return tuple(
-        _kept(table, same, cycles)
-        for table, cycles in zip(data.tables, data.cycles, strict=True)
-        for same in _phases(cycles)
-    )
-
-
-def _phases(cycles: Sequence[Cycle]) -> list[list[Cycle]]:
-    found: dict[int, list[Cycle]] = {}
-    for cycle in cycles:
-        found.setdefault(cycle.phase, []).append(cycle)
-    return list(found.values())
-
-
-def _kept(table: BiaxialTable, same: Sequence[Cycle], cycles: Sequence[Cycle]) -> KeptStrain:
-    first, last = same[0], same[-1]
-    later = [cycle.first for cycle in cycles if cycle.first > last.last]
-    stop = (later[0] if later else len(table.load) - 1) + 1
-    away = np.abs(table.load - table.load[0]).max(axis=1)
-    least = BACK * float(np.ptp(table.load.max(axis=1)))
-
-    def kept(row: int) -> Array | None:
-        return table.strain[row] - table.strain[0] if away[row] <= least else None
-
-    back = last.last + int(np.argmin(away[last.last : stop]))
-    return KeptStrain(
-        table.path.name,
-        last.ratio,
-        last.phase,
-        len(same),
-        kept(first.first),
-        kept(back),
-        table.load[0],
-    )
+    """Return residual strains phase by phase in the order of the files."""
+    found = []
+    for table, cycles in zip(data.tables, data.cycles, strict=True):
+        away = np.abs(table.load - table.load[0]).max(axis=1)
+        least = BACK * float(np.ptp(table.load.max(axis=1)))
+        for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
+            same = list(phase)
+            last = same[-1]
+            later = [cycle.first for cycle in cycles if cycle.first > last.last]
+            stop = (later[0] if later else len(table.load) - 1) + 1
+            back = last.last + int(np.argmin(away[last.last : stop]))
+            before, after = (
+                table.strain[row] - table.strain[0] if away[row] <= least else None
+                for row in (same[0].first, back)
+            )
+            name, load = table.path.name, table.load[0]
+            found.append(KeptStrain(name, last.ratio, last.phase, len(same), before, after, load))
+    return tuple(found)
 
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
 WIDE = 1.1
-#: Of what a spread is told.
+#: Constants and their names.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "nu fill"}
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
-    """Constants of one test.
+    """Elastic constants of one test.
 
-    paths, lines : measured, and their regression lines, ratio by ratio. chosen : of the options
-    that were asked for; others : of the others that the paths settle. first, last : of the same
-    options with the first and the last cycle of each ratio, None where they do not settle it.
-    kept : strain that the fabric kept, ratio by ratio.
+    lines : regression lines of the paths. others : of other options that the paths settle. first,
+    last : with the first and the last cycle of each ratio, None where they do not settle it.
     """
 
     test: str
@@ -127,7 +103,7 @@ class BiaxialEvaluation:
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader of the constants should know."""
+        """Return notes for a reader of the constants."""
         c, found = self.chosen.constants, []
         if not c.stable:
             words = (
@@ -148,20 +124,15 @@ class BiaxialEvaluation:
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
-        """Least and largest of each constant over all options."""
+        """Return the least and largest of each constant over all options."""
         ends = spread_of((self.chosen, *self.others))
         return {NAMES[name]: pair for name, pair in ends.items()}
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
-    """The constants of a test by some options, beside those of all others.
-
-    Raises
-    ------
-    InputError : paths that do not settle the constants.
-    """
+    """Return the constants of a test by some options, beside those of all others."""
     paths = test.data.paths
-    lines = _lines(paths)
+    lines = linear_paths(paths)
     there = [line.ratio for line in lines]
     missing = [ratio for ratio in options.ratios if ratio not in there]
     if missing:
@@ -184,12 +155,13 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     )
 
 
-def _lines(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
+def linear_paths(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
+    """Return the regression lines of paths."""
     return tuple(line_of(path.ratio, path.load, path.since) for path in paths)
 
 
 def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
-    """With another cycle of the same ratios, without the conditioning that is asked for."""
+    """Return the paths of another cycle of the same ratios, without conditioning."""
     section, data = test.section, test.data
     ratios = [path.ratio for path in data.paths]
     paths = evaluated_paths(data.tables, data.cycles, which, section.conditioning, ratios)
@@ -198,7 +170,7 @@ def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation |
             paths = [path.between(*section.range) for path in paths]
         except InputError:
             return None
-    return evaluate_or_none(_lines(paths), options)
+    return evaluate_or_none(linear_paths(paths), options)
 
 
 #: nu_warp and nu_fill in words.
@@ -209,7 +181,7 @@ CONVENTION = (
 
 
 def in_words(options: Options) -> str:
-    """What was evaluated, in a few words."""
+    """Return a description of what was evaluated."""
     of = "loads" if options.minimise == "load" else "strains"
     unloaded = "with" if options.unloaded else "without"
     reciprocal = "reciprocal" if options.reciprocal else "free"
@@ -218,7 +190,7 @@ def in_words(options: Options) -> str:
 
 
 def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row for each choice: options, constants of both forms, squares of strain.
+    """Return a table of constants of both forms and squares of strain, by options.
 
     Columns E in kN/m, A (direct form) in kN/m, squares in %^2 at `POINTS` points a path.
     """
@@ -229,58 +201,42 @@ def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row a ratio: cycle, loads and strains of the regression lines, what they leave."""
+    """Return a table of the regression lines, by ratio."""
     table = []
     for path, line in zip(found.paths, found.lines, strict=True):
-        table.append(
-            {
-                "ratio": path.ratio,
-                "file": path.table.path.name,
-                "cycle": path.cycle.number,
-                "cycles": path.cycles,
-                "readings": len(path.load),
-                "from_kN_per_m": float(path.load[0].max()),
-                "to_kN_per_m": float(path.load[-1].max()),
-                "warp_load_change_kN_per_m": line.load[0],
-                "fill_load_change_kN_per_m": line.load[1],
-                "warp_strain_change_percent": PERCENT * line.strain[0],
-                "fill_strain_change_percent": PERCENT * line.strain[1],
-                "warp_rms_about_line_percent": PERCENT * line.residual[0],
-                "fill_rms_about_line_percent": PERCENT * line.residual[1],
-                "rms_of_constants_percent": found.chosen.rms[path.ratio],
-            }
-        )
+        row = {
+            "ratio": path.ratio,
+            "file": path.table.path.name,
+            "cycle": path.cycle.number,
+            "cycles": path.cycles,
+            "readings": len(path.load),
+            "from_kN_per_m": float(path.larger[0]),
+            "to_kN_per_m": float(path.larger[-1]),
+        }
+        for what, values in (
+            ("load_change_kN_per_m", line.load),
+            ("strain_change_percent", PERCENT * np.asarray(line.strain)),
+            ("rms_about_line_percent", PERCENT * np.asarray(line.residual)),
+        ):
+            row |= {f"warp_{what}": values[0], f"fill_{what}": values[1]}
+        table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
     return pd.DataFrame(table)
 
 
 def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """A row a phase of cycles: strain kept before and after it, %."""
-
-    def percent(strain: Array | None) -> Array:
-        return np.full(2, np.nan) if strain is None else PERCENT * strain
-
+    """Return a table of residual strains before and after each phase of cycles, %."""
     table = []
-    for kept in found.kept:
-        before, after = percent(kept.before), percent(kept.after)
-        table.append(
-            {
-                "file": kept.file,
-                "phase": kept.phase,
-                "ratio": kept.ratio,
-                "cycles": kept.cycles,
-                "warp_before_percent": before[0],
-                "fill_before_percent": before[1],
-                "warp_after_percent": after[0],
-                "fill_after_percent": after[1],
-                "warp_load_kN_per_m": kept.load[0],
-                "fill_load_kN_per_m": kept.load[1],
-            }
-        )
+    for k in found.kept:
+        row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
+        for when, strain in (("before", k.before), ("after", k.after)):
+            values = np.full(2, np.nan) if strain is None else PERCENT * strain
+            row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
+        table.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
     return pd.DataFrame(table)
 
 
 def lines_of(found: BiaxialEvaluation) -> list[str]:
-    """For the terminal."""
+    """Return the results as lines for the terminal."""
     c = found.chosen.constants
     said = [
         f"{found.test}: {in_words(found.chosen.options)}; {found.chosen.paths} strain paths of "
@@ -317,7 +273,7 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
 
 
 def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
-    """For result.json."""
+    """Return the results for result.json."""
 
     def plain(table: pd.DataFrame) -> list[dict[str, Any]]:
         return [
@@ -335,28 +291,3 @@ def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
         "spread": {name: list(ends) for name, ends in found.spread.items()},
         "notes": rows(found.notes),
     }
-
-
-def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
-    """constants.csv, lines.csv, kept.csv and constants.png into a folder; what was written."""
-    written = []
-    for name, table in (
-        ("constants.csv", option_table(found)),
-        ("lines.csv", line_table(found)),
-        ("kept.csv", kept_table(found)),
-    ):
-        with replacing(folder / (prefix + name)) as path:
-            table.to_csv(path, index=False, float_format="%.9g")
-        written.append(folder / (prefix + name))
-    panels = []
-    for measured in found.paths:
-        load = measured.load
-        strain = PERCENT * found.chosen.constants.strain(load - load[0])
-        larger = load.max(axis=1)
-        panels.append(
-            BiaxialPanel(
-                measured.ratio, larger, PERCENT * measured.since, (("constants", larger, strain),)
-            )
-        )
-    written.append(save(folder / f"{prefix}constants.png", biaxial_charts("ratios", panels)))
-    return written

@@ -1,9 +1,10 @@
-"""What a biaxial test puts on the page of a fit, and the files that it writes."""
+"""Results of biaxial tests as numbers, tables, figures and files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,29 +14,26 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...files import replacing
 from ...materials.card import MaterialCard
-from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import elongations
 from ...notes import Note, NoteKind
-from ...readers.biaxial import BiaxialPath
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
-from .objective import PERCENT
-from .prepared import FittedPath, PreparedBiaxial
+from .data import BiaxialPath
+from .evaluation import BiaxialEvaluation, kept_table, line_table, option_table
+from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
+Array = NDArray[np.float64]
 YARNS = ("warp", "fill")
 
 
 def misfit_table(paths: Sequence[FittedPath]) -> Table:
-    """Misfit ratio by ratio."""
+    """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
-        [
-            p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
-            float(p.path.load[0].max()), float(p.path.load[-1].max()),
-            *(PERCENT * p.path.residual).tolist(),
-        ]
+        [p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
+         *p.path.larger[[0, -1]].tolist(), *(PERCENT * p.path.residual).tolist()]
         for p in paths
     ]  # fmt: skip
     header = [
@@ -50,112 +48,24 @@ def misfit_table(paths: Sequence[FittedPath]) -> Table:
 
 
 def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Loads and strains of every ratio, measured and modelled, since the beginning of the path."""
+    """Return loads and strains of every ratio, measured and modelled, along the path."""
     parts = []
     for p in paths:
-        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
-        parts.append(
-            pd.DataFrame(
-                {
-                    "ratio": p.path.ratio,
-                    "warp_load_kN_per_m": p.path.load[:, 0],
-                    "fill_load_kN_per_m": p.path.load[:, 1],
-                    "warp_strain_percent": measured[:, 0],
-                    "fill_strain_percent": measured[:, 1],
-                    "warp_model_percent": modelled[:, 0],
-                    "fill_model_percent": modelled[:, 1],
-                }
-            )
+        parts.append(_columns(p.path.load, "load_kN_per_m"))
+        parts[-1].insert(0, "ratio", p.path.ratio)
+        strains = (("strain", p.objective.strain), ("model", p.objective.modelled(p.history)))
+        parts[-1][[f"{yarn}_{name}_percent" for name, _ in strains for yarn in YARNS]] = (
+            PERCENT * np.hstack([strain for _, strain in strains])
         )
     return pd.concat(parts, ignore_index=True)
 
 
-def residual_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Every matched strain: part, loads, quantity, measured, modelled, difference, unit."""
-    parts = []
-    for p in paths:
-        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
-        for k, yarn in enumerate(YARNS):
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "part": p.path.ratio,
-                        "warp_load_kN_per_m": p.path.load[1:, 0],
-                        "fill_load_kN_per_m": p.path.load[1:, 1],
-                        "quantity": f"{yarn}_strain",
-                        "measured": measured[1:, k],
-                        "modelled": modelled[1:, k],
-                        "difference": (modelled - measured)[1:, k],
-                        "unit": "%",
-                    }
-                )
-            )
-    return pd.concat(parts, ignore_index=True)
-
-
-Array = NDArray[np.float64]
-
-CAPTION = "Strain over the larger load: measured and modelled"
-
-
-def exhibit(
-    test: BiaxialTest, paths: Sequence[FittedPath], law: HypoelasticLaw, out: Output
-) -> Exhibit:
-    """Write paths.csv and the picture of the ratios."""
-    with replacing(out.path("paths.csv")) as path:
-        path_table(paths).to_csv(path, index=False, float_format="%.9g")
-    panels = [
-        BiaxialPanel(
-            p.path.ratio,
-            p.path.load.max(axis=1),
-            PERCENT * p.objective.strain,
-            (("model", p.path.load.max(axis=1), PERCENT * p.objective.modelled(p.history)),),
-        )
-        for p in paths
-    ]
-    charts = biaxial_charts(f"{test.name} ratios", panels, CAPTION)
-    save(out.path("paths.png"), charts)
-    return Exhibit(
-        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
-        tables=[misfit_table(paths)],
-        files=[
-            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
-            (out.name("paths.png"), "picture of the ratios"),
-        ],
-        parts=[charts],
-    )
-
-
-def findings_of(test: BiaxialTest, paths: Sequence[FittedPath]) -> Findings:
-    """Numbers and words of the best fit."""
-    errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
-    summary = f"RMS errors of strain along warp / fill in %: {errors}"
-    return Findings(
-        numbers={"ratios": {p.path.ratio: _numbers(p) for p in paths}},
-        warnings=tuple(_warnings(test)),
-        lines=(summary,),
-        quality=summary,
-        summary=summary,
-    )
-
-
-def _numbers(fitted: FittedPath) -> dict[str, Any]:
-    path = fitted.path
-    return {
-        "rms_warp_percent": fitted.rms[0],
-        "rms_fill_percent": fitted.rms[1],
-        "matched": len(path.load),
-        "cycle": path.cycle.number,
-        "cycles": path.cycles,
-        "end_load_warp_kN_per_m": float(path.load[-1, 0]),
-        "end_load_fill_kN_per_m": float(path.load[-1, 1]),
-        "residual_warp_percent": 100 * float(path.residual[0]),
-        "residual_fill_percent": 100 * float(path.residual[1]),
-    }
+def _columns(values: Array, name: str) -> pd.DataFrame:
+    return pd.DataFrame(values, columns=[f"{yarn}_{name}" for yarn in YARNS])
 
 
 def _warnings(test: BiaxialTest) -> list[Note]:
-    """What the data leave open before any fit."""
+    """Return warnings of what the data leave open before any fit."""
     words = (
         f"{test.name} pulls along the yarns only: it says nothing of G12, which rests on other "
         "tests or stays where its fit began"
@@ -165,43 +75,12 @@ def _warnings(test: BiaxialTest) -> list[Note]:
     return notes + [Note(NoteKind.READING, words) for words in said]
 
 
-PATHS = "biaxial.png"
-
-
-def exhibit_examined(test: BiaxialTest, out: Output) -> Exhibit:
-    """Write the paths that are evaluated; a table of all cycles."""
-    panels = [
-        BiaxialPanel(path.ratio, path.load.max(axis=1), PERCENT * path.since)
-        for path in test.data.paths
-    ]
-    save(out.path(PATHS), biaxial_charts("ratios", panels))
-    used = {(id(path.table), path.cycle.count) for path in test.data.paths}
-    rows: list[list[object]] = []
-    for read, cycles in zip(test.data.tables, test.data.cycles, strict=True):
-        for cycle in cycles:
-            kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
-            rows.append(
-                [
-                    read.path.name, cycle.count, cycle.ratio, cycle.number,
-                    *read.load[cycle.last].tolist(), *kept.tolist(),
-                    "yes" if (id(read), cycle.count) in used else "",
-                ]
-            )  # fmt: skip
-    header = [
-        "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
-        "strain kept before it, warp, %", "fill, %", "evaluated",
-    ]  # fmt: skip
-    table = Table("Cycles as read", header, rows, text=(0, 2, 8))
-    figures = [(out.name(PATHS), "the loading of each ratio that is evaluated")]
-    return Exhibit(figures=figures, tables=[table])
-
-
 @dataclass(frozen=True, eq=False)
 class Loading:
     """One card along one measured path.
 
-    larger : (n,) kN/m, strain : (n, 2) % since the beginning, of the loads that are shown. rms :
-    (2,) % off the measured strains, None where no load is shown. reached : (3,) strains.
+    larger, strain : (n,) kN/m, (n, 2) % of the loads shown. rms : (2,) % or None. reached : (3,)
+    strains.
     """
 
     path: BiaxialPath
@@ -222,9 +101,9 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """Write paths.csv and paths.png; a failed analysis is told as such.
+    """Write paths.csv and paths.png, also of failed analyses.
 
-    within_range : show each path only to where the card's valid range ends.
+    within_range : show each path only up to the card's valid range.
     """
     found: Loadings = {
         (name, path.ratio): _loading(path, card, runs[name, path.ratio], within_range)
@@ -232,11 +111,11 @@ def simulate(
         for name, card in cards.items()
     }
     _write_paths(test, found, out)
-    told: dict[str, Any] = {name: {"ratios": {}} for name in cards}
+    numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
     for (name, ratio), one in found.items():
-        told[name]["ratios"][ratio] = _loading_numbers(one)
+        numbers[name]["ratios"][ratio] = _loading_numbers(one)
     figures = [(out.name("paths.png"), "Strain over the larger load")]
-    return Simulation({"cards": told}, _lines_of_cards(found), figures)
+    return Simulation({"cards": numbers}, _lines_of_cards(found), figures)
 
 
 def _loading(
@@ -249,12 +128,11 @@ def _loading(
     strain = PERCENT * (own - own[0])[:shown]
     off = strain - PERCENT * path.since[:shown]
     warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist() if shown else (None, None)
-    larger = path.load.max(axis=1)[:shown]
-    return Loading(path, larger, strain, (warp, fill), strains_of(run.outcome))
+    return Loading(path, path.larger[:shown], strain, (warp, fill), strains_of(run.outcome))
 
 
 def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
-    """For result.json."""
+    """Return the results for result.json."""
     if isinstance(one, SolverFailure):
         return {"failed": one.reason}
     return {
@@ -266,7 +144,7 @@ def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
 
 
 def _lines_of_cards(found: Loadings) -> list[str]:
-    """The same for the terminal."""
+    """Return the results as lines for the terminal."""
     lines = []
     for (name, ratio), one in found.items():
         if isinstance(one, SolverFailure):
@@ -281,19 +159,13 @@ def _lines_of_cards(found: Loadings) -> list[str]:
 
 def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
     ended = {key: one for key, one in found.items() if isinstance(one, Loading)}
-    tables = [
-        pd.DataFrame(
-            {
-                "card": name,
-                "ratio": ratio,
-                "warp_load_kN_per_m": one.path.load[: len(one.larger), 0],
-                "fill_load_kN_per_m": one.path.load[: len(one.larger), 1],
-                "warp_strain_percent": one.strain[:, 0],
-                "fill_strain_percent": one.strain[:, 1],
-            }
-        )
-        for (name, ratio), one in ended.items()
-    ]
+    tables = []
+    for (name, ratio), one in ended.items():
+        table = _columns(one.path.load[: len(one.larger)], "load_kN_per_m")
+        table[[f"{yarn}_strain_percent" for yarn in YARNS]] = one.strain
+        table.insert(0, "card", name)
+        table.insert(1, "ratio", ratio)
+        tables.append(table)
     if tables:
         with replacing(out.path("paths.csv")) as file:
             pd.concat(tables, ignore_index=True).to_csv(file, index=False, float_format="%.9g")
@@ -304,32 +176,126 @@ def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
             for (name, ratio), one in ended.items()
             if ratio == path.ratio and len(one.larger)
         )
-        larger = path.load.max(axis=1)
-        panels.append(BiaxialPanel(path.ratio, larger, PERCENT * path.since, curves))
+        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
     save(out.path("paths.png"), biaxial_charts("ratios", panels))
 
 
 def _within(card: MaterialCard, elongation: Array) -> int:
-    """Loads before a strain leaves the card's valid range."""
+    """Return the number of loads within the card's valid range."""
     beyond = (np.log1p(elongation) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
     return int(np.argmax(beyond)) if beyond.any() else len(elongation)
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    return findings_of(prepared.test, prepared.fitted_paths(fitted))
+    paths, numbers = prepared.fitted_paths(fitted), {}
+    for p in paths:
+        warp, fill = p.rms
+        numbers[p.path.ratio] = {
+            "rms_warp_percent": warp,
+            "rms_fill_percent": fill,
+            "matched": len(p.path.load),
+            "cycle": p.path.cycle.number,
+            "cycles": p.path.cycles,
+            "end_load_warp_kN_per_m": float(p.path.load[-1, 0]),
+            "end_load_fill_kN_per_m": float(p.path.load[-1, 1]),
+            "residual_warp_percent": 100 * float(p.path.residual[0]),
+            "residual_fill_percent": 100 * float(p.path.residual[1]),
+        }
+    errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
+    summary = f"RMS errors of strain along warp / fill in %: {errors}"
+    warnings = tuple(_warnings(prepared.test))
+    return Findings({"ratios": numbers}, warnings, (summary,), summary, summary)
 
 
 def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
-    return exhibit(prepared.test, prepared.fitted_paths(fitted), fitted.law, out)
+    paths = prepared.fitted_paths(fitted)
+    with replacing(out.path("paths.csv")) as path:
+        path_table(paths).to_csv(path, index=False, float_format="%.9g")
+    panels = [
+        BiaxialPanel(
+            p.path.ratio,
+            p.path.larger,
+            PERCENT * p.objective.strain,
+            (("model", p.path.larger, PERCENT * p.objective.modelled(p.history)),),
+        )
+        for p in paths
+    ]
+    caption = "Strain over the larger load: measured and modelled"
+    charts = biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
+    save(out.path("paths.png"), charts)
+    return Exhibit(
+        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
+        tables=[misfit_table(paths)],
+        files=[
+            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
+            (out.name("paths.png"), "picture of the ratios"),
+        ],
+        parts=[charts],
+    )
 
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
-    """Write the loads and cycles as they were read."""
-    return exhibit_examined(prepared.test, out)
+    """Draw the paths; return a table of all cycles."""
+    data, picture = prepared.test.data, "biaxial.png"
+    panels = [BiaxialPanel(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
+    save(out.path(picture), biaxial_charts("ratios", panels))
+    used = {(id(path.table), path.cycle.count) for path in data.paths}
+    rows: list[list[object]] = []
+    for read, cycles in zip(data.tables, data.cycles, strict=True):
+        for cycle in cycles:
+            kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
+            mark = "yes" if (id(read), cycle.count) in used else ""
+            rows.append([read.path.name, cycle.count, cycle.ratio, cycle.number,
+                         *read.load[cycle.last].tolist(), *kept.tolist(), mark])  # fmt: skip
+    header = [
+        "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
+        "strain kept before it, warp, %", "fill, %", "evaluated",
+    ]  # fmt: skip
+    table = Table("Cycles as read", header, rows, text=(0, 2, 8))
+    figures = [(out.name(picture), "the loading of each ratio that is evaluated")]
+    return Exhibit(figures=figures, tables=[table])
 
 
 def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
-    """Return every matched strain in %, see `residual_table`."""
-    return residual_table(prepared.fitted_paths(fitted))
+    """Return a table of every matched strain in %."""
+    parts = []
+    for p in prepared.fitted_paths(fitted):
+        measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
+        for k, yarn in enumerate(YARNS):
+            table = _columns(p.path.load[1:], "load_kN_per_m")
+            table.insert(0, "part", p.path.ratio)
+            parts.append(
+                table.assign(
+                    quantity=f"{yarn}_strain",
+                    measured=measured[1:, k],
+                    modelled=modelled[1:, k],
+                    difference=(modelled - measured)[1:, k],
+                    unit="%",
+                )
+            )
+    return pd.concat(parts, ignore_index=True)
+
+
+def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
+    """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
+    written = []
+    for name, table in (
+        ("constants.csv", option_table(found)),
+        ("lines.csv", line_table(found)),
+        ("kept.csv", kept_table(found)),
+    ):
+        with replacing(folder / (prefix + name)) as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+        written.append(folder / (prefix + name))
+    panels = []
+    for measured in found.paths:
+        load = measured.load
+        strain = PERCENT * found.chosen.constants.strain(load - load[0])
+        curves = (("constants", measured.larger, strain),)
+        panels.append(
+            BiaxialPanel(measured.ratio, measured.larger, PERCENT * measured.since, curves)
+        )
+    written.append(save(folder / f"{prefix}constants.png", biaxial_charts("ratios", panels)))
+    return written

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...readers.biaxial import LoadUnit, StrainUnit
 from ...readers.sections import Name, Number, Positive, Section
+from .data import LoadUnit, StrainUnit
 
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -21,7 +21,7 @@ def _files(given: Any) -> Any:
 
 
 class ColumnsSection(Section):
-    """[biaxial.data.columns]: what the files call them."""
+    """Section [biaxial.data.columns]: the files' own column names."""
 
     warp_load: str | None = None
     fill_load: str | None = None
@@ -31,7 +31,7 @@ class ColumnsSection(Section):
 
 
 class TablesSection(Section):
-    """[biaxial.data]: the files, in any order, or those of each ratio."""
+    """Section [biaxial.data]: the files, in any order, or those of each ratio."""
 
     files: Annotated[list[str] | dict[str, list[str]], BeforeValidator(_files)]
     folder: str = ""
@@ -44,7 +44,7 @@ class TablesSection(Section):
 
 
 class BiaxialSection(Section):
-    """[[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
+    """Section [[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
 
     range : kN/m, of the larger load, in which paths are evaluated. cycle : of each ratio.
     conditioning : cycles at the beginning of each file that count for nothing. noise : of one

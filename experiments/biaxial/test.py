@@ -1,18 +1,20 @@
-"""A biaxial test as its section says, and the models of it."""
+"""A biaxial test, as its section describes it, and its models."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import InputError
 from ...files import is_file
 from ...meshes.strip_models import PatchModel
-from ...readers.biaxial import (
+from ...readers.sections import beside
+from ..keys import named_format
+from ..kinds import Place, Reach, Refined
+from .data import (
     BiaxialPath,
     BiaxialTable,
     Cycle,
@@ -21,18 +23,12 @@ from ...readers.biaxial import (
     plain_ratio,
     read_biaxial_table,
 )
-from ...readers.sections import beside
-from ..keys import named_format
-from ..kinds import Place, Reach, Refined
 from .section import BiaxialSection, TablesSection
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialData:
-    """All that was read: files, their cycles, and the path of each ratio, as it is evaluated."""
+    """Data of a test: files, their cycles, and the path of each ratio."""
 
     tables: tuple[BiaxialTable, ...]
     cycles: tuple[tuple[Cycle, ...], ...]
@@ -40,12 +36,7 @@ class BiaxialData:
 
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
-    """The data of a section; none where a file is not there and none is needed.
-
-    Raises
-    ------
-    InputError : naming the project and the key, or the data file.
-    """
+    """Read the data of a section; none where a file is missing and not needed."""
     data = section.data
     folder = place.data_folder
     if folder is None:
@@ -55,9 +46,18 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
         if not is_file(path):
             if not place.need_data:
                 return BiaxialData((), (), ())
-            problem = f"there is no file {path}; --data DIR names another folder"
-            raise place.error(field, problem)
-        tables.append(_table(place, data, path))
+            raise place.error(field, f"there is no file {path}; --data DIR names another folder")
+        tables.append(
+            read_biaxial_table(
+                path,
+                columns={k: v for k, v in data.columns.model_dump().items() if v is not None},
+                load_unit=data.load_unit,
+                strain_unit=data.strain_unit,
+                decimal=data.decimal,
+                comment=data.comment,
+                format=named_format(place, "data.format", "machine table", data.format),
+            )
+        )
         named.append(ratio)
     cycles = cycles_of(tables, named)
     wanted = None
@@ -75,7 +75,7 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
 
 
 def _listed(place: Place, data: TablesSection, folder: Path) -> list[tuple[Path, str, str | None]]:
-    """Each file, its key, and the ratio that it is listed for."""
+    """Return each file, its key, and the ratio that it is listed for."""
     if isinstance(data.files, list):
         return [(folder / name, f"data.files[{i}]", None) for i, name in enumerate(data.files)]
     listed: list[tuple[Path, str, str | None]] = []
@@ -90,18 +90,6 @@ def _ratio(place: Place, field: str, name: str) -> str:
         return plain_ratio(name)
     except InputError as error:
         raise place.error(field, error.problem) from None
-
-
-def _table(place: Place, data: TablesSection, path: Path) -> BiaxialTable:
-    return read_biaxial_table(
-        path,
-        columns={k: v for k, v in data.columns.model_dump().items() if v is not None},
-        load_unit=data.load_unit,
-        strain_unit=data.strain_unit,
-        decimal=data.decimal,
-        comment=data.comment,
-        format=named_format(place, "data.format", "machine table", data.format),
-    )
 
 
 #: Strains below it are none that a law could be fitted over.
@@ -125,31 +113,31 @@ class BiaxialTest:
 
     @property
     def reads_files(self) -> bool:
-        """Yes: a biaxial test is measured."""
+        """Return True: a biaxial test is measured."""
         return True
 
     @property
     def reach(self) -> Reach:
-        """The largest strains along warp and fill."""
+        """Return the largest strains along warp and fill."""
         return reach_of(self.data.paths)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
-        """A patch for each ratio, driven by the loads as they were measured.
+        """Return a patch for each ratio, driven by the loads as they were measured.
 
-        Nothing is there to be refined: one point of the law, one increment a reading.
+        There is nothing to refine: one point of the law, one increment a reading.
         """
         thick = self.place.fabric.thickness if thickness is None else thickness
         return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}
 
     def settings(self) -> Mapping[str, object]:
-        """What of the section a result depends on; the data count by themselves."""
+        """Return the settings that a result depends on; data count by themselves."""
         return {"weight": self.weight, "noise": self.noise}
 
 
 def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
-    """The largest strains along warp and fill; of the shear a test tells nothing."""
+    """Return the largest strains along warp and fill; the shear stays unknown."""
     if not paths:
         return Reach()
     ends = np.max([path.strain.max(axis=0) for path in paths], axis=0)
@@ -158,12 +146,7 @@ def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
 
 
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-    """The test of a section, and its files.
-
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a data file.
-    """
+    """Read the section of a test, and its files."""
     noise = None if section.noise is None else 0.01 * section.noise
     return BiaxialTest(
         name=name,

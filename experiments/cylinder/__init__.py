@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from ..kinds import Place
 from .predicted import STUDIED, CylinderPredicted
 from .section import CylinderSection
-from .test import CylinderTest, read
-
-__all__ = ["KIND", "CylinderKind"]
+from .test import read
 
 
 class CylinderKind:
-    """[[cylinder]] of a project."""
+    """Kind of the sections [[cylinder]] of a project."""
 
     name = "cylinder"
     title = "an inflated cylinder in three-point bending"
@@ -20,10 +17,7 @@ class CylinderKind:
     fitted = False
     predicted = CylinderPredicted()
     studied = STUDIED
-
-    def read(self, section: CylinderSection, place: Place, name: str) -> CylinderTest:
-        """The test of a section; raises InputError."""
-        return read(section, place, name)
+    read = staticmethod(read)
 
 
 KIND = CylinderKind()

@@ -1,4 +1,4 @@
-"""Cylinders with cards: what is kept of a run, and what runs say."""
+"""Runs of cylinders with cards: the arrays that are stored, and the numbers of a run."""
 
 from __future__ import annotations
 
@@ -17,12 +17,7 @@ from ...meshes.mesh import Mesh, surface_strain
 from ...notes import marks
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
-from ..kinds import (
-    PredictedRun,
-    RunRecord,
-    Studied,
-    band_of,
-)
+from ..kinds import PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
 
 Array = NDArray[np.float64]
@@ -30,13 +25,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class BendingRun:
-    """A run that did not fail. Frame 0 is the inflated cylinder; frames are those reached.
+    """A run that did not fail; frame 0 is the inflated cylinder.
 
-    Parameters
-    ----------
     deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3, of the whole cylinder.
-    inflated, bent : (nodes, 3) mm of displacement at the first and the last frame.
-    wrinkled : (frames,) share of the surface, empty where the solver does not say.
+    inflated, bent : (nodes, 3) mm at the first and last frame. wrinkled : (frames,) share of the
+    surface, or empty.
     """
 
     deflection: Array
@@ -49,16 +42,14 @@ class BendingRun:
 
 
 def run_of(record: RunRecord) -> BendingRun | None:
-    """The run of a record; None where it failed."""
+    """Return the run of a record; None where it failed."""
     return None if record.failure else BendingRun(**record.arrays)
 
 
 def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
-    """What is kept of a history, by the names of `BendingRun`.
+    """Return the arrays of a history that are stored, by the names of `BendingRun`.
 
-    Raises
-    ------
-    SolverFailure : no gas; fewer frames than asked for, and no word of the solver why.
+    Raises SolverFailure: no gas; fewer frames than asked for without the solver's reason.
     """
     deflection = np.array([0.0, *model.deflections])
     reached = len(history.load)
@@ -67,32 +58,19 @@ def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
         raise SolverFailure(f"the results end {where}, and do not say why", "")
     if history.cavity_pressure is None or history.cavity_volume is None:
         raise SolverFailure("the results have no gas pressure or no volume", "")
-    run = BendingRun(
-        deflection[:reached],
-        np.asarray(history.load, dtype=float),
-        np.asarray(history.cavity_pressure, dtype=float),
-        np.asarray(history.cavity_volume, dtype=float),
-        history.displacement[0],
-        history.displacement[-1],
-        np.empty(0) if history.wrinkled is None else np.asarray(history.wrinkled, dtype=float),
-    )
-    return {field.name: getattr(run, field.name) for field in fields(run)}
+    wrinkled = np.empty(0) if history.wrinkled is None else history.wrinkled
+    curves = (history.load, history.cavity_pressure, history.cavity_volume)
+    load, pressure, volume, share = (np.asarray(c, dtype=float) for c in (*curves, wrinkled))
+    ends = history.displacement[0], history.displacement[-1]
+    values = (deflection[:reached], load, pressure, volume, *ends, share)
+    return dict(zip((field.name for field in fields(BendingRun)), values, strict=True))
 
 
 def early_end(model: CylinderModel, history: History) -> str:
-    """The solver's own word for an end before the last deflection, "" where it came so far."""
+    """Return the solver's reason for an end before the last deflection, else ""."""
     if len(history.load) > len(model.deflections):
         return ""
     return history.early
-
-
-def depends_on(model: CylinderModel) -> tuple[object, ...]:
-    """All of a model that its result depends on."""
-    mesh = model.mesh
-    return (
-        model.thickness, model.inflation, model.deflections, model.increments, model.collar,
-        model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
-    )  # fmt: skip
 
 
 #: The initial stiffness is that of a straight line through at least so many frames.
@@ -114,20 +92,13 @@ Point = tuple[float, float]  # deflection in mm and load in N
 
 @dataclass(frozen=True)
 class BendingMeasures:
-    """Numbers of one run that ended; None where the run does not tell.
+    """Numbers of one run that ended; None where unknown.
 
-    Parameters
-    ----------
-    stiffness : N/mm, initial.
-    loads : N by the name of the place where it is read.
-    knee, limit, wrinkles : (deflection, load) where the slope has halved, of the largest load
-        before the load falls, and where wrinkles appear.
-    straightness : R^2 of a straight line before buckling, and its largest deviation over the
-        load there.
-    body_strain : (eps1, eps2) largest on inflation in the body, away from seam and caps;
-        anywhere_strain : on the tube with seam, its edges and ends.
-    pressure_rise : kPa from inflated to the last frame.
-    reached : mm. error : against what was measured.
+    stiffness : N/mm. loads : N by place. knee, limit, wrinkles : (deflection, load) where the slope
+    has halved, of the largest load before a fall, and where wrinkles appear. straightness : R^2 of
+    a line before buckling, and its largest deviation over the load. body_strain : largest (eps1,
+    eps2) on inflation away from seam and caps; anywhere_strain : on tube and seam. pressure_rise :
+    kPa. reached : mm.
     """
 
     stiffness: float | None
@@ -144,46 +115,46 @@ class BendingMeasures:
 
     @property
     def buckling(self) -> Point | None:
-        """The limit point, else the knee."""
+        """Return the limit point, else the knee."""
         return self.limit or self.knee
 
     @property
     def buckling_is(self) -> str:
-        """What the buckling load is: "limit point", "knee", or "none"."""
+        """Return the kind of the buckling load: "limit point", "knee" or "none"."""
         return "limit point" if self.limit else "knee" if self.knee else "none"
 
 
 def bending_measures(
     model: CylinderModel, run: BendingRun, measured: Sequence[BendingCurve]
 ) -> BendingMeasures:
-    """The numbers of a run of a model, beside what was measured."""
+    """Return the numbers of a run of a model, beside what was measured."""
     d, load, over = run.deflection, run.load, model.reading.slope_over
     stiffness = initial_stiffness(d, load, over)
     knee = knee_point(d, load, stiffness, over)
     body, anywhere = inflation_strain(model.mesh, run.inflated)
     return BendingMeasures(
-        stiffness,
-        loads_at(d, load, model.reading.places),
-        knee,
-        limit_point(d, load),
-        wrinkle_onset(run),
-        straightness(d, load, knee[1] if knee else float(load.max())),
-        body,
-        anywhere,
-        1e3 * float(run.pressure[-1] - run.pressure[0]),
-        float(d[-1]),
-        model_error(measured, d, load),
+        stiffness=stiffness,
+        loads=loads_at(d, load, model.reading.places),
+        knee=knee,
+        limit=limit_point(d, load),
+        wrinkles=wrinkle_onset(run),
+        straightness=straightness(d, load, knee[1] if knee else float(load.max())),
+        body_strain=body,
+        anywhere_strain=anywhere,
+        pressure_rise=1e3 * float(run.pressure[-1] - run.pressure[0]),
+        reached=float(d[-1]),
+        error=model_error(measured, d, load),
     )
 
 
 def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, float | None]:
-    """Load (N) at places (mm) by name; None at those that the run did not reach."""
+    """Return the load (N) at places (mm) by name; None at those not reached."""
     end = d[-1] * (1 + 1e-9)
     return {n: float(np.interp(p, d, load)) if p <= end else None for n, p in places.items()}
 
 
 def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
-    """Slope (N/mm) of the straight line through the frames up to `over` mm."""
+    """Return the slope (N/mm) of the straight line through the frames up to `over` mm."""
     count = max(int((d <= over * (1 + 1e-9)).sum()), FEWEST)
     if len(d) < 2:
         return None
@@ -191,7 +162,7 @@ def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
 
 
 def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> Point | None:
-    """Where the slope over `over` mm first is `KNEE` of the initial stiffness."""
+    """Return the point where the slope over `over` mm first is `KNEE` of the initial one."""
     half = 0.5 * over
     if stiffness is None or not stiffness > 0 or d[-1] < 2 * over:
         return None
@@ -209,7 +180,7 @@ def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> P
 
 
 def limit_point(d: Array, load: Array) -> Point | None:
-    """The largest load, where the load falls afterwards."""
+    """Return the largest load, where the load falls afterwards."""
     top = int(np.argmax(load))
     if not load[top:].min() < (1 - FALL) * load[top]:
         return None
@@ -217,7 +188,7 @@ def limit_point(d: Array, load: Array) -> Point | None:
 
 
 def wrinkle_onset(run: BendingRun) -> Point | None:
-    """The first frame in which more of the surface is wrinkled than when inflated."""
+    """Return the first frame in which more of the surface is wrinkled than when inflated."""
     if not len(run.wrinkled):
         return None
     more = np.flatnonzero(run.wrinkled > run.wrinkled[0] + ONSET)
@@ -225,9 +196,9 @@ def wrinkle_onset(run: BendingRun) -> Point | None:
 
 
 def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] | None:
-    """R^2 of a straight line up to `STRAIGHT` of the buckling load, and how far the curve is off.
+    """Return R^2 of a line up to `STRAIGHT` of the buckling load, and the largest deviation.
 
-    The deviation is the largest, over the load where the part ends.
+    The deviation is over the load where the part ends.
     """
     beyond = np.flatnonzero(load > STRAIGHT * buckling)
     count = int(beyond[0]) if len(beyond) else len(d)
@@ -242,10 +213,9 @@ def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] 
 
 
 def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[Point, Point]:
-    """Largest (eps1, eps2) in the middle of the quads of the inflated tube.
+    """Return largest (eps1, eps2) of quads of the inflated tube: of the body, and of all.
 
-    First of the body without the quads that touch seam or caps, which the thick seam and the caps
-    bend; then of the whole tube with its seam.
+    The body is without the quads that touch seam or caps, which these bend.
     """
     strain = surface_strain(mesh, inflated)[:, :2]
     others = np.zeros(len(mesh.points), dtype=bool)
@@ -268,7 +238,7 @@ MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetiti
 
 
 def columns_of(m: BendingMeasures | None, places: Sequence[str]) -> Mapping[str, object]:
-    """A row of the table of runs; None where a run does not tell, or failed."""
+    """Return a row of the table of runs; None where a number is unknown or a run failed."""
     error = None if m is None else m.error
     row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
     for name in ("knee", "limit", "wrinkles"):
@@ -289,7 +259,7 @@ def columns_of(m: BendingMeasures | None, places: Sequence[str]) -> Mapping[str,
 
 
 def curve_of(run: BendingRun | None) -> pd.DataFrame:
-    """A run frame by frame; no rows where it failed."""
+    """Return a run frame by frame; no rows where it failed."""
     if run is None:
         return pd.DataFrame({name: np.empty(0) for name in CURVE})
     share = run.wrinkled if len(run.wrinkled) else np.full(len(run.load), np.nan)
@@ -298,7 +268,7 @@ def curve_of(run: BendingRun | None) -> pd.DataFrame:
 
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
-    """Mean and scatter of the repetitions on a grid, of the tests that were measured."""
+    """Return mean and scatter of the repetitions on a grid, of the tests that were measured."""
     parts = []
     for test in tests:
         if test.measured:
@@ -309,12 +279,12 @@ def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
 
 
 def place_names(tests: Sequence[CylinderTest]) -> list[str]:
-    """Where loads are listed, of all tests, each once."""
+    """Return the places of listed loads in all tests, each once."""
     return list(dict.fromkeys(name for test in tests for name in test.reading.places))
 
 
 def load_words(load: float | None, sigma: float | None, unit: str = "") -> str:
-    """A load (N), with one standard deviation where it is known."""
+    """Return a load (N), with one standard deviation where it is known."""
     if load is None:
         return "-"
     return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
@@ -326,7 +296,7 @@ def terminal_table(
     ended: Sequence[str],
     sigma: Mapping[int, Mapping[str, float | None]] | None = None,
 ) -> list[str]:
-    """Stiffness, buckling, loads and errors, run by run; sigma : of the loads, N, by number."""
+    """Return stiffness, buckling, loads and errors run by run; sigma (N) by number."""
     spreads = sigma or {}
     places = place_names([run.test for run in runs])
     widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
@@ -363,19 +333,19 @@ FINISHED = "finished"
 
 @dataclass(frozen=True, eq=False)
 class CylinderOutcome:
-    """Runs of cylinders with cards, in the order given, and what they say."""
+    """Results of runs of cylinders with cards, in the order given."""
 
     runs: Sequence[PredictedRun]
 
     @cached_property
     def bent(self) -> Mapping[int, BendingRun]:
-        """The runs that did not fail, by number."""
+        """Return the runs that did not fail, by number."""
         found = {i: run_of(run.record) for i, run in enumerate(self.runs)}
         return {i: run for i, run in found.items() if run is not None}
 
     @cached_property
     def measures(self) -> Mapping[int, BendingMeasures]:
-        """Their numbers."""
+        """Return the numbers of those runs."""
         return {
             i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
             for i, run in self.bent.items()
@@ -383,11 +353,11 @@ class CylinderOutcome:
 
     @cached_property
     def band(self) -> Sequence[BandEnd]:
-        """The ends of the band that the solver gives, first what is predicted; or none."""
+        """Return the ends of the band that the solver gives, first what is predicted; or none."""
         return band_of(self.runs)
 
     def other_end(self, number: int) -> BendingRun | None:
-        """Of the band of a run: with the same card in the same test, where it did not fail."""
+        """Return the run at the other end of the band of a run, if it did not fail."""
         own = self.runs[number]
         for i, run in enumerate(self.runs):
             if run.test is own.test and run.card == own.card and not run.predicted:
@@ -396,7 +366,7 @@ class CylinderOutcome:
 
     @cached_property
     def spreads(self) -> Mapping[int, Array]:
-        """(frames,) N, one standard deviation of the load by what the card leaves open.
+        """Return the standard deviations (frames,) N of the load due to the card; NaN if unknown.
 
         Of the runs with laws around the card's, by number; NaN where that is not known.
         """
@@ -410,7 +380,7 @@ class CylinderOutcome:
         return found
 
     def sigma(self, number: int) -> dict[str, float | None]:
-        """N, of the load at each place that is read; None where it is not known."""
+        """Return the standard deviation (N) of the load at each place; None if unknown."""
         own = self.spreads.get(number)
         if own is None:
             return dict.fromkeys(self.measures[number].loads)
@@ -418,22 +388,15 @@ class CylinderOutcome:
         known = loads_at(self.bent[number].deflection, own, places)
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
 
-    def _around(self, number: int) -> str | None:
-        """What was run around a run."""
-        around = self.runs[number].around if number in self.spreads else None
-        return None if around is None else around.words
-
     @property
     def unsure(self) -> Sequence[str]:
-        """What is to be said of cards of which no spread is known."""
+        """Return notes on cards of unknown spread."""
         cards = [run.card for run in self.runs if run.material.certainty is None]
-        names = ", ".join(dict.fromkeys(cards))
-        return [f"no spread of loads with {names}: the card does not say how sure it is"] * bool(
-            names
-        )
+        words = f"no spread of loads with {', '.join(dict.fromkeys(cards))}"
+        return [f"{words}: the card does not say how sure it is"] if cards else []
 
     def ended(self, number: int) -> str:
-        """How a run ended: "finished", how far it came, or why it failed."""
+        """Return how a run ended: "finished", how far it came, or why it failed."""
         record = self.runs[number].record
         if record.failure:
             return f"failed: {record.failure}"
@@ -443,13 +406,14 @@ class CylinderOutcome:
         return f"stopped at {reached:g} of {whole:g} mm: {record.early}"
 
     def error(self, number: int) -> float | None:
-        """RMS of model less reading over the largest load read; None where there is none."""
+        """Return RMS of model less reading over the largest load read; None where there is none."""
         measures = self.measures.get(number)
         return None if measures is None or measures.error is None else measures.error.relative
 
     def numbers(self, number: int) -> Mapping[str, Any]:
-        """Of a run that did not fail, for result.json."""
+        """Return the numbers of a run that did not fail, for result.json."""
         m = self.measures[number]
+        around = self.runs[number].around if number in self.spreads else None
         names = ("warp", "fill")
         return {
             "reached_mm": m.reached,
@@ -460,20 +424,19 @@ class CylinderOutcome:
             "wrinkle_onset": _point(m.wrinkles),
             "load_N": dict(m.loads),
             "load_sigma_N": self.sigma(number),
-            "spread": self._around(number),
+            "spread": None if around is None else around.words,
             "inflation_strain": {
                 "body": dict(zip(names, m.body_strain, strict=True)),
                 "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
             },
-            "straight_before_buckling": None
-            if m.straightness is None
-            else {"r_squared": m.straightness[0], "largest_deviation": m.straightness[1]},
+            "straight_before_buckling": m.straightness
+            and dict(zip(("r_squared", "largest_deviation"), m.straightness, strict=True)),
             "pressure_rise_kPa": m.pressure_rise,
             "error": None if m.error is None else asdict(m.error),
         }
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """A row of the table of runs."""
+        """Return a row of the table of runs."""
         places = self.runs[number].test.reading.places
         row = dict(columns_of(self.measures.get(number), tuple(places)))
         if number in self.spreads:
@@ -482,14 +445,14 @@ class CylinderOutcome:
         return row
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Frame by frame: deflection, load, gauge pressure, volume, wrinkled share."""
+        """Return deflection, load, gauge pressure, volume and wrinkled share by frame."""
         curve = curve_of(self.bent.get(number))
         if number in self.spreads:
             curve["load_sigma_N"] = self.spreads[number]
         return curve
 
     def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
-        """What a cylinder is, for result.json."""
+        """Return the numbers of a cylinder, for result.json."""
         return {
             "diameter_mm": test.diameter,
             "pressure_kPa": 1e3 * test.pressure,
@@ -505,7 +468,7 @@ class CylinderOutcome:
         }
 
     def lines(self) -> Sequence[str]:
-        """A table for the terminal."""
+        """Return a table for the terminal."""
         ended = [self.ended(i) for i in range(len(self.runs))]
         sigma = {i: self.sigma(i) for i in self.spreads}
         return [*terminal_table(self.runs, self.measures, ended, sigma), *self.unsure]
@@ -516,42 +479,38 @@ def _point(point: Point | None) -> dict[str, float | None]:
 
 
 class CylinderPredicted:
-    """How cylinders are predicted."""
+    """Predictions of cylinders."""
+
+    arrays = staticmethod(arrays_of)
+    early = staticmethod(early_end)
+    outcome = CylinderOutcome
 
     def depends_on(self, model: CylinderModel) -> Sequence[object]:
-        """All of a model that its result depends on."""
-        return depends_on(model)
-
-    def arrays(self, model: CylinderModel, history: History) -> Mapping[str, Array]:
-        """What is kept of a history; raises SolverFailure where it is cut off without a word."""
-        return arrays_of(model, history)
-
-    def early(self, model: CylinderModel, history: History) -> str:
-        """The solver's own word for an end before the last deflection."""
-        return early_end(model, history)
+        """Return all of a model that its result depends on."""
+        mesh = model.mesh
+        return (
+            model.thickness, model.inflation, model.deflections, model.increments, model.collar,
+            model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
+        )  # fmt: skip
 
     def measured(self, test: CylinderTest) -> bool:
-        """Whether a test has measured loads."""
+        """Return whether a test has measured loads."""
         return bool(test.measured)
-
-    def outcome(self, runs: Sequence[PredictedRun]) -> CylinderOutcome:
-        """What runs say."""
-        return CylinderOutcome(runs)
 
 
 def deflection_curve(model: CylinderModel, history: History) -> tuple[Array, Array]:
-    """Deflection (mm) and load (N) from the inflated cylinder to where the run ended."""
+    """Return deflection (mm) and load (N) from the inflated cylinder to where the run ended."""
     return np.array([0.0, *model.deflections])[: len(history.load)], history.load
 
 
 def loads(model: CylinderModel, history: History) -> dict[str, float]:
-    """Load (N) at the places where the curve is read, as far as the run went."""
+    """Return the load (N) at the places where the curve is read, up to the end of the run."""
     read = loads_at(*deflection_curve(model, history), model.reading.places)
     return {f"load at {place}, N": load for place, load in read.items() if load is not None}
 
 
 def quantities(model: CylinderModel, history: History) -> dict[str, float]:
-    """What a study of the mesh looks at; knee and limit point where the run has them."""
+    """Return the quantities of a mesh study; knee and limit point where there are any."""
     mesh, over = model.mesh, model.reading.slope_over
     inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])
     values = {"radius at mid-span, inflated, mm": inflated}

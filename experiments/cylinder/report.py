@@ -1,4 +1,4 @@
-"""What bent cylinders put on a page: facts, figures, tables and files."""
+"""Results of bent cylinders as facts, figures, tables and files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -42,9 +41,6 @@ from .predicted import (
 )
 from .test import PART, CylinderTest
 
-if TYPE_CHECKING:
-    from .predicted import CylinderOutcome
-
 Array = NDArray[np.float64]
 
 #: Node sets that the picture draws as lines.
@@ -61,7 +57,7 @@ class Beam:
 
 
 def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
-    """What was meshed and its mirror images."""
+    """Return the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
     points, quads, warp = mesh.points, mesh.quads, mesh.warp
@@ -85,7 +81,7 @@ def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
 
 
 def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies:
-    """Supports and collar, brought to touch the inflated beam; the collar then goes down."""
+    """Return supports and collar, placed to touch the inflated beam."""
     at = beam.mesh.points + beam.inflated
     radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
     beside = np.abs(np.abs(at[:, 2]) - half)
@@ -100,7 +96,7 @@ def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies
 
 
 def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> None:
-    """The picture of the last frame."""
+    """Draw the last frame."""
     beam = whole_beam(model, run)
     rest, sets = beam.mesh.points, beam.mesh.node_sets
     nodes, top, bottom = (sets[name] for name in LINES)
@@ -108,47 +104,33 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
     ring = np.append(nodes[around], nodes[around[0]])
     top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
-    inflated, bent = beam.mesh.points + beam.inflated, beam.mesh.points + beam.bent
-    charts = beam_charts(
-        bent,
-        beam.mesh.quads,
-        surface_strain(beam.mesh, beam.bent)[:, 0],
-        inflated[outline][:, [2, 1]],
-        (inflated[ring, :2], bent[ring, :2]),
-        bodies_of(model, beam, float(run.deflection[-1])),
-        title,
-    )
-    save(path, charts)
+    inflated, bent = rest + beam.inflated, rest + beam.bent
+    strain = surface_strain(beam.mesh, beam.bent)[:, 0]
+    lines = inflated[outline][:, [2, 1]], (inflated[ring, :2], bent[ring, :2])
+    bodies = bodies_of(model, beam, float(run.deflection[-1]))
+    save(path, beam_charts(bent, beam.mesh.quads, strain, *lines, bodies, title))
 
 
 def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
-    """The last frame for ParaView, with the inflated one as a further displacement."""
+    """Write the last frame for ParaView, with the inflated one as a further displacement."""
     beam = whole_beam(model, run)
-    write_vtu(
-        beam.mesh,
-        beam.bent,
-        path,
-        {"inflated_displacement": beam.inflated},
-        {
-            "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
-            "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
-        },
-    )
+    strains = {
+        "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
+        "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
+    }
+    write_vtu(beam.mesh, beam.bent, path, {"inflated_displacement": beam.inflated}, strains)
 
 
 FIGURES, BEAMS = "figures", "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Loads, gas and beam of every test, and all loads together, as pictures.
+    """Draw loads, gas and beam of every test, and all loads; return those of the page.
 
-    Returns
-    -------
     Those that the page shows, each with its caption: the loads are charts there.
     """
     tests = tests_of(outcome)
-    cards = list(dict.fromkeys(run.card for run in outcome.runs))
-    ranks = {card: rank for rank, card in enumerate(cards)}
+    ranks = _ranks(outcome)
     names = file_names([test.name for test in tests])
     panels, figures = {}, []
     for test in tests:
@@ -170,27 +152,31 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     if sum(bool(panel.lines) for panel in panels.values()) > 1:
         rows = _rows(tests)
         columns = max(map(len, rows))
-        laid = [p for row in rows for p in [panels[t.name] for t in row] + _free(columns, row)]
+        laid = []
+        for row in rows:
+            laid += [panels[t.name] for t in row] + [BendPanel("")] * (columns - len(row))
         save(out.path(f"{FIGURES}/all-loads.png"), bending_charts(laid, columns=columns))
     return figures
 
 
 def load_charts(outcome: CylinderOutcome) -> list[Charts]:
-    """Load over deflection of every test; nothing where no run came to an end."""
-    cards = list(dict.fromkeys(run.card for run in outcome.runs))
-    ranks = {card: rank for rank, card in enumerate(cards)}
+    """Return charts of load over deflection of every test; none where no run ended."""
+    ranks = _ranks(outcome)
     tests = tests_of(outcome)
     panels = [_panel(test, outcome, _ended(test, outcome), ranks) for test in tests]
     if not any(panel.lines for panel in panels):
         return []
-    caption = f"Load over deflection{_walls(outcome)}"
+    caption = "Load over deflection"
+    if len(outcome.band) > 1:
+        predicted, *others = (end.name for end in outcome.band)
+        caption += f"; line: {predicted}, dashed: {', '.join(others)}"
     if outcome.spreads:
         caption += f". Shaded: {panels[0].spread}"
     return [bending_charts(panels, caption)]
 
 
 def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """The last frame of every run for ParaView; files and what they are."""
+    """Write the last frame of every run for ParaView; return the files."""
     tests = file_names([test.name for test in tests_of(outcome)])
     cards = file_names(list(dict.fromkeys(run.card for run in outcome.runs)))
     files = []
@@ -205,12 +191,12 @@ def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
 
 
 def tests_of(outcome: CylinderOutcome) -> list[CylinderTest]:
-    """The tests of the runs, each once."""
+    """Return the tests of the runs, each once."""
     return list({id(run.test): run.test for run in outcome.runs}.values())
 
 
 def file_names(names: Sequence[str]) -> dict[str, str]:
-    """A name for files for each, all different."""
+    """Return different file names for each."""
     files: dict[str, str] = {}
     for number, name in enumerate(names, start=1):
         plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
@@ -219,20 +205,12 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
     return files
 
 
-def _walls(outcome: CylinderOutcome) -> str:
-    """For a caption: what lines and bands are."""
-    if len(outcome.band) < 2:
-        return ""
-    predicted, *others = (end.name for end in outcome.band)
-    return f"; line: {predicted}, dashed: {', '.join(others)}"
-
-
-def _free(columns: int, row: Sequence[CylinderTest]) -> list[BendPanel]:
-    return [BendPanel("")] * (columns - len(row))
+def _ranks(outcome: CylinderOutcome) -> dict[str, int]:
+    return {card: k for k, card in enumerate(dict.fromkeys(run.card for run in outcome.runs))}
 
 
 def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
-    """A row a diameter where there are several of them with several pressures."""
+    """Return a row a diameter, where several diameters have several pressures."""
     rows: dict[float, list[CylinderTest]] = {}
     for test in tests:
         rows.setdefault(round(test.diameter, 6), []).append(test)
@@ -243,7 +221,7 @@ def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
 
 
 def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
-    """The runs of a test that did not fail, of what the solver predicts."""
+    """Return the runs of a test that did not fail, of what the solver predicts."""
     own = [i for i in outcome.bent if outcome.runs[i].test is test]
     return [i for i in own if outcome.runs[i].predicted]
 
@@ -267,12 +245,8 @@ def _panel(
         # Where a repetition has ended the mean of the others jumps.
         whole = s.count == len(test.measured)
         readings = [(c.deflection, c.load) for c in test.measured]
-        measured = BendReadings(
-            readings,
-            s.deflection,
-            np.where(whole, s.mean, np.nan),
-            np.where(whole, s.deviation, np.nan),
-        )
+        shown = (np.where(whole, values, np.nan) for values in (s.mean, s.deviation))
+        measured = BendReadings(readings, s.deflection, *shown)
     names = [end.name for end in outcome.band]
     walls = f"from {' to '.join(names)}" if names else ""
     return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card")
@@ -288,7 +262,7 @@ SIZES: Mapping[str, Callable[[CylinderTest], float]] = {
 
 
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
-    """What a reader should know before any load: how sure they are, and what was assumed."""
+    """Return notes on the uncertainty of the loads and on assumptions."""
     lines = []
     if outcome.spreads:
         shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
@@ -304,9 +278,9 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
         lines.append(f"The solver's answer lies between walls ({ends}).")
     for words in dict.fromkeys(words for test in tests for words in test.assumed):
         own = [test for test in tests if words in test.assumed]
-        told = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
+        sizes = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
         of = "" if len(own) == len(tests) else f" for {', '.join(t.name for t in own)}"
-        size = f" ({', '.join(told)})" if told else ""
+        size = f" ({', '.join(sizes)})" if sizes else ""
         lines.append(f"Assumed{of}, as the project does not say: the usual {words}{size}.")
     return lines
 
@@ -314,6 +288,7 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
 #: Letters of a cell that is not broken.
 SHORT = 30
 CURVES = "load_deflection.csv"
+CONTENT = ("deflection", "load", "pressure", "volume", "wrinkled share")
 MEASURED = "measured.csv"
 
 
@@ -324,7 +299,14 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     files = [*_write_tables(outcome, tests, out), *write_beams(outcome, out)]
     tables = [_runs(outcome, tests), *_errors(outcome)]
     parts: list[Part] = [Words(how_sure(outcome, tests)), *load_charts(outcome)]
-    return Exhibit(_common(tests), figures, tables, files, parts)
+    shared = (
+        ("length, mm", {t.length for t in tests}),
+        ("span, mm", {t.supports.span for t in tests}),
+        ("element size, mm", {t.size for t in tests}),
+        ("seam width, mm", {t.seam_width for t in tests}),
+    )
+    facts = [(label, float(values.pop())) for label, values in shared if len(values) == 1]
+    return Exhibit(facts, figures, tables, files, parts)
 
 
 def _write_tables(
@@ -335,33 +317,21 @@ def _write_tables(
         curve.insert(0, "wall", run.wall)
         curve.insert(0, "card", run.card)
         curve.insert(0, "test", run.test.name)
-    _write(pd.concat(curves), out, CURVES)
-    what = "every curve: deflection, load, pressure, volume, wrinkled share"
-    files = [(out.name(CURVES), what)]
-    measured = measured_table(tests)
-    if len(measured):
-        _write(measured, out, MEASURED)
-        files.append((out.name(MEASURED), "mean and scatter of the repetitions on a grid"))
+    found = [
+        (
+            CURVES,
+            pd.concat(curves),
+            "every curve: deflection, load, pressure, volume, wrinkled share",
+        ),
+        (MEASURED, measured_table(tests), "mean and scatter of the repetitions on a grid"),
+    ]
+    files = []
+    for name, table, what in found:
+        if len(table) or name == CURVES:
+            with replacing(out.path(name)) as path:
+                table.to_csv(path, index=False)
+            files.append((out.name(name), what))
     return files
-
-
-def _write(table: pd.DataFrame, out: Output, name: str) -> None:
-    with replacing(out.path(name)) as path:
-        table.to_csv(path, index=False)
-
-
-def _common(tests: Sequence[CylinderTest]) -> list[tuple[str, object]]:
-    """What all tests share, for the head of the page."""
-    facts: list[tuple[str, object]] = []
-    for label, values in (
-        ("length, mm", {t.length for t in tests}),
-        ("span, mm", {t.supports.span for t in tests}),
-        ("element size, mm", {t.size for t in tests}),
-        ("seam width, mm", {t.seam_width for t in tests}),
-    ):
-        if len(values) == 1:
-            facts.append((label, float(values.pop())))
-    return facts
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:
@@ -388,14 +358,11 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         knee = " (knee)" if m.buckling_is == "knee" else ""
         buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
         wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
-        loads = [m.loads.get(place) for place in places]
         strain, rise = f"{max(m.body_strain):.3f}", f"{m.pressure_rise:+.2f}"
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
         spread = outcome.sigma(i)
-        listed = [
-            None if load is None else load_words(load, spread.get(place))
-            for place, load in zip(places, loads, strict=True)
-        ]
+        loads = [(m.loads.get(place), spread.get(place)) for place in places]
+        listed = [None if one[0] is None else load_words(*one) for one in loads]
         rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
     header = [
         "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
@@ -425,27 +392,24 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
 
 def _errors(outcome: CylinderOutcome) -> list[Table]:
     walls = ["wall"] if outcome.band else []
-    rows: list[list[object]] = [
-        [
-            outcome.runs[i].test.name, outcome.runs[i].card,
-            *(walls and [outcome.runs[i].wall]), m.error.rms,
-            percent(m.error.relative), f"{m.error.mean:+.1f}", m.error.compared, m.error.beyond,
-        ]
-        for i, m in outcome.measures.items()
-        if m.error is not None
-    ]  # fmt: skip
+    rows: list[list[object]] = []
+    for i, m in outcome.measures.items():
+        if (error := m.error) is not None:
+            run = outcome.runs[i]
+            numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
+            head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
+            rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
     if not rows:
         return []
-    shared = ["RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
-    header = ["test", "card", *walls, *shared]
+    named = ["test", "card", *walls]
+    header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
-    text = [_unbroken(row) for row in rows]
-    named = tuple(range(1, header.index("RMS, N")))
-    return [Table("Against measured loads", header, text, note, text=named)]
+    text = tuple(range(1, len(named)))
+    return [Table("Against measured loads", header, rows, note, text=text)]
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:
-    """The row with names and numbers that stay on one line."""
+    """Return the row with names and numbers that stay on one line."""
     return [c.replace(" ", "\u00a0") if isinstance(c, str) and len(c) < SHORT else c for c in row]
 
 
@@ -456,7 +420,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """load_deflection.csv, figures and beams; the numbers of every card."""
+    """Write load_deflection.csv, figures and beams; return the numbers of every card."""
     kind, predicted = CylinderPredicted(), []
     for name, card in cards.items():
         run = runs[name, PART]

@@ -24,7 +24,7 @@ class CollarSection(Section):
 
 
 class GasSection(Section):
-    """What it is filled with."""
+    """The gas that fills the cylinder."""
 
     ambient: Positive | None = None
     temperature: Positive | None = None
@@ -47,7 +47,7 @@ class MeasuredSection(Section):
 
 
 class CylinderSection(Section):
-    """[[cylinder]]: inflated, laid on two supports, bent by a collar."""
+    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar."""
 
     name: Name | None = None
     diameter: Positive

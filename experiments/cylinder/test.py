@@ -1,4 +1,4 @@
-"""A cylinder in bending as its section says, and the model of it."""
+"""A cylinder in bending, as its section describes it, and its model."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from ...errors import InputError
 from ...files import is_file
@@ -34,12 +35,7 @@ from .section import CylinderSection, MeasuredSection
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Every repetition in the files of a section; none where it lists none.
-
-    Raises
-    ------
-    InputError : a file that is listed twice or is not there; of a file, naming it and the line.
-    """
+    """Read every repetition in the files of a section; none where it lists none."""
     names = section.files or []
     folder = place.data_folder
     if folder is None:
@@ -72,7 +68,6 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
 PART = "cylinder"
 #: mm of an element, unless the file says otherwise.
 SIZE = 25.0
-#: Keys of the section, where a model calls them otherwise.
 #: Keys that may be left out, and what is then as usual.
 USUAL = {"span": "span", "seam_width": "seam width", "length": "length", "collar": "collar",
          "support_diameter": "diameter of the supports"}  # fmt: skip
@@ -83,9 +78,8 @@ KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size"
 class CylinderTest:
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
-    deflections : frames of the bending. measured : repetitions, empty where there are none.
-    listed : whether the section lists files of them. assumed : what the section leaves to the
-    usual values, in words.
+    deflections : frames of the bending. listed : whether the section lists measured files. assumed
+    : what the section leaves to usual values, in words.
     """
 
     name: str
@@ -111,11 +105,11 @@ class CylinderTest:
 
     @property
     def reads_files(self) -> bool:
-        """Whether its section lists measured files."""
+        """Return whether its section lists measured files."""
         return self.listed
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files of the measured repetitions."""
+        """Return the files of the measured repetitions."""
         return joined(
             DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
             for c in self.measured
@@ -124,52 +118,37 @@ class CylinderTest:
 
     @property
     def reach(self) -> Reach:
-        """Nothing: its strains are known only when a card is."""
+        """Return nothing: the strains are known only with a card."""
         return Reach()
 
     def model(self, thickness: float | None = None) -> CylinderModel:
-        """The test with a fabric of this thickness (mm), else of the project's.
-
-        Raises
-        ------
-        InputError : sizes that make no mesh or bodies that do not fit around it.
-        """
+        """Return the model with a fabric of this thickness (mm), else of the project's."""
+        thick = self.place.fabric.thickness if thickness is None else thickness
         return inflated_cylinder(
-            self.diameter,
-            self.pressure,
-            self.place.fabric.thickness if thickness is None else thickness,
-            self.size,
-            self.length,
-            self.seam_width,
-            self.supports,
-            self.collar,
-            self.deflections,
-            self.symmetry,
-            self.cap_warp,
-            self.gas,
+            self.diameter, self.pressure, thick, self.size, self.length, self.seam_width,
+            self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp, self.gas,
             self.reading,
-        )
+        )  # fmt: skip
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, CylinderModel]:
-        """The one model; edges, or every increment of pressure and deflection, divided.
-
-        Raises
-        ------
-        InputError : a mesh that cannot be had; increments to be joined.
-        """
+        """Return the one model; edges, or every increment, divided by a factor."""
         if what == "elements":
             return {PART: replace(self, size=self.size / factor).model(thickness)}
         if factor != int(factor):
             problem = "the cylinder's steps are divided, never joined: use --coarser 0"
             raise InputError(None, "increments", problem)
         model, parts = self.model(thickness), int(factor)
-        inflation, increments = (_divided(s, parts) for s in (model.inflation, model.increments))
-        return {PART: replace(model, inflation=inflation, increments=increments)}
+        finer: dict[str, Any] = {}
+        for name in ("inflation", "increments"):
+            ends = pairwise((0.0, *getattr(model, name)))
+            steps = [np.linspace(a, b, parts + 1)[1:] for a, b in ends]
+            finer[name] = [float(value) for part in steps for value in part]
+        return {PART: replace(model, **finer)}
 
     def settings(self) -> Mapping[str, object]:
-        """Everything but names, measurements and where the curve is read."""
+        """Return everything but names, measurements and where the curve is read."""
         names = (
             "diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
             "deflections",
@@ -179,12 +158,7 @@ class CylinderTest:
 
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
-    """The test of a section; a cylinder that makes no model is found here, before anything runs.
-
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a measured file and line.
-    """
+    """Read the section of a test; refuse a cylinder that makes no model."""
     scales = place.scales
 
     def length(value: float | None, default: float) -> float:
@@ -207,9 +181,11 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
                 length(section.span, RigidSupports().span),
                 length(section.support_diameter, RigidSupports().diameter),
             ),
-            collar=_collar(section, diameter, scales.length),
+            collar=usual_collar(diameter)
+            if section.collar is None
+            else Collar(**_scaled(section.collar, scales.length)),
             deflections=_deflections(section, scales.length),
-            gas=_gas(section, scales.pressure),
+            gas=Gas(**_scaled(section.gas, scales.pressure, ("ambient",))),
             reading=curve_reading(
                 diameter,
                 None if places is None else [p * scales.length for p in places],
@@ -225,28 +201,14 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     return replace(test, measured=measured, listed=listed, assumed=assumed)
 
 
-def _collar(section: CylinderSection, diameter: float, scale: float) -> Collar:
-    if section.collar is None:
-        return usual_collar(diameter)
-    given = section.collar.model_dump(exclude_none=True)
-    return Collar(**{key: value * scale for key, value in given.items()})
-
-
-def _gas(section: CylinderSection, scale: float) -> Gas:
-    given = section.gas.model_dump(exclude_none=True)
-    if "ambient" in given:
-        given["ambient"] *= scale
-    return Gas(**given)
+def _scaled(section: BaseModel, scale: float, names: Sequence[str] | None = None) -> dict[str, Any]:
+    given = section.model_dump(exclude_none=True)
+    return {k: v * scale if names is None or k in names else v for k, v in given.items()}
 
 
 def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
-    """Those listed, else equal steps."""
+    """Return the deflections listed, else equal steps."""
     if section.deflections is not None:
         return tuple(d * scale for d in section.deflections)
     end = DEFLECTION if section.deflection is None else section.deflection * scale
     return tuple(np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist())
-
-
-def _divided(ends: Sequence[float], parts: int) -> list[float]:
-    steps = [np.linspace(a, b, parts + 1)[1:] for a, b in pairwise((0.0, *ends))]
-    return [float(value) for part in steps for value in part]

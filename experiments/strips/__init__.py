@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from pydantic import BaseModel
 
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
 from ...solvers.base import History
-from ..kinds import (
-    Candidate,
-    Kind,
-    MakeSolver,
-    Place,
-    Planning,
-    Predicted,
-    Studied,
-)
+from ..kinds import Kind, MakeSolver, Predicted, Studied
 from .candidates import candidates
-from .objective import Array
-from .prepared import PreparedStrips
+from .prepared import Array, PreparedStrips
 from .section import StripsSection
 from .test import StripsTest, read
 
@@ -46,6 +35,8 @@ class Strips:
     doubts: tuple[str, ...] = (
         "elongation-unit", "load-unit", "preload", "after-failure", "swapped",
     )  # fmt: skip
+    read = staticmethod(read)
+    candidates = staticmethod(candidates)
     studied: Studied | None = Studied(
         steps=lambda model: model.elongations,
         quantities=_end_load,
@@ -54,24 +45,11 @@ class Strips:
         curve=_load_curve,
     )
 
-    def read(self, section: StripsSection, place: Place, name: str) -> StripsTest:
-        """The test of a section, and its load curves.
-
-        Raises
-        ------
-        InputError : naming the file and the dotted key, or a data file.
-        """
-        return read(section, place, name)
-
     def prepare(
         self, test: StripsTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedStrips:
-        """Return the test as it is: its data were read with its section."""
+        """Return the test, which was read with its data."""
         return PreparedStrips(test)
-
-    def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Strips along the yarns and at angles to them."""
-        return candidates(planning)
 
 
 KIND: Kind = Strips()

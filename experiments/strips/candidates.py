@@ -11,7 +11,7 @@ import numpy as np
 
 from ...meshes.strip_models import GRIP_DISTANCE, WIDTH
 from ...readers.curves import DIRECTIONS, LoadCurve
-from ..kinds import Candidate, Planning, Precision
+from ..kinds import Candidate, Planning
 from .data import Strip
 from .prepared import PLACES, PreparedStrips, loads_to_match
 from .test import StripsTest
@@ -27,21 +27,21 @@ SCATTER = 0.04
 
 @dataclass(frozen=True)
 class Pull:
-    """A strip that could be pulled: direction as the kind knows it, and its angle in degrees."""
+    """A strip that could be pulled: its direction (warp, fill, bias) and its angle in degrees."""
 
     direction: str
     angle: float
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Return a readable name."""
         if self.direction != "bias":
             return f"{self.direction} strip"
         return f"strip at {self.angle:g} degrees"
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Each direction by itself; of the project's first strips, or of usual ones."""
+    """Return each direction by itself, after the project's first strips or usual ones."""
     own = [test for test in planning.present if isinstance(test, PreparedStrips)]
     template = own[0] if own else None
     angles = dict.fromkeys([*ANGLES, *([template.test.bias_angle] if template else [])])
@@ -56,48 +56,19 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
-    """The strip with the loads that the law gives, one value an increment."""
-    strip = _strip(pull, template, planning)
-    test = _test(pull, strip, template, planning)
-    (model,) = test.models().values()
-    history = planning.make_solver().run(model, planning.law)
-    load, elongation = np.asarray(history.load), np.array(model.elongations)
-    noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
-    curve = LoadCurve(pull.direction, "computed", elongation, load, None)
-    done = replace(strip, curves=(curve,))
-    return PreparedStrips(replace(test, strips={pull.direction: done}, noise=noise))
+    """Return the strip with the loads that the law gives, one value an increment.
 
-
-def _strip(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Strip:
-    """As long as the project's own of the direction, else pulled as far as the law is known."""
-    own = None if template is None else template.test.strips.get(pull.direction)
-    gauge = GAUGE if own is None else own.gauge_length
-    final = gauge * math.exp(_strain(pull, planning))
-    if template is not None and own is not None:
-        alike = pull.direction != "bias" or pull.angle == template.test.bias_angle
-        final = own.final_length if alike else final
-    return Strip(pull.direction, gauge, final)
-
-
-def _strain(pull: Pull, planning: Planning) -> float:
-    """Logarithmic strain of the gauge at which a yarn, or the shear between them, is at its end.
-
-    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    It is as long as the project's own, else pulled up to the end of the known law.
     """
-    warp, fill, shear = planning.ends.tolist()
-    if pull.direction != "bias":
-        return float(warp if pull.direction == "warp" else fill)
-    turn = math.radians(2 * pull.angle)
-    along, end = math.cos(turn), warp if pull.angle < 45 else fill
-    most = shear / (2 * math.sin(turn))
-    return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
-
-
-def _test(
-    pull: Pull, strip: Strip, template: PreparedStrips | None, planning: Planning
-) -> StripsTest:
     own = None if template is None else template.test
-    return StripsTest(
+    strip = None if own is None else own.strips.get(pull.direction)
+    gauge = GAUGE if strip is None else strip.gauge_length
+    final = gauge * math.exp(_strain(pull, planning))
+    if own is not None and strip is not None:
+        alike = pull.direction != "bias" or pull.angle == own.bias_angle
+        final = strip.final_length if alike else final
+    strip = Strip(pull.direction, gauge, final)
+    test = StripsTest(
         name=pull.name,
         place=planning.place,
         weight=1.0,
@@ -110,32 +81,47 @@ def _test(
         weights=dict.fromkeys(DIRECTIONS, 1.0),
         objective="N",
     )
+    (model,) = test.models().values()
+    load = np.asarray(planning.make_solver().run(model, planning.law).load)
+    noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
+    curve = LoadCurve(pull.direction, "computed", np.array(model.elongations), load, None)
+    done = replace(strip, curves=(curve,))
+    return PreparedStrips(replace(test, strips={pull.direction: done}, noise=noise))
+
+
+def _strain(pull: Pull, planning: Planning) -> float:
+    """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
+
+    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    """
+    warp, fill, shear = planning.ends.tolist()
+    if pull.direction != "bias":
+        return float(warp if pull.direction == "warp" else fill)
+    turn = math.radians(2 * pull.angle)
+    along, end = math.cos(turn), warp if pull.angle < 45 else fill
+    most = shear / (2 * math.sin(turn))
+    return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
 
 
 def _noise(
     pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
 ) -> float:
-    """N of independent loads: that of the own direction, else of the others or the usual scatter.
-
-    The largest of the others counts, relative to the largest load.
-    """
+    """Return the noise (N) of independent loads: of the own direction, the others, or usual."""
     if planning.noise is not None:
         return planning.noise
     if template is None:
         return SCATTER * largest * math.sqrt(values / PLACES)
-    own = {d: _precision(d, template, planning).at(values) for d in template.test.matched}
+    test, own = template.test, {}
+    for d in test.matched:  # the precision of one specimen
+        known = planning.precision[template.part(d)]
+        specimens = len(test.strips[d].curves) or test.specimens or 1
+        if test.match_by != "points":  # one curve of all of them: one says so much less
+            known = replace(known, alike=known.alike * specimens)
+        else:
+            known = replace(known, values=max(1, known.values // specimens))
+        own[d] = known.at(values)
     if pull.direction in own:
         return own[pull.direction]
-    models = template.test.models()
-    loads = {d: loads_to_match(template.test, template.test.strips[d], models[d])[1] for d in own}
+    models = test.models()
+    loads = {d: loads_to_match(test, test.strips[d], models[d])[1] for d in own}
     return max(noise / float(np.abs(loads[d]).max()) for d, noise in own.items()) * largest
-
-
-def _precision(direction: str, template: PreparedStrips, planning: Planning) -> Precision:
-    """Of the project's own strips of a direction, one specimen."""
-    told = planning.precision[template.part(direction)]
-    specimens = len(template.test.strips[direction].curves) or template.test.specimens or 1
-    if template.test.match_by != "points":
-        # One curve of all of them: one of them says so much less.
-        return replace(told, alike=told.alike * specimens)
-    return replace(told, values=max(1, told.values // specimens))

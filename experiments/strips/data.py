@@ -1,7 +1,8 @@
-"""From a section of strips and its files to the strips of a test."""
+"""Data of strip tests: files, load curves by direction, polynomials of them and their regions."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,31 +10,167 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
 from ...files import is_file
 from ...inference.comparison import NoiseIs
 from ...meshes.strip_models import WIDTH
-from ...readers.curves import DIRECTIONS, LoadCurve, read_load_curves, split_at_restarts
-from ...readers.frames import FrameSource
-from ...readers.polynomials import (
+from ...readers.curves import (
+    DIRECTIONS,
+    LoadCurve,
     LoadPolynomial,
+    checked_points,
     fit_load_polynomial,
+    read_load_curves,
     read_published_polynomials,
     specimen_scatter,
+    split_at_restarts,
+    terms_of,
 )
+from ...readers.frames import FrameSource
 from ...readers.registry import format_of
 from ...readers.sections import beside
 from ..keys import named_format
 from ..kinds import DataFile, Place
-from .polynomials import strain_regions
 from .section import CurvesSection, GaugeSection, StripsSection
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OrderScore:
+    """Scores of one order: n points, k coefficients, S the sum of squares left.
+
+    adjusted_r_squared : of S / (n - k) and (squares about the mean) / (n - 1). rmse : N, sqrt(S /
+    n). aic, bic : n ln(S / n) + 2 (k + 1) and n ln(S / n) + (k + 1) ln n. left_out : N, RMS error
+    at points, or whole specimens, that the fit did not see.
+    """
+
+    order: int
+    r_squared: float
+    adjusted_r_squared: float
+    rmse: float
+    aic: float
+    bic: float
+    left_out: float
+
+
+@dataclass(frozen=True)
+class OrderComparison:
+    """Scores by rising order, and the order that each rule chooses.
+
+    by_fit : lowest RMSE and highest R^2, the thesis' rule (section 3.2). Each order contains the
+    ones below it, so that it chooses the highest offered: the thesis' fourth was a choice of what
+    to offer.
+    """
+
+    scores: tuple[OrderScore, ...]
+    by_fit: int
+    by_adjusted_r_squared: int
+    by_aic: int
+    by_bic: int
+    by_left_out: int
+
+
+def compare_orders(
+    elongation: ArrayLike,
+    load: ArrayLike,
+    orders: Sequence[int] = range(1, 9),
+    through_origin: bool = True,
+    specimens: Sequence[object] | None = None,
+) -> OrderComparison:
+    """Fit each order to the points (n,) mm and (n,) N and score it.
+
+    specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
+    specimen err together, so leaving out one of them flatters.
+    """
+    u, f = checked_points(elongation, load)
+    names = list(range(len(u))) if specimens is None else list(specimens)
+    if len(names) != len(u):
+        raise InputError(None, "specimens", f"expected {len(u)} names, got {len(names)}")
+    if not len(orders):
+        raise InputError(None, "orders", "expected at least one, got none")
+    groups = [
+        np.array([i for i, name in enumerate(names) if name == one]) for one in dict.fromkeys(names)
+    ]
+    scores = tuple(_score(u, f, order, through_origin, groups) for order in sorted(set(orders)))
+
+    def best(values: list[float]) -> int:
+        return scores[int(np.argmin(values))].order
+
+    rules = ("rmse", "aic", "bic", "left_out")
+    fit, aic, bic, left_out = (best([getattr(s, rule) for s in scores]) for rule in rules)
+    adjusted = best([-score.adjusted_r_squared for score in scores])
+    return OrderComparison(scores, fit, adjusted, aic, bic, left_out)
+
+
+def _score(
+    u: Array,
+    f: Array,
+    order: int,
+    through_origin: bool,
+    groups: list[NDArray[np.intp]],
+) -> OrderScore:
+    fitted = fit_load_polynomial(u, f, order, through_origin)
+    terms, _, _ = terms_of(u, order, through_origin)
+    n, k = terms.shape
+    if n < k + 2:
+        problem = f"comparing needs {k + 2} points, there are {n}; lower it"
+        raise InputError(None, f"order {order}", problem)
+    # Below rounding a fit is exact, and the logarithm of nothing says nothing.
+    mean_square = max(fitted.rmse**2, 1e-30 * float((f**2).mean()))
+    likelihood = n * float(np.log(mean_square))
+    orthonormal = np.linalg.qr(terms)[0]
+    left = f - fitted(u)
+    squares = sum(_left_out_squares(orthonormal[group], left[group]) for group in groups)
+    return OrderScore(
+        order,
+        fitted.r_squared,
+        1.0 - (1.0 - fitted.r_squared) * (n - 1) / (n - k),
+        fitted.rmse,
+        likelihood + 2 * (k + 1),
+        likelihood + float(np.log(n)) * (k + 1),
+        float(np.sqrt(squares / n)),
+    )
+
+
+def _left_out_squares(rows: Array, left: Array) -> float:
+    """Return the squared error at points refitted without them, by (1 - H)^-1."""
+    without = np.eye(len(rows)) - rows @ rows.T
+    if np.linalg.cond(without) > 1e12:
+        return float("inf")  # the others do not settle the coefficients
+    return float((np.linalg.solve(without, left) ** 2).sum())
+
+
+#: Places that a break may take between zero and the last strain.
+BREAKS = 40
+
+
+def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
+    """Return the two breaks of the broken line through the origin nearest to the curve.
+
+    By least squares over a grid of 40 places, as Ambroziak and Klosowski read the regions of a
+    coated fabric by eye. strain, load : (n,) of one curve, strain above zero.
+    """
+    x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
+    if len(x) < 5 or not x.max() > 0:
+        raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
+    places = np.linspace(0.0, x.max(), BREAKS + 2)[1:-1]
+    hinges = np.maximum(x[:, None] - places, 0.0)
+    best, least = (places[0], places[-1]), np.inf
+    for a, b in itertools.combinations(range(BREAKS), 2):
+        terms = np.stack([x, hinges[:, a], hinges[:, b]], axis=1)
+        slopes, *_ = np.linalg.lstsq(terms, f, rcond=None)
+        error = float(np.sum((terms @ slopes - f) ** 2))
+        if error < least:
+            best, least = (places[a], places[b]), error
+    return float(best[0]), float(best[1])
 
 
 @dataclass(frozen=True)
 class ListedFile:
-    """A file that a section lists.
+    """A file of a section, with its key, and the direction it is listed for or None.
 
     field : its key below the section. direction : the one it is listed for; None where the file
     itself names it.
@@ -45,12 +182,7 @@ class ListedFile:
 
 
 def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
-    """The files of [strips.data], there or not, in the order of the section.
-
-    Raises
-    ------
-    InputError : none in any direction, one that is listed twice for the same.
-    """
+    """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [ListedFile(folder / data.polynomials, "data.polynomials")]
     field = "data.files"
@@ -76,15 +208,10 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
 def measured_curves(
     place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
 ) -> dict[str, tuple[LoadCurve, ...]]:
-    """The specimens' curves by direction, in the order of `DIRECTIONS`; only those there are.
+    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
 
     A file with one curve in a direction perhaps lists several specimens, one after the other and
     not named: it is split where the elongation starts again. width : of the strips, mm.
-
-    Raises
-    ------
-    InputError : naming the data file and line: see `read_load_curves`; naming the project and
-        key: one curve listed for two directions.
     """
     format = named_format(place, "data.format", "machine table", data.format)
     columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
@@ -103,7 +230,10 @@ def measured_curves(
             format=format,
         )
         before = first.setdefault(file.path, curves[0])
-        if before.direction != curves[0].direction and _same(before, curves[0]):
+        if before.direction != curves[0].direction and all(
+            np.array_equal(getattr(before, name), getattr(curves[0], name))
+            for name in ("elongation", "load")
+        ):
             problem = f"is listed for {before.direction} too, and does not tell the two apart"
             raise place.error(file.field, problem)
         for direction in DIRECTIONS:
@@ -115,12 +245,6 @@ def measured_curves(
     return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
 
 
-def _same(one: LoadCurve, other: LoadCurve) -> bool:
-    return np.array_equal(one.elongation, other.elongation) and np.array_equal(one.load, other.load)
-
-
-Array = NDArray[np.float64]
-
 #: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
 #: load cell is of accuracy class 0.5 %.
 LOAD_CELL = 0.005
@@ -131,19 +255,12 @@ PLACES = 200  # at which a polynomial is asked for its regions
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """One direction. Lengths mm, loads N.
+    """Data of one direction; lengths mm, loads N.
 
-    Parameters
-    ----------
-    direction : warp, fill or bias.
-    gauge_length, final_length : of the virtual strain gauge, at rest and at the end.
-    polynomial : the load curve, given or fitted to the curves; None where a forward analysis does
-        without data.
-    curves : the specimens' points, empty where only the polynomial is given.
-    scatter : standard deviation of the points about the polynomial; None where not known.
-    through_origin : whether a polynomial through the points starts in the origin.
-    open_end : nobody said the final length: it is where the points end.
-    published : the file of a polynomial that was given, None of one fitted to points.
+    gauge_length, final_length : of the virtual strain gauge. polynomial : given or fitted to the
+    curves; None in a forward analysis without data. scatter : standard deviation of points about
+    the polynomial. open_end : the final length is where the points end. published : file of a given
+    polynomial.
     """
 
     direction: str
@@ -158,40 +275,37 @@ class Strip:
 
     @property
     def elongation(self) -> float:
-        """Of the gauge at the end, mm."""
+        """Return the elongation of the gauge at the end, mm."""
         return self.final_length - self.gauge_length
 
     @property
     def strain(self) -> float:
-        """Logarithmic strain of the gauge at the end."""
+        """Return logarithmic strain of the gauge at the end."""
         return float(np.log1p(self.elongation / self.gauge_length))
 
     def strain_by(self, mask: NDArray[np.bool_] | None) -> float:
-        """The same by the points of a mask, which alone say where the end is if nobody else did."""
+        """Return the strain at the end by the points of a mask, unless the end was given."""
         end = self._end_of(mask) if self.open_end else self.elongation
         return float(np.log1p(end / self.gauge_length))
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Elongation and load of all specimens up to the end of the model, by elongation."""
+        """Return elongation and load of all specimens up to the end of the model, by elongation."""
         elongation, load, _ = self._inside
         return elongation, load
 
     @property
     def specimen_of(self) -> NDArray[np.intp]:
-        """Number of the specimen of each of the `points`."""
+        """Return number of the specimen of each of the `points`."""
         return self._inside[2]
 
     @property
     def beyond(self) -> int:
-        """Number of measured points that are not among the `points`."""
+        """Return number of measured points that are not among the `points`."""
         return sum(len(c.load) for c in self.curves) - len(self.points[0])
 
     def noise(self, largest: float, given: float | None = None) -> tuple[float, NoiseIs]:
-        """Least noise of a load to reckon with, N, and what it is.
-
-        largest : load measured. given : what the project says of it.
-        """
+        """Return the least noise of a load, N, and its origin."""
         if given is not None:
             return given, "given"
         if self.scatter is not None:
@@ -199,7 +313,7 @@ class Strip:
         return LOAD_CELL * largest, "assumed"
 
     def data_files(self, points: bool) -> list[DataFile]:
-        """The files of the load curve; points : whether those up to the end alone count."""
+        """Return the files of the load curve; points : whether those up to the end alone count."""
         if self.published is not None:
             name = format_of("load polynomials", self.published).name
             return [DataFile(self.published, FrameSource(name), 1)]
@@ -215,14 +329,7 @@ class Strip:
         return files
 
     def break_shares(self, mask: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
-        """Two shares of the gauge's strain between which three lines follow the load curve best.
-
-        mask : of the points, which the curve is to follow; all unless given.
-
-        Raises
-        ------
-        InputError : the points matched settle no polynomial.
-        """
+        """Return the two breaks (shares of strain) of the three lines nearest to the curve."""
         polynomial = self.polynomial
         if polynomial is None:
             return None
@@ -238,7 +345,7 @@ class Strip:
         return float(first / whole), float(second / whole)
 
     def _end_of(self, mask: NDArray[np.bool_] | None) -> float:
-        """How far (mm) the points of a mask go, at most to the end of the gauge."""
+        """Return the last elongation (mm) of masked points, at most the end of the gauge."""
         if mask is None or not self.curves:
             return self.elongation
         return min(self.elongation, float(self.points[0][mask].max()))
@@ -249,11 +356,11 @@ class Strip:
             return np.empty(0), np.empty(0), np.empty(0, np.intp)
         elongation = np.concatenate([c.elongation for c in self.curves])
         load = np.concatenate([c.load for c in self.curves])
-        whose = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
+        owners = np.repeat(np.arange(len(self.curves)), [len(c.load) for c in self.curves])
         end = self.elongation * (1 + 1e-9)
         order = np.argsort(elongation, kind="stable")
         order = order[(elongation[order] >= 0) & (elongation[order] <= end)]
-        return elongation[order], load[order], whose[order].astype(np.intp)
+        return elongation[order], load[order], owners[order].astype(np.intp)
 
 
 #: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
@@ -262,19 +369,13 @@ EXTRAPOLATED = 0.05
 
 
 def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
-    """The strips of a section, by direction: those whose table or whose data are there.
+    """Read the strips of a section, by direction: those with a table or data.
 
-    Files that are not there are done without where the place needs none and all lengths are given.
-
-    Raises
-    ------
-    InputError : naming the project and the key, or the data file: no data, no gauge length, a
-        final length that is not longer or beyond the data, points that settle no polynomial.
+    Missing files are no error where the place needs none and all lengths are given.
     """
     data = section.data
     if (data.polynomials is None) == (data.files is None):
-        problem = "expected exactly one of 'polynomials' and 'files'"
-        raise place.error("data", problem)
+        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
     folder = place.data_folder
     if folder is None:
         folder = beside(place.path.parent, data.folder)
@@ -282,7 +383,8 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     listed = listed_files(place, data, folder)
     missing = next((file for file in listed if not is_file(file.path)), None)
     if missing is not None:
-        if place.need_data or not _complete(tables):
+        lengths = [x for t in tables.values() for x in (t.gauge_length, t.final_length)]
+        if place.need_data or not lengths or None in lengths:
             problem = f"there is no file {missing.path}; --data DIR names another folder"
             raise place.error(missing.field, problem)
         length = place.scales.length
@@ -305,11 +407,6 @@ def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
     return strips
 
 
-def _complete(tables: Mapping[str, GaugeSection]) -> bool:
-    lengths = [(t.gauge_length, t.final_length) for t in tables.values()]
-    return bool(lengths) and all(a is not None and b is not None for a, b in lengths)
-
-
 def _published(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
 ) -> dict[str, Strip]:
@@ -322,15 +419,8 @@ def _published(
         start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
         end = curve.final_length if own.final_length is None else own.final_length * length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
-        strips[direction] = _strip(
-            place,
-            direction,
-            start,
-            end,
-            polynomial=curve.polynomial,
-            scatter=scatter,
-            published=file.path,
-        )
+        known = {"scatter": scatter, "published": file.path}
+        strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
     return strips
 
 

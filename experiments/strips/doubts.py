@@ -1,11 +1,8 @@
-"""Traps that the load curves of strips can have fallen into.
-
-Each check is told of one specimen's curve and gives doubts, none where all is well.
-"""
+"""Doubts about load curves of strips: wrong units, preload, failure, swapped directions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,22 +31,36 @@ STIFFER = 1.15
 def doubts_of_strips(
     strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected
 ) -> Sequence[Doubt]:
-    """What is doubtful in the strips of a test, by direction; widths and thickness mm."""
+    """Return the doubts about the strips of a test, by direction; widths and thickness mm."""
     found: list[Doubt] = []
+    moduli: dict[str, list[float]] = {}
     for direction, strip in strips.items():
         for name, elongation, load in curves_of(strip):
             what = f"{direction}, {name}" if name else direction
-            found += _end(what, elongation[-1] / strip.gauge_length)
-            found += _preload(what, elongation, load)
-            found += _failure(what, elongation, load, strip.elongation)
-            if direction in ALONG and expected.moduli:
-                modulus = _modulus(strip, elongation, load, width * thickness)
-                found += _load_unit(what, modulus, expected, ALONG[direction])
-    return [*found, *_swapped(strips, width * thickness, expected)]
+            found += _of_curve(what, strip, elongation, load)
+            if direction not in ALONG or not expected.moduli:
+                continue
+            modulus = _modulus(strip, elongation, load, width * thickness)
+            moduli.setdefault(direction, []).append(modulus)
+            if far := expected.outside(modulus, [ALONG[direction]]):
+                text = (
+                    f"{what}: load over strain is a modulus of about {far}: are load and "
+                    "elongation in the units that are said, and are width and thickness right?"
+                )
+                found.append(Doubt("load-unit", True, text))
+    if set(ALONG) <= set(strips) and expected.moduli and expected.warp_is_stiffer:
+        warp, fill = (float(np.median(moduli.get(d) or np.nan)) for d in ALONG)
+        if fill > STIFFER * warp:
+            text = (
+                f"the fill's modulus is about {fill:.3g} MPa, the warp's {warp:.3g} MPa, and the "
+                "bounds have the warp stiffer: warp and fill seem to be swapped"
+            )
+            found.append(Doubt("swapped", False, text))
+    return found
 
 
 def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
-    """Name, elongation and load of every specimen; of the polynomial where only that is known."""
+    """Return name, elongation and load of every specimen, else of the polynomial."""
     if strip.curves:
         return [(curve.specimen, curve.elongation, curve.load) for curve in strip.curves]
     if strip.polynomial is None:
@@ -58,87 +69,44 @@ def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
     return [("", elongation, strip.polynomial(elongation))]
 
 
-def _end(what: str, strain: float) -> list[Doubt]:
-    """Percent, or strain, for elongation; mm beside m; a gauge length that is not the gauge's."""
-    if LEAST_END < strain < MOST_END:
-        return []
-    text = (
-        f"{what}: the curve ends at an elongation of {strain:.3g} gauge lengths: is it a length in "
-        "the unit that is said (not percent, not a strain), and is the gauge length right?"
-    )
-    return [Doubt("elongation-unit", True, text)]
-
-
-def _preload(what: str, elongation: Array, load: Array) -> list[Doubt]:
-    """A load where nothing is elongated yet."""
+def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
+    strain = elongation[-1] / strip.gauge_length
+    if not LEAST_END < strain < MOST_END:
+        text = (
+            f"{what}: the curve ends at an elongation of {strain:.3g} gauge lengths: is it a length"
+            " in the unit that is said (not percent, not a strain), and is the gauge length right?"
+        )
+        yield Doubt("elongation-unit", True, text)
     largest, end = float(load.max()), float(elongation.max())
+    # A curve may begin where the strip is elongated already.
     first = load[np.abs(elongation) <= BEGINNING * end]
-    if not first.size:  # the curve begins where the strip is elongated already
-        return []
-    level = float(np.median(first)) / largest if largest > 0 else 0.0
-    if abs(level) < PRELOAD:
-        return []
-    text = (
-        f"{what}: the load is {level * largest:.3g} N ({level:.0%} of the largest) where the curve "
-        "begins: a preload, or a zero that was not set; begin the elongation where the load does"
-    )
-    return [Doubt("preload", False, text)]
-
-
-def _failure(what: str, elongation: Array, load: Array, end: float) -> list[Doubt]:
-    """Rows after the strip broke, within what is to be fitted."""
-    largest, row = 0.0, None
-    for i, (u, f) in enumerate(zip(elongation, load, strict=True)):
+    level = float(np.median(first)) / largest if first.size and largest > 0 else 0.0
+    if abs(level) >= PRELOAD:
+        text = (
+            f"{what}: the load is {level * largest:.3g} N ({level:.0%} of the largest) where the "
+            "curve begins: a preload, or a zero that was not set; begin the elongation where the "
+            "load does"
+        )
+        yield Doubt("preload", False, text)
+    largest, end = 0.0, strip.elongation
+    for u, f in zip(elongation, load, strict=True):
         if u > end * (1 + 1e-9):
             break
         largest = max(largest, float(f))
         if f < FAILED * largest and u > SLOPE_AT * end:
-            row = i
+            text = (
+                f"{what}: the load falls from {largest:.3g} to {f:.3g} N at an elongation of "
+                f"{u:.3g} mm: rows after failure; cut them off, or say a shorter final_length"
+            )
+            yield Doubt("after-failure", True, text)
             break
-    if row is None:
-        return []
-    text = (
-        f"{what}: the load falls from {largest:.3g} to {load[row]:.3g} N at an elongation of "
-        f"{elongation[row]:.3g} mm: rows after failure; cut them off, or say a shorter final_length"
-    )
-    return [Doubt("after-failure", True, text)]
 
 
 def _modulus(strip: Strip, elongation: Array, load: Array, area: float) -> float:
-    """Secant modulus (MPa) at half of the end strain."""
+    """Return secant modulus (MPa) at half of the end strain."""
     strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
     at = SLOPE_AT * float(strain.max())
     near = np.argsort(np.abs(strain - at))[:5]
     value = np.median(load[near] / np.where(strain[near] > 0, strain[near], np.nan))
     return float(value) / area if np.isfinite(value) else float("nan")
-
-
-def _load_unit(what: str, modulus: float, expected: Expected, name: str) -> list[Doubt]:
-    """kN beside N, N/m beside N, or a width or thickness that is not the strip's."""
-    far = expected.outside(modulus, [name])
-    if not far:
-        return []
-    text = (
-        f"{what}: load over strain is a modulus of about {far}: are load and elongation in the "
-        "units that are said, and are width and thickness right?"
-    )
-    return [Doubt("load-unit", True, text)]
-
-
-def _swapped(strips: Mapping[str, Strip], area: float, expected: Expected) -> list[Doubt]:
-    """The fill is stiffer where the bounds have the warp stiffer."""
-    if not set(ALONG) <= set(strips) or not expected.moduli or not expected.warp_is_stiffer:
-        return []
-    moduli = {}
-    for direction in ALONG:
-        strip = strips[direction]
-        values = [_modulus(strip, u, f, area) for _, u, f in curves_of(strip)]
-        moduli[direction] = float(np.median(values)) if values else float("nan")
-    warp, fill = moduli["warp"], moduli["fill"]
-    if not fill > STIFFER * warp:
-        return []
-    text = (
-        f"the fill's modulus is about {fill:.3g} MPa, the warp's {warp:.3g} MPa, and the bounds "
-        "have the warp stiffer: warp and fill seem to be swapped"
-    )
-    return [Doubt("swapped", False, text)]

@@ -25,30 +25,31 @@ if TYPE_CHECKING:
     from scipy.spatial import Delaunay
 
 Array = NDArray[np.float64]
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
     """The correlated points of a frame, triangulated by their reference x and y.
 
-    mesh : Delaunay triangles. places : (points, 2, 3) mm, before and after.
+    places : (points, 2, 3) mm, before and after.
     """
 
     mesh: Delaunay
     places: Array
 
     def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Longest edge (triangles,) mm in the reference x and y."""
+        """Return longest edge (triangles,) mm in the reference x and y."""
         corners = self.places[self.mesh.simplices[triangles], 0, :2]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         return np.asarray(edges.max(axis=1))
 
 
 def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
-    """The surface of a frame; None where fewer than three points, or a line, were correlated.
+    """Triangulate a frame; None where fewer than three points, or a line, were correlated.
 
-    before : a surface whose triangles are taken where the reference points are the same: most
-        exports have the same points in every frame, and triangulating is what costs.
+    before : a surface; its triangles are taken where the reference points are the same:
+    triangulating is what costs.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -64,13 +65,8 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
         return None
 
 
-def usual_edge(surface: Surface) -> float:
-    """Median over the triangles of their longest edge, mm."""
-    return float(np.median(surface.longest_edge()))
-
-
 def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
-    """Place (2, 3) mm before and after of the point (2,), or why there is none.
+    """Return place (2, 3) mm before and after of the point (2,), or the reason for none.
 
     limit : mm; a triangle with a longer edge spans a hole.
     """
@@ -87,10 +83,10 @@ def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
 
 
 def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
-    """The triangle that holds a point (2,), -1 for none, and the weights (3,) of its corners.
+    """Return the triangle that holds a point (2,), -1 for none, and its corners' weights (3,).
 
-    By hand: Delaunay.find_simplex first inverts a matrix for every triangle, which costs more
-    than triangulating.
+    Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
+    triangulating.
     """
     x, y = np.moveaxis(surface.places[surface.mesh.simplices, 0, :2] - end, -1, 0)
     # Twice the areas that the point makes with the sides opposite to each corner.
@@ -101,22 +97,12 @@ def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
     return (best if weights[best].min() >= -1e-9 else -1), weights[best]
 
 
-log = logging.getLogger(__name__)
-
-
 @dataclass(frozen=True, eq=False)
 class GaugeRecord:
     """A virtual strain gauge through n frames; NaN in the frames where it was lost.
 
-    Parameters
-    ----------
-    reference_length : mm, between the two reference places, by x, y and z.
-    length : (n,) mm, by x, y and z.
-    elongation : (n,) mm, length - reference length.
-    strain : (n,) engineering, elongation / reference length.
-    log_strain : (n,) ln(length / reference length).
-    lost : indices of the frames where an end had no correlated surface around it.
-    warnings : one line for each end of the gauge that was lost: in which frames, why, what to do.
+    reference_length, length : mm, by x, y and z. strain : engineering, elongation / reference
+    length; log_strain : ln(length / reference length). lost : frames without surface around an end.
     """
 
     reference_length: float
@@ -129,28 +115,14 @@ class GaugeRecord:
 
 
 def virtual_strain_gauge(
-    frames: Sequence[Frame],
-    lower: ArrayLike,
-    upper: ArrayLike,
-    max_gap: float = 1.35,
+    frames: Sequence[Frame], lower: ArrayLike, upper: ArrayLike, max_gap: float = 1.35
 ) -> GaugeRecord:
     """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
 
     An end is lost in a frame where it lies outside the triangulated points, or in a triangle with
-    an edge longer than `max_gap` times the usual longest edge: there the points between are
-    missing, and a value would be interpolated over a hole.
-
-    Parameters
-    ----------
-    frames : in the order of the test; each with its own points, not necessarily the same.
-    lower, upper : (2,) mm, x and y of the ends in the reference state.
-    max_gap : 1.35 finds one missing point of a square grid (there the ratio is 1.41). Points
-        scattered at random need about 2.5.
-
-    Raises
-    ------
-    InputError : no frames, ends that are no points or coincide, an end lost in every frame,
-        a gauge within one triangle of points, a gap that is no number.
+    an edge longer than `max_gap` times the usual longest edge: a value would be interpolated over a
+    hole. lower, upper : (2,) mm, x and y in the reference state. max_gap : 1.35 finds one missing
+    point of a square grid (1.41 there); points scattered at random need about 2.5.
     """
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
@@ -164,7 +136,7 @@ def virtual_strain_gauge(
     for frame in frames:
         seen.append(triangulated(frame, whole))
         whole = seen[-1] or whole
-    spacing = [usual_edge(surface) for surface in seen if surface is not None]
+    spacing = [float(np.median(s.longest_edge())) for s in seen if s is not None]
     usual = float(np.median(spacing)) if spacing else 0.0
     apart = float(np.linalg.norm(ends[1] - ends[0]))
     if apart < usual:
@@ -237,30 +209,17 @@ def gauge_load_curve(
     load_times: ArrayLike | None = None,
     path: Path | None = None,
 ) -> LoadCurve:
-    """The machine's load against the gauge's elongation; lost frames are left out.
+    """Return the machine's load over the gauge's elongation; lost frames are left out.
 
-    Without times, one load a frame. With times, the load is interpolated at the frames' times;
-    frames before the first or after the last load are left out, which is logged.
-
-    Parameters
-    ----------
-    loads : (n,) or, with times, (k,) N.
-    direction, specimen, path : of the curve; the direction by any of its names.
-    frame_times, load_times : (n,) and (k,) on the same clock and in the same unit; the latter
-        rising.
-
-    Raises
-    ------
-    InputError : counts that do not agree, times that do not rise, numbers that are not finite,
-        fewer than two frames left.
+    loads : (n,) N, or (k,) at rising load_times, interpolated at frame_times (n,); frames before
+    the first or after the last load are left out, which is logged.
     """
     way = direction_named(direction)
     load, count = np.asarray(loads, dtype=float), len(record.length)
     if not np.isfinite(load).all():
         raise InputError(path, "loads", "expected finite numbers; leave out rows without a load")
     if (frame_times is None) != (load_times is None):
-        problem = "expected both frame_times and load_times, or neither"
-        raise InputError(path, "times", problem)
+        raise InputError(path, "times", "expected both frame_times and load_times, or neither")
     inside = np.ones(count, dtype=bool)
     if frame_times is None or load_times is None:
         if load.shape != (count,):
@@ -285,12 +244,11 @@ def gauge_load_curve(
 def _at_times(
     load: Array, frame_times: Array, load_times: Array, count: int, path: Path | None
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Loads (n,) at the frames' times, and which of them lie within the record."""
+    """Return loads (n,) at the frames' times, and which of them lie within the record."""
     pairs = (("frame_times", frame_times, count), ("load_times", load_times, load.size))
     for name, times, expected in pairs:
         if times.shape != (expected,) or not np.isfinite(times).all():
-            problem = f"expected {expected} finite numbers, got {times.size}"
-            raise InputError(path, name, problem)
+            raise InputError(path, name, f"expected {expected} finite numbers, got {times.size}")
     if load.size < 2 or (np.diff(load_times) <= 0).any():
         raise InputError(path, "load_times", "expected two or more, each later than the one before")
     inside = (frame_times >= load_times[0]) & (frame_times <= load_times[-1])
@@ -299,24 +257,11 @@ def _at_times(
 
 @dataclass(frozen=True)
 class PairedLoads:
-    """A machine's loads, and how they belong to the frames of a gauge.
+    """A machine's loads, and their pairing with the frames of a gauge.
 
-    Parameters
-    ----------
-    path : the machine's export.
-    direction, specimen : of the strip; the direction by any of its names.
-    load_column, time_column : names in the export, where they are not found by themselves.
-    load_unit : N or kN, where the export names none.
-    decimal : the mark in the export and in the table of times, where it is not clear.
-    format : of the export, found by its content unless given.
-    frame_times : a table of the frames' times: pairs the loads by time. frame_time_column : name
-        of its column.
-    frame_interval : s between frames, the first at 0: pairs the loads by time too.
-    time_offset : s, the machine's clock less the frames'.
-
-    Raises
-    ------
-    InputError : naming what is out of range, contradicts another, or would have no effect.
+    load_column, load_unit, decimal, format : of the export, where not found. frame_times : a table
+    of the frames' times, or frame_interval : s between frames, the first at 0: pair the loads by
+    time. time_offset : s, the machine's clock less the frames'.
     """
 
     path: Path
@@ -350,7 +295,7 @@ class PairedLoads:
 
     @property
     def timed(self) -> bool:
-        """Whether loads and frames are paired by time."""
+        """Return whether loads and frames are paired by time."""
         return self.frame_times is not None or self.frame_interval is not None
 
     def _refuse(self, *useless: str, needs: str) -> None:
@@ -360,12 +305,7 @@ class PairedLoads:
 
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
-    """The load curve of a gauge.
-
-    Raises
-    ------
-    InputError : naming the file of loads or of times; counts that do not agree.
-    """
+    """Return the load curve of a gauge."""
     count, times = len(record.length), None
     if loads.frame_interval is not None:
         times = loads.frame_interval * np.arange(count)
@@ -404,7 +344,7 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
 
 @contextmanager
 def _naming(fields: str) -> Iterator[None]:
-    """Readers ask for their argument `columns`, which is called otherwise here."""
+    """Rename the readers' argument `columns` in errors to what it is called here."""
     try:
         yield
     except InputError as error:
@@ -412,17 +352,19 @@ def _naming(fields: str) -> Iterator[None]:
         raise InputError(error.path, error.field, problem) from None
 
 
+#: Columns of a table by the attributes of a record.
+COLUMNS = {
+    "length": "length_mm", "elongation": "elongation_mm", "strain": "strain",
+    "log_strain": "log_strain",
+}  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class GaugeTable:
     """A gauge through the frames of a test, with the machine's loads where there are any.
 
-    Parameters
-    ----------
-    files : names of the frames, one each.
-    lower, upper : (x, y) mm of the ends in the reference state.
-    record : of the gauge.
-    curve : its loads; frames where correlation was lost, or without a load, are not in it.
-    note : what looks unmeant in the order of the frames.
+    lower, upper : (x, y) mm of the ends. curve : without lost frames and those without load. note :
+    on the order of the frames.
     """
 
     files: Sequence[str]
@@ -434,7 +376,7 @@ class GaugeTable:
 
     @property
     def notes(self) -> list[Note]:
-        """Lost ends of the gauge, the order of the frames, frames that have no load."""
+        """Return warnings: lost ends of the gauge, order of the frames, frames without load."""
         notes = [*self.record.warnings, *([as_note(self.note)] if self.note else [])]
         if without := self.without_load:
             words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
@@ -444,40 +386,28 @@ class GaugeTable:
 
     @property
     def without_load(self) -> list[str]:
-        """Files of the frames that the load curve leaves out, though the gauge has a length."""
+        """Return the files of frames with a length that the load curve leaves out."""
         if self.curve is None:
             return []
         seen = np.flatnonzero(np.isfinite(self.record.length))
         return [self.files[i] for i in sorted({*seen.tolist()} - {*self._used().tolist()})]
 
     def frame(self) -> pd.DataFrame:
-        """A row a frame, NaN where the gauge was lost; with loads only the frames of the curve."""
+        """Return a DataFrame, a row a frame; with loads only the frames of the curve."""
         import pandas as pd
 
         record, curve = self.record, self.curve
         rows = np.arange(len(self.files)) if curve is None else self._used()
-        table = pd.DataFrame(
-            {
-                "frame": rows,
-                "file": [self.files[i] for i in rows],
-                "length_mm": record.length[rows],
-                "elongation_mm": record.elongation[rows],
-                "strain": record.strain[rows],
-                "log_strain": record.log_strain[rows],
-            }
-        )
+        table = pd.DataFrame({"frame": rows, "file": [self.files[i] for i in rows]})
+        for name, column in COLUMNS.items():
+            table[column] = getattr(record, name)[rows]
         if curve is not None:
             table["load_N"] = curve.load
             table["specimen"], table["direction"] = curve.specimen, curve.direction
         return table
 
     def write(self, path: Path | str) -> None:
-        """Write the table with its notes; with loads, strips of a project read it as a curve.
-
-        Raises
-        ------
-        OutputError : it cannot be written; what was there is still there.
-        """
+        """Write the table with its notes; with loads, strips of a project read it as a curve."""
         ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
         about = (
             f"# virtual strain gauge between {ends[0]} and {ends[1]} mm,"
@@ -490,19 +420,14 @@ class GaugeTable:
             self.frame().to_csv(stream, index=False, lineterminator="\n")
 
     def numbers(self) -> dict[str, Any]:
-        """The outcome as plain data; frames by the names of their files."""
+        """Return the results as plain data; frames by the names of their files."""
         record, curve = self.record, self.curve
         seen = np.flatnonzero(np.isfinite(record.length))
         last = seen[np.argmax(record.length[seen])]
         numbers: dict[str, Any] = {
             "gauge_length_mm": record.reference_length,
-            "longest": {
-                "file": self.files[last],
-                "length_mm": float(record.length[last]),
-                "elongation_mm": float(record.elongation[last]),
-                "strain": float(record.strain[last]),
-                "log_strain": float(record.log_strain[last]),
-            },
+            "longest": {"file": self.files[last]}
+            | {column: float(getattr(record, name)[last]) for name, column in COLUMNS.items()},
             "frames": len(self.files),
             "lost": [self.files[i] for i in record.lost],
             "warnings": [note.line for note in self.notes],
@@ -519,7 +444,7 @@ class GaugeTable:
         return numbers
 
     def _used(self) -> NDArray[np.intp]:
-        """The frames (points,) of the curve."""
+        """Return the frames (points,) of the curve."""
         if self.curve is None or self.curve.frame is None:
             return np.flatnonzero(np.isfinite(self.record.length))
         return self.curve.frame

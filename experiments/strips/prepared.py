@@ -1,15 +1,23 @@
-"""A test of strips in a fit: what is compared, and what a finished fit shows of it."""
+"""Strip tests in a fit: residuals (Eqs 3.4-3.6), comparisons, and the number of independent loads.
+
+Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not a
+hundred measurements: five specimens reduce an uncertainty by the root of five, whatever the number
+of readings.
+"""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
-from ...inference.comparison import Comparison
+from ...errors import InputError
+from ...inference.comparison import Comparison, NoiseIs
 from ...inference.noise import alike
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import UniaxialModel
@@ -27,19 +35,104 @@ from ..kinds import (
 )
 from .data import Strip
 from .doubts import doubts_of_strips
-from .objective import Array, LoadObjective
 from .test import StripsTest, reach_of
 
-# How many independent loads the curves of a direction hold.
-#
-# Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not
-# a hundred measurements, and what a fit knows better for five specimens is by a factor of the root
-# of five, whatever the number of readings.
+Array = NDArray[np.float64]
+
+
+class LoadObjective:
+    """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
+
+    increments : (frames,) mm of the model; its load is interpolated by a cubic spline from the
+    origin. elongation, load : (n,) mm, N, measured. scale : N: 1 for errors in N (Eq. 3.7), the
+    largest load for relative errors. least_noise, noise_is : N, and its origin. alike : number of
+    loads that err as one, at least. specimens : (n,) number of each load's specimen.
+    """
+
+    unit = "N"
+
+    def __init__(
+        self,
+        increments: ArrayLike,
+        elongation: ArrayLike,
+        load: ArrayLike,
+        scale: float = 1.0,
+        weight: float = 1.0,
+        least_noise: float = 0.0,
+        noise_is: NoiseIs = "assumed",
+        alike: float = 1.0,
+        specimens: ArrayLike | None = None,
+    ) -> None:
+        knots = np.concatenate([[0.0], np.asarray(increments, float)])
+        self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
+        if not len(self.load):
+            raise InputError(None, "load curve", "holds no point to match")
+        beyond = (self.elongation < 0) | (self.elongation > knots[-1] * (1 + 1e-9))
+        if beyond.any():
+            problem = f"expected elongations from 0 to {knots[-1]:g} mm, got "
+            raise InputError(None, "load curve", f"{problem}{self.elongation[beyond][0]:g}")
+        # Interpolation is linear in the loads; the first knot is the unloaded strip.
+        self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
+        self.sizes = (len(self.load),)
+        self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
+        self.specimens = None if specimens is None else np.asarray(specimens)
+        self.alike = min(max(alike, 1.0), float(len(self.load)))
+        self._unit = scale * np.sqrt(len(self.load)) / weight
+
+    @property
+    def scale(self) -> Array:
+        """Return newtons in one unit of each residual, (n,)."""
+        return np.full(len(self.load), self._unit)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Return everything measured that the residual depends on."""
+        return self.elongation, self.load
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """Return the elongation of every reading, (n, 1) mm: neighbours may err as one."""
+        return (self.elongation[:, None],)
+
+    def of_points(self, values: Array) -> Array:
+        """Return values for each residual from values for each measured point."""
+        return values
+
+    def shifted(self, here: History, there: History) -> LoadObjective:
+        """Return the objective of a model that carries `here` where this one carries `there`."""
+        other = copy.copy(self)
+        other.load = self.load - self.sample @ (here.load - there.load)
+        return other
+
+    def modelled(self, history: History) -> Array:
+        """Return the model's load at the measured elongations, (n,) N."""
+        return np.asarray(self.sample @ history.load)
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Return the block, (n,)."""
+        return np.asarray((self.modelled(history) - self.load) / self._unit)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return (n, parameters) from the history's load slope."""
+        if history.load_slope is None:
+            raise InputError(None, "history", "the solver gives no derivatives of the load")
+        return np.asarray(self.sample @ history.load_slope / self._unit)
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        """Return (n, 0): a load curve has no nuisance unknowns."""
+        if names:
+            raise InputError(None, "nuisance", f"a load curve knows no {', '.join(names)}")
+        return np.empty((len(self.load), 0))
+
+    def rms(self, history: History) -> float:
+        """Return RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
+        return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))
+
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
 #: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_certainty.py strips).
 PLACES = 1.25
-#: Specimens behind a polynomial of which nobody says it: as many as ISO 1421 asks for.
+#: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
 SPECIMENS = 5
 #: Distances along a curve, up to its whole length, at which loads are compared: a specimen may have
 #: ten of them.
@@ -49,10 +142,9 @@ RINGS = 8
 def loads_alike(
     strip: Strip, loads: int, noise: float | None, specimens: int | None = None
 ) -> float:
-    """How many of so many loads of a direction err as one.
+    """Return the number of loads of a direction that err as one.
 
-    noise : N, that the project gives of one load: independent of the others' where no two specimens
-    tell. specimens : as for `independent_loads`.
+    noise : N, that the project gives of one load.
     """
     if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
         return 1.0
@@ -61,17 +153,12 @@ def loads_alike(
 
 @lru_cache(maxsize=64)
 def independent_loads(strip: Strip, specimens: int | None = None) -> float:
-    """Of all specimens of a direction together, up to the end of the model.
+    """Return the number of independent loads of all specimens of a direction together.
 
-    Of two or more whose points are there: as many places a specimen as do not err as one, by the
-    correlation along it of what it lies beside the polynomial of all, or as the factor says by
-    which it is stiffer, whichever are fewer; times the specimens less one, which that polynomial
-    has taken up. Else `PLACES` a specimen, likewise.
-
-    Parameters
-    ----------
-    specimens : how many there are behind a polynomial, or behind points that do not tell them
-        apart; `SPECIMENS` behind a polynomial, and one of points, where nobody says it.
+    Of two or more specimens: places a specimen that do not err as one, by the correlation along it
+    of what it lies beside the polynomial of all, or by the factor by which it is stiffer, whichever
+    are fewer; times the specimens less one. Else `PLACES` a specimen, likewise, with `specimens`,
+    one, or `SPECIMENS` behind a polynomial.
     """
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2 or strip.polynomial is None:
@@ -107,7 +194,7 @@ STRAIGHT, BIAS = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class FittedStrip:
-    """One strip of a finished fit: what was measured, and what the best law makes of it."""
+    """One strip of a finished fit: measured data and the best law's response."""
 
     strip: Strip
     model: UniaxialModel
@@ -116,34 +203,34 @@ class FittedStrip:
 
     @property
     def direction(self) -> str:
-        """warp, fill or bias."""
+        """Return warp, fill or bias."""
         return self.strip.direction
 
     @property
     def rms(self) -> float:
-        """Of the load error, N."""
+        """Return the RMS error of the load, N."""
         return self.objective.rms(self.history)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedStrips:
-    """The test: its curves were read with its section."""
+    """A test of strips with its data."""
 
     test: StripsTest
 
     @property
     def objective_is(self) -> str:
-        """What is minimised, in words."""
+        """Return what is minimised, in words."""
         return OBJECTIVES[self.test.objective]
 
     @property
     def known(self) -> HypoelasticLaw | None:
-        """None: loads are measured, not computed."""
+        """Return None: loads are measured, not computed."""
         return None
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Number of the specimen of each measured point that is matched, by comparison."""
+        """Return number of the specimen of each measured point that is matched, by comparison."""
         test = self.test
         if test.match_by != "points":
             return {}
@@ -151,33 +238,42 @@ class PreparedStrips:
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Directions, and specimens of a direction that has several."""
-
-        return parts_of(self)
+        """Return masks without each part, by sort and name; sorts of one part are left out."""
+        test = self.test
+        points = test.match_by == "points"
+        counts = {
+            d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched
+        }
+        whole = {self.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
+        directions: dict[str, Masks] = {}
+        specimens: dict[str, Masks] = {}
+        for direction, count in counts.items():
+            name = self.part(direction)
+            directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
+            others = _without(test.strips[direction]) if points else {}
+            for which, mask in others.items():
+                specimens[f"{direction}, {which}"] = {**whole, name: mask}
+        sorts = {"directions": directions, "specimens": specimens}
+        return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
 
     def reach(self, masks: Masks) -> Reach:
-        """What the points matched say of the law."""
+        """Return the reach of the law in the points matched."""
         by_direction = {d: masks.get(self.part(d)) for d in self.test.matched}
         return reach_of(self.test, by_direction)
 
     def kept(self, masks: Masks | None) -> tuple[str, ...]:
-        """The directions of which masks leave anything to match."""
+        """Return the directions in which masks leave points to match."""
         known = masks or {}
         return tuple(d for d in self.test.matched if known.get(self.part(d), np.True_).any())
 
     def part(self, direction: str) -> str:
-        """The name of the comparison of a direction."""
+        """Return the name of the comparison of a direction."""
         return f"{self.test.name}: {direction}"
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """One a direction, without those whose weight is zero, or of which nothing is left.
-
-        Raises
-        ------
-        InputError : nothing was measured, or no load at all.
-        """
+        """Return a comparison a direction that has weight and points."""
         test, models = self.test, self.test.models()
         share, kept = weighting.weight, self.kept(masks)
         if weighting.relative and kept:
@@ -201,7 +297,7 @@ class PreparedStrips:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same loads on other quads; the increments hardly matter (a bar has their limit)."""
+        """Return the comparisons on other quads; increments hardly matter."""
         models = self.test.models(what="elements", factor=factor)
         own = self.comparisons(make_solver, weighting)
         return tuple(
@@ -215,11 +311,11 @@ class PreparedStrips:
         test, strip = self.test, self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
         alike = loads_alike(strip, len(load), test.noise, test.specimens)
-        whose = strip.specimen_of if test.match_by == "points" else None
+        owners = strip.specimen_of if test.match_by == "points" else None
         mask = masks.get(self.part(direction))
         if mask is not None:
             elongation, load = elongation[mask], load[mask]
-            whose = None if whose is None else whose[mask]
+            owners = None if owners is None else owners[mask]
         largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
@@ -227,11 +323,11 @@ class PreparedStrips:
         weight = share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
         return LoadObjective(
-            model.elongations, elongation, load, scale, weight, *noise, alike, whose
+            model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
     def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
-        """The strips that a fit matched, each with its model, objective and history."""
+        """Return the strips that a fit matched, each with its model, objective and history."""
         known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
         strips = []
         for direction in self.test.matched:
@@ -243,20 +339,20 @@ class PreparedStrips:
         return tuple(strips)
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files of the curves that are matched."""
+        """Return the files of the curves that are matched."""
         points = self.test.match_by == "points"
         return joined(
             file for d in self.test.matched for file in self.test.strips[d].data_files(points)
         )
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """What makes the load curves doubtful."""
+        """Return the doubts about the load curves."""
         test = self.test
         return doubts_of_strips(test.strips, test.width, test.thickness, expected)
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:
-    """Elongation (n,) mm and load (n,) N: the points, or the polynomial at the increments."""
+    """Return elongation (n,) mm and load (n,) N: points, or the polynomial at increments."""
     if test.match_by == "points":
         return strip.points
     if strip.polynomial is None:
@@ -265,32 +361,13 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
     return elongation, strip.polynomial(elongation)
 
 
-def parts_of(prepared: PreparedStrips) -> Mapping[str, Mapping[str, Masks]]:
-    """By sort and name, the points that are kept without each; sorts of one part left out."""
-    test = prepared.test
-    points = test.match_by == "points"
-    counts = {d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched}
-    whole = {prepared.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
-    directions: dict[str, Masks] = {}
-    specimens: dict[str, Masks] = {}
-    for direction, count in counts.items():
-        name = prepared.part(direction)
-        directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
-        others = _without(test.strips[direction]) if points else {}
-        for which, mask in others.items():
-            specimens[f"{direction}, {which}"] = {**whole, name: mask}
-    sorts = {"directions": directions, "specimens": specimens}
-    return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
-
-
 def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
-    """Which points are not of each specimen, by its name; none of a strip of one specimen."""
+    """Return masks without each specimen, by its name; none of a strip of one specimen."""
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2:
         return {}
     names = [strip.curves[number].specimen for number in numbers]
-    told = {n: f"specimen {n}" for n in names}
-    whose = strip.specimen_of
-    if len(told) < len(names):  # files may name theirs alike
-        return {f"specimen {n + 1}": whose != n for n in numbers}
-    return {told[name]: whose != n for name, n in zip(names, numbers, strict=True)}
+    if len(set(names)) < len(names):  # files may name theirs alike
+        names = [str(number + 1) for number in numbers]
+    owners = strip.specimen_of
+    return {f"specimen {name}": owners != n for name, n in zip(names, numbers, strict=True)}

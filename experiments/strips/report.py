@@ -1,8 +1,8 @@
-"""What a finished fit means for a test of strips: RMS errors beside the specimens' scatter."""
+"""Results of strip tests as numbers, tables, figures and files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,8 @@ from ...reports.vega import save
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
-from .data import Strip
+from .data import Strip, compare_orders
 from .doubts import curves_of
-from .polynomials import compare_orders
 from .prepared import FittedStrip, PreparedStrips
 from .test import StripsTest
 
@@ -42,88 +41,28 @@ from .test import StripsTest
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
-def findings_of(test: StripsTest, strips: Sequence[FittedStrip]) -> Findings:
-    """Numbers and words of the best fit."""
-    total = sum(s.rms for s in strips)
-    errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
-    return Findings(
-        numbers={
-            "directions": {s.direction: _numbers(test, s) for s in strips},
-            "e_uniaxial_N": total,
-            "matched_by": test.match_by,
-        },
-        warnings=tuple(_warnings(test, strips)),
-        lines=(_line(strips, total),),
-        quality="RMS errors in N: " + ", ".join(f"{s.direction} {s.rms:.4g}" for s in strips),
-        summary=f"RMS errors in N: {errors}, together {total:.4g}",
-    )
-
-
-def _numbers(test: StripsTest, fitted: FittedStrip) -> dict[str, Any]:
-    strip = fitted.strip
-    return {
-        "rms_N": fitted.rms,
-        "scatter_N": strip.scatter,
-        "weight": test.weights[strip.direction],
-        "matched": len(fitted.objective.load),
-        "gauge_length_mm": strip.gauge_length,
-        "final_length_mm": strip.final_length,
-        "end_load_N": float(fitted.history.load[-1]),
-    }
-
-
-def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> list[Note]:
-    """What the data leave open before any fit."""
+def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> Iterator[Note]:
+    """Yield warnings of what the data leave open before any fit."""
     directions = {s.direction for s in strips}
-    notes = [
-        Note(
-            NoteKind.UNMATCHED,
-            f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            "directions",
-        )
-        for direction, modulus in PINS.items()
-        if direction not in directions
-    ]
-    said = dict.fromkeys(note for s in strips for curve in s.strip.curves for note in curve.notes)
-    notes += [Note(NoteKind.READING, words) for words in said]
-    if test.match_by == "points":
-        notes += [
-            Note(
-                NoteKind.LEFT_OUT,
-                f"{s.strip.beyond} points beyond the final length (or before zero) were left out",
-                s.direction,
-            )
-            for s in strips
-            if s.strip.beyond
-        ]
-    return notes
-
-
-def _line(strips: Sequence[FittedStrip], total: float) -> str:
-    parts = []
-    for fitted in strips:
-        scatter = fitted.strip.scatter
-        beside = "" if scatter is None else f" (specimens scatter by {scatter:.3g})"
-        parts.append(f"{fitted.direction} {fitted.rms:.3g}{beside}")
-    return "RMS error, N: " + ", ".join(parts) + f"; sum {total:.4g}"
+    for direction, modulus in PINS.items():
+        if direction not in directions:
+            words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
+            yield Note(NoteKind.UNMATCHED, words + "directions")
+    for words in dict.fromkeys(n for s in strips for curve in s.strip.curves for n in curve.notes):
+        yield Note(NoteKind.READING, words)
+    words = "points beyond the final length (or before zero) were left out"
+    for s in strips:
+        if test.match_by == "points" and s.strip.beyond:
+            yield Note(NoteKind.LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
 
 
 def misfit_table(strips: Sequence[FittedStrip]) -> Table:
-    """Misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
+    """Return the misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
     rows: list[list[object]] = []
-    for fitted in strips:
-        strip, polynomial = fitted.strip, fitted.strip.polynomial
-        rows.append(
-            [
-                strip.direction,
-                fitted.rms,
-                strip.scatter,
-                polynomial.r_squared if polynomial is not None else None,
-                polynomial.rmse if polynomial is not None else None,
-                len(fitted.objective.load),
-                float(fitted.history.load[-1]),
-            ]
-        )
+    for s in strips:
+        p = s.strip.polynomial
+        rows.append([s.direction, s.rms, s.strip.scatter, p and p.r_squared, p and p.rmse,
+                     len(s.objective.load), float(s.history.load[-1])])  # fmt: skip
     header = ["strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial",
               "its RMSE, N", "points matched", "load at the end, N"]  # fmt: skip
     note = (
@@ -134,42 +73,18 @@ def misfit_table(strips: Sequence[FittedStrip]) -> Table:
 
 
 def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Load curves of the model, and the polynomials where there are any (else NaN)."""
+    """Return load curves of the model, and the polynomials (NaN where there are none)."""
     parts = []
-    for fitted in strips:
-        u, polynomial = np.array(fitted.model.elongations), fitted.strip.polynomial
-        parts.append(
-            pd.DataFrame(
-                {
-                    "direction": fitted.direction,
-                    "elongation_mm": u,
-                    "engineering_strain": u / fitted.strip.gauge_length,
-                    "model_N": fitted.history.load,
-                    "polynomial_N": np.nan if polynomial is None else polynomial(u),
-                }
-            )
-        )
-    return pd.concat(parts, ignore_index=True)
-
-
-def residual_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Every matched load: part, elongation_mm, quantity, measured, modelled, difference, unit."""
-    parts = []
-    for fitted in strips:
-        modelled, measured = fitted.objective.modelled(fitted.history), fitted.objective.load
-        parts.append(
-            pd.DataFrame(
-                {
-                    "part": fitted.direction,
-                    "elongation_mm": fitted.objective.elongation,
-                    "quantity": "load",
-                    "measured": measured,
-                    "modelled": modelled,
-                    "difference": modelled - measured,
-                    "unit": fitted.objective.unit,
-                }
-            )
-        )
+    for s in strips:
+        u, polynomial = np.array(s.model.elongations), s.strip.polynomial
+        columns = {
+            "direction": s.direction,
+            "elongation_mm": u,
+            "engineering_strain": u / s.strip.gauge_length,
+            "model_N": s.history.load,
+            "polynomial_N": np.nan if polynomial is None else polynomial(u),
+        }
+        parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -187,28 +102,21 @@ def load_panels(
     models: Mapping[str, Sequence[Curve]],
     rms: Mapping[str, Sequence[float]],
 ) -> list[StripCurves]:
-    """What the panels of `load_charts` show; `models` and their `rms` (N) by direction."""
+    """Return the panels of `load_charts`; `models` and their `rms` (N) by direction."""
     panels = []
     for strip in strips:
         curve = None
         if strip.polynomial is not None:
             u = np.linspace(0.0, strip.elongation, SMOOTH)
             curve = u, strip.polynomial(u)
-        panels.append(
-            StripCurves(
-                strip.direction,
-                models.get(strip.direction, ()),
-                strip.points if strip.curves else None,
-                curve,
-                strip.scatter,
-                rms.get(strip.direction, ()),
-            )
-        )
+        d, points = strip.direction, strip.points if strip.curves else None
+        errors = rms.get(d, ())
+        panels.append(StripCurves(d, models.get(d, ()), points, curve, strip.scatter, errors))
     return panels
 
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
-    """The deformed strip with its shear strain as a picture and for ParaView."""
+    """Draw the deformed strip with its shear strain; write it for ParaView."""
     u = history.displacement[-1]
     strain = middle_strain(model.mesh, u, model.warp)
     mesh = model.mesh
@@ -218,145 +126,63 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
 
 
 def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path) -> None:
-    """Moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
+    """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
     ends = failure_strains(strips, fitted.valid)
     strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
-    curves = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
-    save(picture, moduli_together(strains, np.array(curves)))
+    moduli = [fitted.law.modulus(name, x) for name, x in zip(COMPONENTS, strains, strict=True)]
+    save(picture, moduli_together(strains, np.array(moduli)))
 
 
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
-    """(3,) logarithmic strain of warp and fill at the end, and shear strain in the bias gauge.
+    """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
 
-    valid : (3,) the ends up to which the moduli are fitted, which no strain shown exceeds; they
-    take the place of a strip that is not there.
+    valid : (3,) the ends of the moduli, which no strain shown exceeds.
     """
     ends = np.array(valid, dtype=float)
-    for fitted in strips:
-        if fitted.direction == "bias":
-            ends[2] = min(ends[2], _gauge_shear(fitted.model, fitted.history))
+    for s in strips:
+        if s.direction == "bias":  # the largest shear of the quads between the gauge's ends
+            mesh = s.model.mesh
+            strain = middle_strain(mesh, s.history.displacement[-1], s.model.warp)
+            corners = mesh.points[mesh.quads][:, :, 1]
+            low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
+            inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
+            ends[2] = min(ends[2], float(np.abs(strain[inside, 2]).max()))
         else:
-            component = 0 if fitted.direction == "warp" else 1
-            ends[component] = min(ends[component], fitted.strip.strain)
+            component = 0 if s.direction == "warp" else 1
+            ends[component] = min(ends[component], s.strip.strain)
     return ends
 
 
-def _gauge_shear(model: UniaxialModel, history: History) -> float:
-    """Largest shear strain of the quads between the gauge's ends."""
-    strain = middle_strain(model.mesh, history.displacement[-1], model.warp)
-    corners = model.mesh.points[model.mesh.quads][:, :, 1]
-    low, high = model.mesh.points[model.mesh.node_sets["gauge"]][:, 1]
-    inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
-    return float(np.abs(strain[inside, 2]).max())
-
-
 def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
-    """Which order the load polynomials should have; False where there are no points to ask."""
+    """Draw the errors of polynomial orders; return False where there are no points."""
     panels = []
     for strip in strips:
         if strip.polynomial is None:
             continue
-        whose = strip.specimen_of.tolist()
-        specimens = whose if len(set(whose)) > 1 else None
+        owners = strip.specimen_of.tolist()
+        specimens = owners if len(set(owners)) > 1 else None
         try:
             scores = compare_orders(
                 *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
             ).scores
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
-        panels.append(
-            OrderErrors(
-                strip.direction,
-                [s.order for s in scores],
-                [s.rmse for s in scores],
-                [s.left_out for s in scores],
-                strip.polynomial.order,
-            )
+        orders, rms, left_out = (
+            [getattr(s, n) for s in scores] for n in ("order", "rmse", "left_out")
         )
+        order = strip.polynomial.order
+        panels.append(OrderErrors(strip.direction, orders, rms, left_out, order))
     if panels:
         save(picture, order_charts(panels))
     return bool(panels)
 
 
-LOADS = "Load over gauge elongation: measured and modelled"
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
-
-
-def exhibit(
-    test: StripsTest, strips: Sequence[FittedStrip], fitted: FittedTest, out: Output
-) -> Exhibit:
-    """Write loads.csv, bias.vtu and the pictures; what the page says of them."""
-    with replacing(out.path("loads.csv")) as path:
-        load_table(strips).to_csv(path, index=False)
-    panels = _panels(strips)
-    charts = load_charts(f"{test.name} loads", panels, LOADS)
-    save(out.path("loads.png"), charts)
-    figures: list[Shown] = []
-    files = [
-        (out.name("loads.csv"), "load curves of the best fit"),
-        (out.name("loads.png"), "picture of the load curves"),
-    ]
-    for strip in strips:
-        if strip.direction == "bias":
-            picture, vtu = out.path("bias.png"), out.path("bias.vtu")
-            draw_bias(strip.model, strip.history, picture, vtu)
-            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
-            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
-    draw_moduli(strips, fitted, out.path("failure.png"))
-    caption = "Tangent moduli up to the strains at the end of each strip"
-    figures.append((out.name("failure.png"), caption))
-    if draw_orders([s.strip for s in strips], out.path("orders.png")):
-        caption = "Error of load polynomials by order, and with a specimen left out"
-        figures.append((out.name("orders.png"), caption))
-    return Exhibit(
-        facts=[("matched", MATCHED[test.match_by])],
-        figures=figures,
-        tables=[misfit_table(strips)],
-        files=files,
-        parts=[charts],
-    )
-
-
-def _panels(strips: Sequence[FittedStrip]) -> list[StripCurves]:
-    """Load curves against what was measured."""
-    models = {
-        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
-    }
-    return load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
-
-
-CURVES = "curves.png"
-
-
-def exhibit_examined(test: StripsTest, out: Output) -> Exhibit:
-    """Write the curves; a table of what each specimen holds."""
-    curves = {direction: curves_of(strip) for direction, strip in test.strips.items()}
-    save(out.path(CURVES), specimen_charts(curves))
-    rows: list[list[object]] = [
-        [
-            direction,
-            name or "polynomial",
-            len(load),
-            float(elongation[0]),
-            float(elongation[-1]),
-            float(np.log1p(elongation[-1] / test.strips[direction].gauge_length)),
-            float(load[0]),
-            float(load.max()),
-        ]
-        for direction, specimens in curves.items()
-        for name, elongation, load in specimens
-    ]
-    header = [
-        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
-        "first load, N", "largest load, N",
-    ]  # fmt: skip
-    table = Table("Load curves as read", header, rows, text=(1,))
-    return Exhibit(figures=[(out.name(CURVES), "load curves as they were read")], tables=[table])
 
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """One card on one strip: how many of its increments are shown, and how far off they are (N)."""
+    """One card on one strip: the number of increments shown, and their RMS error (N)."""
 
     model: UniaxialModel
     history: History
@@ -365,12 +191,12 @@ class Pull:
 
     @property
     def elongation(self) -> Array:
-        """mm of the gauge, at every increment."""
+        """Return the elongation of the gauge at every increment, mm."""
         return np.array(self.model.elongations)
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is left out."""
+        """Return whether nothing is left out."""
         return self.shown == len(self.model.elongations)
 
 
@@ -385,7 +211,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """Write loads.csv, loads.png and the deformed bias strips; a failed analysis is told as such.
+    """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
 
     within_range : show each curve only to where the card's valid range ends.
     """
@@ -393,10 +219,10 @@ def simulate(
         (name, direction): _pull(test, cards[name], direction, run, within_range)
         for (name, direction), run in runs.items()
     }
-    told = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
+    numbers = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
     _write_loads(test, list(cards), pulls, out)
     figures = [(out.name("loads.png"), "Load over gauge elongation")]
-    return Simulation({"cards": told}, _lines_of_cards(told), figures)
+    return Simulation({"cards": numbers}, _lines_of_cards(numbers), figures)
 
 
 def _pull(
@@ -414,7 +240,7 @@ def _pull(
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
-    """Increments before a strain in the middle of a quad leaves the card's valid range."""
+    """Return the number of increments within the card's valid range."""
     for i, u in enumerate(history.displacement):
         strain = middle_strain(model.mesh, u, model.warp)
         reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
@@ -424,7 +250,7 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 
 
 def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict[str, Any]:
-    """RMS errors, end loads and strains of a card, strip by strip."""
+    """Return RMS errors, end loads and strains of a card, strip by strip."""
     directions: dict[str, Any] = {}
     total: float | None = 0.0
     for direction in test.strips:
@@ -447,16 +273,10 @@ def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls)
 
 def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> None:
     ended = {key: pull for key, pull in pulls.items() if isinstance(pull, Pull)}
+    header = ("card", "direction", "elongation_mm", "load_N")
     tables = [
-        pd.DataFrame(
-            {
-                "card": name,
-                "direction": direction,
-                "elongation_mm": pull.elongation,
-                "load_N": pull.history.load,
-            }
-        )
-        for (name, direction), pull in ended.items()
+        pd.DataFrame(dict(zip(header, (*key, pull.elongation, pull.history.load), strict=True)))
+        for key, pull in ended.items()
     ]
     with replacing(out.path("loads.csv")) as path:
         pd.concat(tables).to_csv(path, index=False)
@@ -477,17 +297,17 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
 
 
 def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
-    """The same for the terminal."""
+    """Return the results as lines for the terminal."""
     lines = []
     for name, card in cards.items():
         parts = []
-        for direction, told in card["directions"].items():
-            if "failed" in told:
-                parts.append(f"{direction} failed")
-            elif told["rms_N"] is None:
-                parts.append(f"{direction} {told['end_load_N']:.4g} N at the end")
-            else:
-                parts.append(f"{direction} {told['rms_N']:.4g} N to {told['shown_to_mm']:.3g} mm")
+        for direction, numbers in card["directions"].items():
+            words = "failed"
+            if "failed" not in numbers:
+                words = f"{numbers['end_load_N']:.4g} N at the end"
+                if numbers["rms_N"] is not None:
+                    words = f"{numbers['rms_N']:.4g} N to {numbers['shown_to_mm']:.3g} mm"
+            parts.append(f"{direction} {words}")
         total = card["e_uniaxial_N"]
         words = "" if total is None else f"; sum {total:.4g} N"
         lines.append(f"{name}: RMS {', '.join(parts)}{words}")
@@ -496,19 +316,104 @@ def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    return findings_of(prepared.test, prepared.fitted_strips(fitted))
+    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    total = sum(s.rms for s in strips)
+    errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
+    beside = [
+        "" if s.strip.scatter is None else f" (specimens scatter by {s.strip.scatter:.3g})"
+        for s in strips
+    ]
+    line = ", ".join(f"{s.direction} {s.rms:.3g}{b}" for s, b in zip(strips, beside, strict=True))
+    numbers = {
+        s.direction: {
+            "rms_N": s.rms,
+            "scatter_N": s.strip.scatter,
+            "weight": test.weights[s.direction],
+            "matched": len(s.objective.load),
+            "gauge_length_mm": s.strip.gauge_length,
+            "final_length_mm": s.strip.final_length,
+            "end_load_N": float(s.history.load[-1]),
+        }
+        for s in strips
+    }
+    return Findings(
+        {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
+        tuple(_warnings(test, strips)),
+        (f"RMS error, N: {line}; sum {total:.4g}",),
+        "RMS errors in N: " + ", ".join(f"{s.direction} {s.rms:.4g}" for s in strips),
+        f"RMS errors in N: {errors}, together {total:.4g}",
+    )
 
 
 def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-    return exhibit(prepared.test, prepared.fitted_strips(fitted), fitted, out)
+    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    with replacing(out.path("loads.csv")) as path:
+        load_table(strips).to_csv(path, index=False)
+    models = {
+        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
+    }
+    panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
+    caption = "Load over gauge elongation: measured and modelled"
+    charts = load_charts(f"{test.name} loads", panels, caption)
+    save(out.path("loads.png"), charts)
+    figures: list[Shown] = []
+    files = [
+        (out.name("loads.csv"), "load curves of the best fit"),
+        (out.name("loads.png"), "picture of the load curves"),
+    ]
+    for s in strips:
+        if s.direction == "bias":
+            draw_bias(s.model, s.history, out.path("bias.png"), out.path("bias.vtu"))
+            figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
+            files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
+    draw_moduli(strips, fitted, out.path("failure.png"))
+    caption = "Tangent moduli up to the strains at the end of each strip"
+    figures.append((out.name("failure.png"), caption))
+    if draw_orders([s.strip for s in strips], out.path("orders.png")):
+        caption = "Error of load polynomials by order, and with a specimen left out"
+        figures.append((out.name("orders.png"), caption))
+    return Exhibit(
+        facts=[("matched", MATCHED[test.match_by])],
+        figures=figures,
+        tables=[misfit_table(strips)],
+        files=files,
+        parts=[charts],
+    )
 
 
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
-    """Write the load curves as they were read."""
-    return exhibit_examined(prepared.test, out)
+    """Draw the load curves as read; return a table of the specimens."""
+    strips = prepared.test.strips
+    curves = {direction: curves_of(strip) for direction, strip in strips.items()}
+    save(out.path("curves.png"), specimen_charts(curves))
+    rows: list[list[object]] = []
+    for direction, specimens in curves.items():
+        for name, u, load in specimens:
+            strain = float(np.log1p(u[-1] / strips[direction].gauge_length))
+            rows.append([direction, name or "polynomial", len(load), float(u[0]), float(u[-1]),
+                         strain, float(load[0]), float(load.max())])  # fmt: skip
+    header = [
+        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
+        "first load, N", "largest load, N",
+    ]  # fmt: skip
+    figures = [(out.name("curves.png"), "load curves as they were read")]
+    return Exhibit(figures=figures, tables=[Table("Load curves as read", header, rows, text=(1,))])
 
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
-    """Return every matched load, see `residual_table`."""
-    return residual_table(prepared.fitted_strips(fitted))
+    """Return a table of every matched load."""
+    parts = []
+    for s in prepared.fitted_strips(fitted):
+        modelled, measured = s.objective.modelled(s.history), s.objective.load
+        columns = {
+            "part": s.direction,
+            "elongation_mm": s.objective.elongation,
+            "quantity": "load",
+            "measured": measured,
+            "modelled": modelled,
+            "difference": modelled - measured,
+            "unit": s.objective.unit,
+        }
+        parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True)

@@ -15,14 +15,14 @@ Unit = Literal["N", "relative"]
 
 
 class GaugeSection(Section):
-    """[strips.warp] and so on: the virtual strain gauge at rest and at the end."""
+    """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
 
     gauge_length: Positive | None = None
     final_length: Positive | None = None
 
 
 class ColumnsSection(Section):
-    """[strips.data.columns]: what the files call them."""
+    """Section [strips.data.columns]: the files' own column names."""
 
     elongation: str | None = None
     load: str | None = None
@@ -46,7 +46,7 @@ def _files(given: Any) -> Any:
 
 
 class CurvesSection(Section):
-    """[strips.data]: load curves, as polynomials or as measured."""
+    """Section [strips.data]: load curves, as polynomials or as measured."""
 
     polynomials: str | None = None
     files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
@@ -63,7 +63,7 @@ class CurvesSection(Section):
 
 
 class WeightsSection(Section):
-    """[strips.weights]: of each direction's error in the objective."""
+    """Section [strips.weights]: of each direction's error in the objective."""
 
     warp: Weight = 1.0
     fill: Weight = 1.0
@@ -71,7 +71,7 @@ class WeightsSection(Section):
 
 
 class StripsSection(Section):
-    """[[strips]]: cut strips pulled along warp, fill and across the yarns, as one test."""
+    """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
 
     name: Name | None = None
     width: Positive | None = None

@@ -1,4 +1,4 @@
-"""A test of strips as its section says, and the models of it."""
+"""A test of strips, as its section describes it, and its models."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ from ..kinds import Place, Reach, Refined
 from .data import Strip, read_strips
 from .section import Match, StripsSection, Unit
 
-if TYPE_CHECKING:
-    pass
-
 Mask = NDArray[np.bool_]
 
 
@@ -33,8 +30,8 @@ Mask = NDArray[np.bool_]
 class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
 
-    `strips` and `weights` by direction (warp, fill, bias). `noise` (N) of one measured load, None
-    where it is not given; `specimens` of each direction, None where the files tell or nobody does.
+    strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
+    unknown.
     """
 
     name: str
@@ -54,33 +51,28 @@ class StripsTest:
 
     @property
     def thickness(self) -> float:
-        """Of the fabric, mm."""
+        """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
 
     @property
     def reads_files(self) -> bool:
-        """Yes: load curves are measured or published, never computed."""
+        """Return True: load curves are measured or published."""
         return True
 
     @cached_property
     def reach(self) -> Reach:
-        """What the gauges say: see `reach_of`."""
+        """Return the reach of the gauges, see `reach_of`."""
         return reach_of(self)
 
     @property
     def matched(self) -> tuple[str, ...]:
-        """The directions that a fit matches: those of a weight above 0."""
+        """Return the directions of a weight above 0."""
         return tuple(d for d in self.strips if self.weights[d] > 0)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
-        """The models by direction; edges of their quads, or their increments, over a factor.
-
-        Raises
-        ------
-        InputError : lengths that do not make a strip.
-        """
+        """Return the models by direction; edges of quads, or increments, divided by a factor."""
         quads = factor if what == "elements" else 1.0
         steps = factor if what == "increments" else 1.0
         thick = self.thickness if thickness is None else thickness
@@ -99,7 +91,7 @@ class StripsTest:
         return straight_strip(direction, *lengths, increments, **quads)
 
     def settings(self) -> Mapping[str, object]:
-        """Everything but names and places of files."""
+        """Return everything but names and places of files."""
         names = ("width", "grip_distance", "bias_angle", "increments", "match_by", "objective",
                  "weight")  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
@@ -108,12 +100,7 @@ class StripsTest:
 
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
-    """The test of a section, and its load curves.
-
-    Raises
-    ------
-    InputError : naming the file and the dotted key, or a data file.
-    """
+    """Read the section of a test, and its load curves."""
     length = place.scales.length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
     strips = read_strips(place, section)
@@ -124,7 +111,13 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         problem = f"expected less than the distance of the grips, {grips:g} mm"
         raise place.error("bias.gauge_length", problem)
     if section.match == "points":
-        _check_points(strips, place)
+        if place.need_data and not all(s.curves for s in strips.values()):
+            problem = "'points' needs measured points (data.files), not polynomials"
+            raise place.error("match", problem)
+        for direction, strip in strips.items():
+            if strip.curves and not len(strip.points[0]):
+                problem = "no measured point lies between the gauge length and this one"
+                raise place.error(f"{direction}.final_length", problem)
     return StripsTest(
         name=name,
         place=place,
@@ -142,25 +135,11 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     )
 
 
-def _check_points(strips: Mapping[str, Strip], place: Place) -> None:
-    if place.need_data and not all(s.curves for s in strips.values()):
-        problem = "'points' needs measured points (data.files), not polynomials"
-        raise place.error("match", problem)
-    for direction, strip in strips.items():
-        if strip.curves and not len(strip.points[0]):
-            problem = "no measured point lies between the gauge length and this one"
-            raise place.error(f"{direction}.final_length", problem)
-
-
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
-    """How far the strips are strained, and where their load curves change.
+    """Return the final strains of the strips, and the breaks of their load curves.
 
-    Warp and fill: the logarithmic strain of their gauges at the end. Shear: that of a strip which
-    keeps its area, 2 sin(2 angle) ln(l_f/l_i). Breaks: where three lines follow a load curve best,
-    in shares of the strain of its gauge.
-
-    masks : which of the points a curve follows, by direction; all unless given. A direction whose
-    mask keeps none says nothing.
+    Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks : shares of the
+    strain of the gauge. masks : which points a curve follows, by direction.
     """
     known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
     strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}

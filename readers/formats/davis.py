@@ -11,24 +11,17 @@ displacement alone are not.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
-from ..frames import Frame, FrameOptions, frame_of
 from ..registry import Format, register_format
-from ..text_frames import read_text_rows
+from ..text_frames import text_reader
 
 _NAMES = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether columns are called x and x-displacement, with a unit right behind."""
+    """Return whether columns are called x and x-displacement, with a unit right behind."""
     return bool(_NAMES.search(head[:4096]))
 
 
-def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
-    return [frame_of(read_text_rows(path, options), options, path, "davis")]
-
-
-register_format(Format("davis", "frame", "CSV of LaVision DaVis", read, recognises))
+register_format(Format("davis", "frame", "CSV of LaVision DaVis", text_reader("davis"), recognises))

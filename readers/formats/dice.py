@@ -35,12 +35,12 @@ NAMES = {
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the header is DICe's, or the row of names without one."""
+    """Return whether the header is DICe's, or the row of names without one."""
     return (head.startswith(b"***") and b"DICe" in head) or head.startswith(b"SUBSET_ID")
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file; without a stereo model it is refused."""
+    """Read the one frame of a file; without a stereo model it is refused."""
     top = "\n".join(text for _, text in read_lines(path, "***", any_encoding=True)[:3])
     if NAMES["x"] not in top and not options.columns:
         problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"

@@ -30,12 +30,12 @@ MASK = "coordinates/mask"
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file is HDF5 as such, which MATLAB's are not."""
+    """Return whether the file is plain HDF5, not MATLAB's."""
     return head.startswith(SIGNATURE)
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
+    """Read the one frame of a file."""
     check_readable(path, partial(_arrays, path))
     there = _arrays(path)
     mask = there.pop("mask", None)
@@ -50,7 +50,7 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[np.float64]]:
-    """The arrays that there are, flat."""
+    """Read the arrays that there are, flat."""
     with open_hdf5(path) as file:
         found = {key: member(path, file, name) for key, name in [*NAMES.items(), ("mask", MASK)]}
         return {

@@ -29,11 +29,12 @@ Rows = list[tuple[int, list[str]]]
 
 SEPARATORS = ("\t", ";", ",")
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
+_LETTERS = re.compile(r"[^\W\d_]")
 _LETTER = re.compile(r"[^\W\d_eE]")
 
 
 def cells_of(text: str, separator: str) -> list[str]:
-    """The cells of one line."""
+    """Return the cells of one line."""
     # Line by line: a quotation mark left open must not swallow the rest of the file.
     if '"' not in text:
         return [cell.strip() for cell in text.split(separator)]
@@ -44,7 +45,7 @@ def cells_of(text: str, separator: str) -> list[str]:
 
 
 def find_header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str]) -> int | None:
-    """The first row of names with numbers one or two rows below; else the first row of names."""
+    """Return the first row of names with numbers below it, else the first row of names."""
     first = None
     for index in range(len(rows)):
         if _is_header(rows, index, named, quantities):
@@ -57,7 +58,7 @@ def find_header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str])
 def _names_all(
     names: list[str], named: Mapping[str, str], quantities: Sequence[str]
 ) -> list[list[int]]:
-    """The columns of each quantity; none where a quantity has no column of its own."""
+    """Return the columns of each quantity; none where one has no column of its own."""
     if len(names) > MOST_NAMES:
         return []
     columns = [columns_of(names, quantity, named) for quantity in quantities]
@@ -67,7 +68,7 @@ def _names_all(
 
 
 def _is_header(rows: Rows, index: int, named: Mapping[str, str], quantities: Sequence[str]) -> bool:
-    """Whether a row has the names, and numbers one or two rows below."""
+    """Return whether a row has the names, and numbers one or two rows below."""
     # Most rows are numbers, and quickly passed over.
     if not _LETTER.search("".join(rows[index][1])):
         return False
@@ -90,11 +91,9 @@ class Block:
 def find_blocks(
     path: Path, rows: Rows, first: int, named: Mapping[str, str], quantities: Sequence[str]
 ) -> dict[tuple[str, ...], list[Block]]:
-    """The tables from the row `first` on, by their names.
+    """Return the tables from the row `first` on, by their names.
 
-    Raises
-    ------
-    InputError : a unit row says another unit than the name above it.
+    Raises InputError: a unit row says another unit than the name above it.
     """
     heads = [
         first,
@@ -105,29 +104,25 @@ def find_blocks(
         line, names = rows[head]
         needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
         units, body = {name: split_unit(name)[1] for name in names}, head + 1
-        if body < end and _is_unit_row(rows[body][1], needed):
+        below = rows[body][1] if body < end else []
+        letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
+        if letters and not any(_is_number(below, i) for i in needed):
             units |= _unit_row(path, rows[body], names, units)
             body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
         # What stands between two tables begins with a word: the title of the second.
-        while end < len(rows) and inside and not _begins_with_a_number(inside[-1][1]):
+        while (
+            end < len(rows)
+            and inside
+            and not is_number(next((cell for cell in inside[-1][1] if cell), ""))
+        ):
             inside.pop()
         blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
     return blocks
 
 
-def _begins_with_a_number(row: list[str]) -> bool:
-    return is_number(next((cell for cell in row if cell), ""))
-
-
 def _is_number(row: list[str], column: int) -> bool:
     return column < len(row) and is_number(row[column])
-
-
-def _is_unit_row(row: list[str], needed: list[int]) -> bool:
-    cells = [row[i] for i in needed if i < len(row)]
-    letters = [cell for cell in cells if re.search("[^\\W\\d_]", cell)]
-    return bool(letters) and not any(_is_number(row, i) for i in needed)
 
 
 def _unit_row(
@@ -148,7 +143,7 @@ def _unit_row(
 def nothing_found(
     lines: list[tuple[int, str]], named: Mapping[str, str], quantities: Sequence[str]
 ) -> str:
-    """Why no row of names was found; and which row it might have been."""
+    """Describe the row that might have been the row of names."""
     what = " and ".join(
         repr(named[quantity]) if quantity in named else f"one of {quantity}"
         for quantity in quantities
@@ -168,13 +163,11 @@ def nothing_found(
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
-    """The first table with a column of each of the quantities asked for.
+    """Read the first table with a column of each of the quantities asked for.
 
-    Raises
-    ------
-    InputError : no such table, nothing below it, two units for one column (also where its names
-        come again), rows longer than the header, a decimal mark that cannot be told from a mark of
-        thousands.
+    Raises InputError: no such table, nothing below it, two units for one column (also where its
+    names come again), rows longer than the header, a decimal mark that may be a mark
+    of thousands.
     """
     import pandas as pd
 
@@ -215,7 +208,7 @@ def read(path: Path, options: TableOptions) -> MachineTable:
 
 
 def _units(path: Path, several: Sequence[Block]) -> dict[str, str]:
-    """Of the columns of tables of the same names, which are read as one."""
+    """Return the units of tables of the same names, which are read as one."""
     first = several[0]
     for one in several[1:]:
         for name, unit in one.units.items():

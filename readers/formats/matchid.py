@@ -14,24 +14,24 @@ German .NET writes it ("n. def."), is taken for one. Where the axes of the expor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
-from ..frames import Frame, FrameOptions, frame_of
 from ..registry import Format, register_format
-from ..text_frames import read_text_rows
+from ..text_frames import text_reader
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the headings are those of either version."""
+    """Return whether the headings are those of either version."""
     top = head[:4096].lower()
     return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
 
 
-def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The one frame of a file."""
-    rows = read_text_rows(path, options, camera_axes=True)
-    return [frame_of(rows, options, path, "matchid")]
-
-
-register_format(Format("matchid", "frame", "CSV of MatchID Stereo, 2023 or 2024", read, recognises))
+register_format(
+    Format(
+        "matchid",
+        "frame",
+        "CSV of MatchID Stereo, 2023 or 2024",
+        text_reader("matchid", camera_axes=True),
+        recognises,
+    )
+)

@@ -23,13 +23,13 @@ RESULTS = ("DIC3DPPresults", "DIC3DpairResults", "DIC3DAllPairsResults")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether a MAT-file holds one of the results."""
+    """Return whether a MAT-file holds one of the results."""
     there = variable_names(path, head) if is_mat(head) else None
     return there is not None and any(name in there for name in RESULTS)
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """A frame for each cell."""
+    """Read a frame for each cell."""
     there = read_variables(path, RESULTS)
     results = next((_struct(there.get(name)) for name in RESULTS if name in there), None)
     points = (results or {}).get("Points3D")

@@ -25,13 +25,13 @@ SAVED = "data_dic_save"
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether a MAT-file holds what Ncorr saves, or is one that nobody can look into."""
+    """Return whether a MAT-file holds what Ncorr saves, or cannot be inspected."""
     there = variable_names(path, head) if is_mat(head) else ()
     return there is None or SAVED in there
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """A frame for each picture."""
+    """Read a frame for each picture."""
     saved = _only(path, read_variables(path, [SAVED]), SAVED)
     about = _only(path, saved, "dispinfo")
     frames = saved.get("displacements")

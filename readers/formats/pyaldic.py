@@ -5,30 +5,91 @@
 
 Source: pyALDIC-3D's own export (tables.py) and reconstruction (points3D and X_mm are the places in
 the frame itself, displacements those since the first frame, NaN where correlation was lost; the
-left camera's axes, so that y points down and z away from it). Its .mat cannot be told from its
+left camera's axes, so that y points down and z away from it). Its .mat cannot be recognised by its
 names alone unless points3D is among them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import zipfile
+import zlib
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.lib import format as npy
 
 from ...errors import InputError
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
 from ..mat_files import is_mat, read_variables, variable_names
-from ..npz_files import SIGNATURE, array_names, read_arrays
 from ..registry import Format, register_format
 from ..text_frames import read_text_rows
+
+SIGNATURE = b"PK\x03\x04"
+#: Bytes of one array: at most, always, and by what it has packed (numbers do not pack a
+#: hundredfold).
+LARGEST, SMALL, RATIO = 2**30, 2**26, 100
+
+
+def array_names(path: Path) -> list[str]:
+    """Return names of the arrays; none of what is no archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return [name[:-4] for name in archive.namelist() if name.endswith(".npy")]
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return []
+
+
+def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
+    """Read the arrays of these names, those that there are.
+
+    Raises InputError: no such file, no archive, objects instead of numbers, a header that says more
+    than the file holds.
+    """
+    found = {}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            there = {one.filename: one for one in archive.infolist()}
+            for name in wanted:
+                one = there.get(f"{name}.npy")
+                if one is not None:
+                    found[name] = _array(path, archive, one, name)
+    except FileNotFoundError:
+        raise InputError(path, "", "no such file") from None
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError) as error:
+        raise InputError(path, "", f"is not a whole .npz archive ({str(error)[:100]})") from None
+    except (ValueError, NotImplementedError, RuntimeError, TypeError, MemoryError) as error:
+        why = " ".join(str(error).split())[:100]
+        raise InputError(path, "", f"cannot be read; is it damaged? ({why})") from None
+    return found
+
+
+def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str) -> np.ndarray:
+    with archive.open(one) as stream:
+        version = npy.read_magic(stream)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+        if dtype.kind not in "fiubU":
+            problem = "holds Python objects or records, which are not read: save plain numbers"
+            raise InputError(path, f"array {name!r}", problem)
+        size = math.prod(shape) * dtype.itemsize
+        most = min(LARGEST, one.file_size, max(SMALL, RATIO * one.compress_size))
+        if min(shape, default=0) < 0 or size > most:
+            problem = f"says {shape} numbers, more than the file holds; is it damaged?"
+            raise InputError(path, f"array {name!r}", problem)
+        content = stream.read(size)
+    if len(content) < size:
+        raise InputError(path, f"array {name!r}", "ends early; is the file damaged?")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran else "C")
+
 
 NAMES = ("points3D", "U", "V", "W")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether points3D is among the arrays, or x_px and X_mm among the headings."""
+    """Return whether points3D is among the arrays, or x_px and X_mm among the headings."""
     if head.startswith(SIGNATURE):
         return "points3D" in array_names(path)
     if is_mat(head):
@@ -37,7 +98,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """All frames of a file."""
+    """Read all frames of a file."""
     try:
         with path.open("rb") as file:
             head = file.read(128)

@@ -34,12 +34,12 @@ _NUMBERS = re.compile(r"^(?:[\s\d+\-.,e]|nan)*$", re.IGNORECASE)
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether a line lists variables."""
+    """Return whether a line lists variables."""
     return bool(_VARIABLES.search(head[:16384]))
 
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-    """The frames of a file, one a zone."""
+    """Read the frames of a file, one a zone."""
     names, zones = _zones(path)
     headings = [heading_of(name) for name in names]
     columns = _columns(path, headings, options)
@@ -83,7 +83,7 @@ def _zones(path: Path) -> tuple[list[str], list[Zone]]:
 def _numbers(
     path: Path, line: int, keys: Mapping[str, str], lines: list[tuple[int, str]], width: int
 ) -> NDArray[np.float64]:
-    """The numbers of a zone, (points, variables)."""
+    """Return the numbers of a zone, (points, variables)."""
     packing = keys.get("DATAPACKING", keys.get("F", "POINT")).upper()
     if packing not in ("POINT", "BLOCK") or "FE" in keys.get("ZONETYPE", "").upper():
         kind = f"{packing} {keys.get('ZONETYPE', '')}".strip()[:40]
@@ -105,12 +105,7 @@ def _numbers(
 
 
 def _flat(lines: list[str], width: int) -> NDArray[np.float64]:
-    """All numbers, as they follow each other: rows of one length by pandas' reader.
-
-    Raises
-    ------
-    ValueError : some are no numbers.
-    """
+    """Return all numbers, as they follow each other: rows of one length by pandas' reader."""
     import pandas as pd
 
     if {len(line.split()) for line in lines} == {width} and not any("," in line for line in lines):
@@ -157,11 +152,8 @@ def _rows(
 ) -> FrameRows:
     values = {key: table[:, i] for key, i in columns.items()}
     valid, invalid, sigma = (values.pop(key, None) for key in ("valid", "invalid", "sigma"))
-    good = np.ones(len(table), dtype=bool)
-    if valid is not None:
-        good &= valid != 0
-    if invalid is not None:
-        good &= invalid == 0
+    good = np.ones(len(table), dtype=bool) if valid is None else valid != 0
+    good &= True if invalid is None else invalid == 0
     names = {key: headings[columns[key]].name for key in values}
     units = {key: headings[columns[key]].unit for key in values}
     return FrameRows(values, names, units, valid=good, sigma=sigma)

@@ -13,8 +13,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import disk_mesh
 from ...meshes.strip_models import WIDTH, UniaxialModel, bias_strip, straight_strip
-from ...readers.curves import read_load_curves
-from ...readers.polynomials import fit_load_polynomial
+from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import Solver
 from ...solvers.calculix.diagnosis import diagnose

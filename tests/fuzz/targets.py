@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
+from bubblefit.experiments.biaxial.data import read_biaxial_table
 from bubblefit.experiments.kinds import Reach
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -17,13 +18,11 @@ from bubblefit.project.project import read_project
 from bubblefit.readers import hdf5_files
 from bubblefit.readers import names as name_numbers
 from bubblefit.readers.bending import read_bending_curves
-from bubblefit.readers.biaxial import read_biaxial_table
 from bubblefit.readers.columns import PRESSURE_UNITS
-from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
 from bubblefit.readers.names import value_in_file
-from bubblefit.readers.polynomials import read_published_polynomials
 from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.surfaces import read_surfaces
 from bubblefit.runs.setup import bounds_of, law_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of

@@ -1,7 +1,5 @@
 """Traps made from good biaxial paths are named; good ones raise no doubt."""
 
-from __future__ import annotations
-
 import bubblefit as bf
 import numpy as np
 import pytest

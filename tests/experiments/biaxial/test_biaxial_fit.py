@@ -1,7 +1,5 @@
 """Biaxial tests in fits: the law behind computed data, ratios foretold, what is said."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -9,17 +7,23 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.kinds import Weighting
+from bubblefit.experiments.biaxial.prepared import candidates
+from bubblefit.experiments.kinds import Planning, Precision, Weighting
 from bubblefit.materials.card import read_card
 from bubblefit.materials.designers import shares
+from bubblefit.materials.forms.ratio import LoadRatio
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations
 from bubblefit.notes import NoteKind
 from bubblefit.runs.check import check
+from bubblefit.runs.compare import candidates as candidate_laws
+from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import simulate_cards
 
 from ...biaxial_files import BENT, FIVE, THICKNESS, biaxial_project, rows_of, write_rows
+from ...commands import in_process
 from ...complaints import complaint_with
 
 
@@ -201,3 +205,137 @@ def test_cards_are_judged_ratio_by_ratio(folder, fitted, tmp_path):
     assert all(told["rms_warp_percent"] < 1e-5 for told in ratios.values())
     assert ratios["1:0"]["shown_to_kN_per_m"] == 30.0
     assert (tmp_path / "paths.png").is_file() and len(pd.read_csv(tmp_path / "paths.csv")) == 150
+
+
+TRUE = HypoelasticLaw.linear(900.0, 600.0, 30.0, 0.24)
+#: What one ratio, unlike the others, was computed with.
+ELSE = HypoelasticLaw.linear(1100.0, 600.0, 30.0, 0.24)
+
+
+def test_a_ratio_is_foretold_by_the_other(tmp_path, monkeypatch):
+    """Each of two was made of a fabric of its own, of which the other knows nothing."""
+    monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
+    write_rows(tmp_path / "test.csv", [*rows_of(TRUE, ["1:1"]), *rows_of(ELSE, ["2:1"])])
+    biaxial_project(tmp_path, form="constant")
+    command = ("validate", "project.toml", "--leave", "ratios", "--starts", 1, "--out", "out")
+    in_process(*command, cwd=tmp_path)
+    table = pd.read_csv(tmp_path / "out" / "validation.csv").set_index("test")
+    assert sorted(table.index) == ["biaxial: 1:1", "biaxial: 2:1"]
+    for ratio in ("1:1", "2:1"):
+        loads = np.outer(np.linspace(2, 30, 30), shares(ratio))
+        one, other = (100 * biaxial_response(e, loads, THICKNESS).elongation for e in (ELSE, TRUE))
+        off = ((one - one[0]) - (other - other[0]))[1:]
+        foretold = table.loc[f"biaxial: {ratio}"].foretold_rms
+        assert foretold == pytest.approx(np.sqrt(np.mean(off**2)), rel=1e-3)
+    # A fit to both meets one of them at least half.
+    assert (table.fitted_rms / table.foretold_rms).min() < 0.5
+
+
+def planning(tmp_path, noise=None, own=True) -> Planning:
+    write_rows(tmp_path / "test.csv", rows_of(TRUE, ["1:1", "2:1"]))
+    project = bf.read_project(biaxial_project(tmp_path, form="constant"))
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    (prepared,) = setup.tests
+    law = HypoelasticLaw(TRUE.beta, 0.24, [0.03, 0.04, 0.1], form=TRUE.form)
+    precision = {"biaxial: 1:1": Precision(0.02, 2.0, 29), "biaxial: 2:1": Precision(0.03, 4.0, 29)}
+    tests = [prepared] if own else []
+    place = prepared.test.place
+    return Planning(place, tests, precision if own else {}, law, setup.make_solver, noise)
+
+
+def test_each_ratio_is_offered_up_to_the_strains_that_the_law_is_known_for(tmp_path):
+    offered = candidates(planning(tmp_path))
+    assert [c.name for c in offered] == [
+        f"biaxial {r}" for r in ("1:1", "2:1", "1:2", "1:0", "0:1", "1:5", "5:1")
+    ]
+    assert {c.noise_is for c in offered} == {"that of biaxial"}
+    for candidate in offered:
+        (path,) = candidate.make().test.data.paths
+        share = np.log1p(path.strain[-1]) / [0.03, 0.04]
+        assert share.max() == pytest.approx(1.0, rel=1e-6) and len(path.load) == 20
+        wanted = biaxial_response(TRUE, path.load, THICKNESS).elongation
+        np.testing.assert_allclose(path.strain, wanted, rtol=1e-12)
+        np.testing.assert_allclose(path.load[0], 0.05 * path.load[-1])
+
+
+def test_the_noise_of_a_ratio_is_the_project_s_own_or_given_or_assumed(tmp_path):
+    def noise(**options):
+        candidate = candidates(planning(tmp_path, **options))[0]
+        (one,) = candidate.make().comparisons(lambda *a: None, Weighting())
+        return candidate.noise_is, one.objective.least_noise
+
+    # The worse of both ratios, of which four neighbours err as one.
+    own, known = noise()
+    assert own == "that of biaxial" and known == pytest.approx(0.03 * np.sqrt(4.0 * 19 / 29))
+    assert noise(noise=0.05) == ("given", pytest.approx(0.05))
+    assert noise(own=False) == ("assumed", pytest.approx(0.01 * np.sqrt(19 / 5)))
+
+
+KNOWN = HypoelasticLaw([30.0, 800.0, 400.0, 1000.0, -300.0], 0.24, form=LoadRatio())
+
+
+@pytest.fixture(scope="module")
+def fitted_folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("ratio")
+    write_rows(place / "test.csv", rows_of(KNOWN))
+    path = biaxial_project(place, form="load-ratio")
+    # Its moduli depend on no strain: it needs no range, as the constant form needs none.
+    path.write_text(path.read_text().replace("strain_range = [0.07, 0.07, 0.1]\n", ""))
+    return place
+
+
+@pytest.fixture(scope="module")
+def fitted_fit(fitted_folder):
+    found = bf.fit(bf.read_project(fitted_folder / "project.toml"), starts=1)
+    found.card.write(fitted_folder / "material.toml")
+    return found
+
+
+def test_five_ratios_give_its_unknowns_back(fitted_fit):
+    np.testing.assert_allclose(fitted_fit.law.beta[1:], KNOWN.beta[1:], rtol=1e-7)
+    assert fitted_fit.objective < 1e-7
+
+
+def test_a_sixth_ratio_is_foretold_fit(fitted_fit):
+    loads = np.outer(np.linspace(2, 30, 20), shares("1:5"))
+    wanted, found = (
+        biaxial_response(law, loads, THICKNESS).elongation for law in (KNOWN, fitted_fit.law)
+    )
+    np.testing.assert_allclose(found, wanted, atol=1e-8)
+
+
+def test_the_card_is_as_sure_of_the_gains_as_of_the_moduli(fitted_folder, fitted_fit):
+    """The moduli at equal loads alone would leave two directions of five out."""
+    card = read_card(fitted_folder / "material.toml")
+    assert len(card.certainty.directions) == 5
+    sigma = np.sqrt(np.diag(card.certainty.covariance))
+    np.testing.assert_allclose(card.law.beta[1:], KNOWN.beta[1:], rtol=1e-7)
+    assert (sigma[1:] > 0.05).all() and (sigma[1:] < 5.0).all()
+    assert sigma[0] > 50.0  # nothing shears the fabric
+    least = {name: float(card.law.modulus(name, 0.0, end)) for name, end in
+             (("E1", 0.0), ("E1", 1.0), ("E2", 0.0), ("E2", 1.0))}  # fmt: skip
+    assert min(least.values()) > 0
+
+
+def test_which_forms_are_compared_unless_named(fitted_folder, tmp_path):
+    path = fitted_folder / "project.toml"
+    assert "load-ratio" in candidate_laws(bf.read_project(path))
+    other = tmp_path / "project.toml"
+    text = path.read_text().replace("test.csv", str(fitted_folder / "test.csv"))
+    other.write_text(text.replace("starts = 1", 'starts = 1\nsolver = "marc"'))
+    project = bf.read_project(other)
+    assert "cubic" in candidate_laws(project) and "load-ratio" not in candidate_laws(project)
+    # Where it is asked for, it is refused before anything runs.
+    assert "load-ratio" in candidate_laws(project, ["load-ratio"])
+
+
+def test_another_solver_is_refused_in_one_line(fitted_folder, tmp_path, ccx):
+    path = tmp_path / "project.toml"
+    text = (
+        (fitted_folder / "project.toml")
+        .read_text()
+        .replace("test.csv", str(fitted_folder / "test.csv"))
+    )
+    path.write_text(text.replace("starts = 1", 'starts = 1\nsolver = "calculix"'))
+    said = ["project.toml", "law.form", "solver membrane", "calculix takes moduli of strain"]
+    complaint_with(said, bf.fit, bf.read_project(path), starts=1)

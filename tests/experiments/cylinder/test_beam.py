@@ -1,7 +1,5 @@
 """The whole beam of a run that meshed a part of it, and where the bodies are."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,7 +28,7 @@ def run(m: CylinderModel) -> BendingRun:
     return ended
 
 
-def test_a_quarter_makes_the_whole_beam() -> None:
+def test_a_quarter_makes_the_whole_beam():
     whole, quarter = run(model("full")), run(model())
     beam, same = whole_beam(model(), quarter), whole_beam(model("full"), whole)
     for one, other in ((beam.bent, same.bent), (beam.inflated, same.inflated)):
@@ -48,7 +46,7 @@ def test_a_quarter_makes_the_whole_beam() -> None:
         )
 
 
-def test_bodies_touch_the_inflated_beam() -> None:
+def test_bodies_touch_the_inflated_beam():
     m = model()
     beam = whole_beam(m, run(m))
     bodies = bodies_of(m, beam, 30.0)
@@ -76,7 +74,7 @@ def test_bodies_touch_the_inflated_beam() -> None:
         ([[0.0, 20.0, 0.0], [0.0, -99.0, 250.0]], 10.0, -80.0),
     ],
 )
-def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float) -> None:
+def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float):
     """Beside a node that stands on a support 60 mm high."""
     rest = np.array([*points, [0.0, 60.0, 200.0]])
     made: Any = SimpleNamespace(

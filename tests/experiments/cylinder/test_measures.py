@@ -1,31 +1,41 @@
 """Numbers of a bending run on curves that are known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.cylinder.predicted import (
+    STUDIED,
     BendingRun,
+    arrays_of,
     bending_measures,
+    early_end,
     inflation_strain,
     initial_stiffness,
     knee_point,
     limit_point,
     loads_at,
+    quantities,
     run_of,
     straightness,
     wrinkle_onset,
 )
+from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh, middle_strain, surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.project.project import read_project
+from bubblefit.runs.refinement import edge_length
+from bubblefit.solvers.base import History
 
-from ...cylinder_cases import ran
+from ...cylinder_cases import STUDIED_PROJECT, ran
 
 #: mm over which slopes are taken here.
 OVER = 20.0
@@ -47,7 +57,7 @@ def model(symmetry: str = "quarter"):
 # Numbers of a curve
 
 
-def test_a_bilinear_curve() -> None:
+def test_a_bilinear_curve():
     """4 N/mm to 100 mm, 1 N/mm from there."""
     load = np.minimum(4 * WAY, 300 + WAY)
     stiffness = initial_stiffness(WAY, load, OVER)
@@ -61,7 +71,7 @@ def test_a_bilinear_curve() -> None:
     assert r2 == pytest.approx(1.0) and off == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_initial_slope_is_of_the_frames_up_to_there() -> None:
+def test_the_initial_slope_is_of_the_frames_up_to_there():
     """The frame that lies there counts, by rounding beyond or not; the next one does not."""
     load = np.array([0.0, 20.0, 40.0, 60.0, 30.0, 200.0])
     for end in (20.0, 20.0 * (1 + 1e-12)):
@@ -69,14 +79,14 @@ def test_the_initial_slope_is_of_the_frames_up_to_there() -> None:
         assert found == pytest.approx(2.0)  # the straight line through five points
 
 
-def test_loads_at_places() -> None:
+def test_loads_at_places():
     """Between frames, and at the last, which may end short of it by rounding; not beyond."""
     way, load = np.array([0.0, 50.0, 100.0 * (1 - 1e-12)]), np.array([0.0, 200.0, 300.0])
     found = loads_at(way, load, {"40 mm": 40.0, "100 mm": 100.0, "101 mm": 101.0})
     assert found == {"40 mm": pytest.approx(160.0), "100 mm": pytest.approx(300.0), "101 mm": None}
 
 
-def test_a_curve_with_a_limit_point() -> None:
+def test_a_curve_with_a_limit_point():
     load = 400 * np.sin(WAY / 240 * 0.9 * np.pi)
     top = limit_point(WAY, load)
     assert top == pytest.approx((240 / 1.8, 400.0), rel=0.02)
@@ -87,21 +97,21 @@ def test_a_curve_with_a_limit_point() -> None:
     assert limit_point(WAY[:3], np.array([0.0, 100.0, 99.6])) is None
 
 
-def test_curves_that_say_too_little() -> None:
+def test_curves_that_say_too_little():
     assert initial_stiffness(WAY[:1], NONE, OVER) is None
     assert knee_point(WAY[:5], 4 * WAY[:5], 4.0, OVER) is None
     assert knee_point(WAY, 4 * WAY, 4.0, OVER) is None
     assert straightness(WAY[:3], 4 * WAY[:3], 100.0) is None
 
 
-def test_a_bent_line_is_not_straight() -> None:
+def test_a_bent_line_is_not_straight():
     r2, off = straightness(WAY, WAY**2, 2 * 240.0**2)
     # Of x^2 on [0, 1] the best straight line misses 1/180 of 4/45 of variance, 1/6 at the ends.
     assert r2 == pytest.approx(1 - (1 / 180) / (4 / 45), abs=2e-3)
     assert off == pytest.approx(1 / 6, rel=0.05)
 
 
-def test_wrinkles_begin_where_more_is_wrinkled_than_when_inflated() -> None:
+def test_wrinkles_begin_where_more_is_wrinkled_than_when_inflated():
     share = 0.1 + 1e-3 * np.maximum(WAY - 50, 0)
     run = BendingRun(WAY, 2 * WAY, NONE, NONE, NONE, NONE, share)
     assert wrinkle_onset(run) == pytest.approx((64.0, 128.0))
@@ -109,7 +119,7 @@ def test_wrinkles_begin_where_more_is_wrinkled_than_when_inflated() -> None:
     assert wrinkle_onset(replace(run, wrinkled=0 * WAY + 0.1)) is None
 
 
-def test_all_numbers_of_the_formula() -> None:
+def test_all_numbers_of_the_formula():
     m = model()
     run = run_of(ran(m, MaterialCard(law(), 0.81)))
     assert run is not None
@@ -132,7 +142,7 @@ def test_all_numbers_of_the_formula() -> None:
 # Strain of a curved surface
 
 
-def test_strain_of_a_tube_that_grows() -> None:
+def test_strain_of_a_tube_that_grows():
     mesh = cylinder_mesh(900.0, 150.0, 25.0, 40.0)
     strain = surface_strain(mesh, mesh.points * [0.1, 0.1, 0.03])
     tube = np.setdiff1d(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
@@ -141,7 +151,7 @@ def test_strain_of_a_tube_that_grows() -> None:
     np.testing.assert_allclose(strain[mesh.element_sets["caps"], :2], np.log(1.1))
 
 
-def test_strain_of_a_flat_mesh_turned_in_space() -> None:
+def test_strain_of_a_flat_mesh_turned_in_space():
     disk = disk_mesh(100.0, 96)
     turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
     turn *= np.linalg.det(turn)
@@ -159,7 +169,7 @@ def test_strain_of_a_flat_mesh_turned_in_space() -> None:
         surface_strain(disk, u)
 
 
-def test_the_body_is_apart_from_seam_and_caps() -> None:
+def test_the_body_is_apart_from_seam_and_caps():
     mesh = cylinder_mesh(900.0, 150.0, 25.0, 40.0)
     u = mesh.points * [0.1, 0.1, 0.0]
     beside = mesh.node_sets["ends"]
@@ -169,7 +179,7 @@ def test_the_body_is_apart_from_seam_and_caps() -> None:
     assert anywhere[1] > np.log(1.25)
 
 
-def test_a_smaller_cylinder_is_read_at_its_own_scale() -> None:
+def test_a_smaller_cylinder_is_read_at_its_own_scale():
     """Everything a tenth: the same curve, read at places a tenth as far."""
     tenth = replace(model(), reading=curve_reading(15.0))
     assert tenth.reading.places == pytest.approx(
@@ -186,7 +196,7 @@ def test_a_smaller_cylinder_is_read_at_its_own_scale() -> None:
 
 
 @pytest.mark.parametrize(("low", "there"), [(99.5, False), (99.49, True), (-1.0, True)])
-def test_a_load_that_falls_by_half_a_percent(low: float, there: bool) -> None:
+def test_a_load_that_falls_by_half_a_percent(low: float, there: bool):
     """The largest load counts, whether the fall is the last frame or not."""
     way = np.array([0.0, 5.0, 10.0, 15.0])
     for load in ([0.0, 100.0, low, 99.9], [0.0, 50.0, 100.0, low]):
@@ -194,20 +204,20 @@ def test_a_load_that_falls_by_half_a_percent(low: float, there: bool) -> None:
         assert found == ((float(way[np.argmax(load)]), 100.0) if there else None)
 
 
-def test_a_hundredth_of_the_surface_is_no_wrinkle() -> None:
+def test_a_hundredth_of_the_surface_is_no_wrinkle():
     way = np.array([0.0, 5.0, 10.0])
     run = BendingRun(way, 3 * way, NONE, NONE, NONE, NONE, np.array([0.25, 0.26, 0.2601]))
     assert wrinkle_onset(run) == (10.0, 30.0)
 
 
-def test_stiffness_of_three_frames_at_least() -> None:
+def test_stiffness_of_three_frames_at_least():
     way, load = np.array([0.0, 30.0, 60.0, 90.0]), np.array([0.0, 60.0, 180.0, 900.0])
     assert initial_stiffness(way, load, OVER) == pytest.approx(3.0)  # the line through three
     assert initial_stiffness(way[:2], load[:2], OVER) == pytest.approx(2.0)
     assert initial_stiffness(way[:1], load[:1], OVER) is None
 
 
-def test_where_a_knee_can_be() -> None:
+def test_where_a_knee_can_be():
     """4 N/mm to `kink` mm, then 1: the slope over 20 mm is 2 where a third lies before it."""
 
     def found(kink: float, end: float, stiffness: float | None = 4.0):
@@ -227,7 +237,7 @@ def test_where_a_knee_can_be() -> None:
     assert found(0.0, 60.0, 1.99) is None
 
 
-def test_straightness_of_four_frames_at_least() -> None:
+def test_straightness_of_four_frames_at_least():
     """Up to half of the load at the knee."""
     way, load = np.arange(5.0), np.array([0.0, 1.0, 5.0, 6.0, 7.0])
     r2, off = straightness(way, load, 12.0)
@@ -241,7 +251,7 @@ def test_straightness_of_four_frames_at_least() -> None:
     assert straightness(way, 0 * load, 12.0) is None
 
 
-def test_largest_strains_of_body_and_tube_by_hand() -> None:
+def test_largest_strains_of_body_and_tube_by_hand():
     """Quads without a seam are the body; where all of them touch the caps, the body is all."""
     mesh = cylinder_mesh(900.0, 150.0, 25.0, 40.0)
     u = mesh.points * [0.1, 0.1, 0.03]
@@ -255,3 +265,99 @@ def test_largest_strains_of_body_and_tube_by_hand() -> None:
     assert inflation_strain(whole, u)[0][0] > np.log(1.04)
     alone = {k: v for k, v in mesh.element_sets.items() if k != "seam"}
     assert inflation_strain(replace(mesh, element_sets=alone), u)[1][0] < np.log(1.06)
+
+
+MODEL = SimpleNamespace(deflections=(10.0, 20.0))
+
+
+def history(frames: int = 3, **other: Any) -> History:
+    given = {
+        "cavity_pressure": np.array([0.1, 0.101, 0.102])[:frames],
+        "cavity_volume": 5e7 - np.arange(frames),
+    } | other
+    moved = np.arange(frames * 6.0).reshape(frames, 2, 3)
+    return History(np.arange(frames) * 50.0, moved, np.zeros(3), np.zeros(3), **given)
+
+
+def test_what_is_kept():
+    kept = arrays_of(MODEL, history(wrinkled=[0.0, 0.1, 0.3]))
+    assert {name: value.tolist() for name, value in kept.items()} == {
+        "deflection": [0.0, 10.0, 20.0],
+        "load": [0.0, 50.0, 100.0],
+        "pressure": [0.1, 0.101, 0.102],
+        "volume": [5e7, 5e7 - 1, 5e7 - 2],
+        "inflated": [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]],
+        "bent": [[12.0, 13.0, 14.0], [15.0, 16.0, 17.0]],
+        "wrinkled": [0.0, 0.1, 0.3],
+    }
+    assert arrays_of(MODEL, history())["wrinkled"].size == 0
+
+
+def test_an_early_end_is_a_result_where_the_solver_says_why():
+    short = history(2, early="no equilibrium")
+    assert arrays_of(MODEL, short)["deflection"].tolist() == [0.0, 10.0]
+    assert early_end(MODEL, short) == "no equilibrium"
+    assert early_end(MODEL, history(3, early="said after the end")) == ""
+    with pytest.raises(SolverFailure, match="the results end at 10 of 20 mm, and do not say why"):
+        arrays_of(MODEL, history(2))
+
+
+@pytest.mark.parametrize("name", ["cavity_pressure", "cavity_volume"])
+def test_results_without_gas(name: str):
+    with pytest.raises(SolverFailure, match="no gas pressure or no volume"):
+        arrays_of(MODEL, history(**{name: None}))
+
+
+@pytest.fixture
+def project(tmp_path) -> Path:
+    path = tmp_path / "project.toml"
+    path.write_text(STUDIED_PROJECT)
+    return path
+
+
+def cylinders(project: Path) -> list[CylinderTest]:
+    return list(read_project(project).tests.values())
+
+
+def test_finer_cylinders(project: Path):
+    narrow, wide = cylinders(project)
+    own, finer = (narrow.models(0.5, "elements", f)["cylinder"] for f in (3.0, 6.0))
+    # What lies between seam, collar and supports is a whole number of rows: nearly a half.
+    assert edge_length(finer.mesh) == pytest.approx(edge_length(own.mesh) / 2, rel=0.05)
+    assert set(np.unique(wide.models(0.5, "elements", 6.0)["cylinder"].thickness)) == {0.5, 1.5}
+
+
+def test_finer_increments_keep_what_is_reported(project: Path):
+    test, _ = cylinders(project)
+    own, finer = (test.models(0.81, "increments", f)["cylinder"] for f in (1.0, 3.0))
+    assert finer.deflections == own.deflections and len(finer.increments) == 12
+    assert finer.increments[:3] == pytest.approx([10 / 3, 20 / 3, 10.0])
+    assert len(finer.inflation) == 3 * len(own.inflation) and finer.pressure == own.pressure
+    np.testing.assert_array_equal(finer.reported, [2, 5, 8, 11])
+    assert len(STUDIED.steps(finer)) == 42
+    with pytest.raises(InputError, match="--coarser 0"):
+        test.models(0.81, "increments", 0.5)
+
+
+def test_quantities_of_a_history_made_up(project: Path):
+    """A cylinder that swells by a tenth, then a load that is straight up to a limit and falls."""
+    model = cylinders(project)[0].model()
+    model = replace(model, deflections=np.arange(4.0, 241, 4.0), increments=())
+    d = np.array([0.0, *model.deflections])
+    swollen = 0.1 * model.mesh.points * [1, 1, 0]
+    moves = np.repeat(swollen[None], len(d), axis=0)
+    load = np.where(d < 120, 3.0 * d, 360.0 - 0.5 * (d - 120))
+    history = History(load, moves, np.zeros(3), np.zeros(3), cavity_volume=np.full(len(d), 6.0e7))
+    found = quantities(model, history)
+    assert found["radius at mid-span, inflated, mm"] == pytest.approx(82.5)
+    assert found["volume, inflated, l"] == pytest.approx(60.0)
+    assert found["initial stiffness, N/mm"] == pytest.approx(3.0)
+    assert found["load at 100 mm, N"] == pytest.approx(300.0)
+    assert found["load at 240 mm, N"] == pytest.approx(300.0)
+    assert found["load at the limit point, N"] == pytest.approx(360.0)
+    assert 110 < found["load at the knee point, N"] / 3.0 < 120
+    early = replace(history, load=load[:26], displacement=moves[:26])
+    gone = set(found) - set(quantities(model, early))
+    assert gone == {
+        "load at 240 mm, N", "load at the limit point, N", "load at the knee point, N"
+    }  # fmt: skip

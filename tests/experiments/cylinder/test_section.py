@@ -1,9 +1,6 @@
 """[[cylinder]] of a project: what it gives, what it says of mistakes."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,7 +36,7 @@ def cylinders(project: Project) -> list[CylinderTest]:
     return list(project.tests.values())
 
 
-def test_the_example_is_table_6_1_with_tables_3_2_and_5_4() -> None:
+def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
     project = read_project(EXAMPLE)
     wanted = [(d, p) for d, pressures in TABLE_6_1.items() for p in pressures]
     tests = cylinders(project)
@@ -67,7 +64,7 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4() -> None:
             assert law.modulus(modulus, np.linspace(0, law.strain_range[column], 500)).min() > 0
 
 
-def test_a_cylinder_says_its_own(tmp_path: Path) -> None:
+def test_a_cylinder_says_its_own(tmp_path):
     write_readings(tmp_path / "a.csv")
     first = """length = 2500
 span = 1800
@@ -84,7 +81,7 @@ measured.files = ["a.csv"]"""
     assert one.model(0.5).thickness.min() == 0.5
 
 
-def test_where_a_curve_is_read_follows_the_diameter(tmp_path: Path) -> None:
+def test_where_a_curve_is_read_follows_the_diameter(tmp_path):
     path = write_project(tmp_path)
     usual = path.read_text().replace("places = [40, 100, 240]\nslope_over = 20\n", "")
     path.write_text(usual.replace("diameter = 150", "diameter = 200", 1))
@@ -96,7 +93,7 @@ def test_where_a_curve_is_read_follows_the_diameter(tmp_path: Path) -> None:
     assert wide.model().reading == wide.reading
 
 
-def test_metres_and_bars_are_the_same_cylinder(tmp_path: Path) -> None:
+def test_metres_and_bars_are_the_same_cylinder(tmp_path):
     path = write_project(tmp_path)
     usual = read_project(path)
     text = path.read_text().replace('modulus = "MPa"', 'modulus="MPa"\nlength="m"\npressure="bar"')
@@ -118,7 +115,7 @@ def test_metres_and_bars_are_the_same_cylinder(tmp_path: Path) -> None:
     assert metres.cards["soft"].card.thickness == pytest.approx(0.81)
 
 
-def test_cards_from_files(tmp_path: Path) -> None:
+def test_cards_from_files(tmp_path):
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     write_card(MaterialCard(law, 0.7, "mine", "a test"), tmp_path / "card.toml")
     path = write_project(tmp_path)
@@ -169,7 +166,7 @@ def test_cards_from_files(tmp_path: Path) -> None:
         ('unit = "kg"', 'units = "kg"', ["cylinder[0].measured.load.units", "did you mean 'unit'"]),
     ],
 )
-def test_mistakes_are_one_line(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+def test_mistakes_are_one_line(tmp_path, old: str, new: str, words: list[str]):
     path = write_project(tmp_path)
     text = path.read_text()
     assert old in text
@@ -177,13 +174,13 @@ def test_mistakes_are_one_line(tmp_path: Path, old: str, new: str, words: list[s
     assert complaint_with(words, read_project, path).startswith(str(path))
 
 
-def test_nothing_of_it_is_fitted(tmp_path: Path) -> None:
+def test_nothing_of_it_is_fitted(tmp_path):
     project = read_project(write_project(tmp_path))
     with pytest.raises(InputError, match="no test to be fitted"):
         project.chosen(None, fitted=True)
 
 
-def test_what_the_example_leaves_out_is_the_default(tmp_path: Path) -> None:
+def test_what_the_example_leaves_out_is_the_default(tmp_path):
     """Without [defaults.cylinder], but for where curves are read, the cylinders are the same."""
     text = EXAMPLE.read_text()
     bare = re.sub(r"\[defaults.cylinder\].*?\n\n", "\n\n", text, flags=re.S)

@@ -1,7 +1,5 @@
 """Fits to several tests at once: strips alone, and strips with a quarter bubble of 48 quads."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
-from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
@@ -131,7 +129,7 @@ class Thicker:
 
     name, external, progress, identity = "thicker", True, None, "thicker"
 
-    def __init__(self, fails: Sequence[int] = ()) -> None:
+    def __init__(self, fails: Sequence[int] = ()):
         self.fails, self.runs = tuple(fails), 0
         self.membrane = MembraneSolver(TIGHT)
 
@@ -172,7 +170,7 @@ def led(fit: FitProblem, fails: Sequence[int] = ()) -> FitProblem:
 class Failing(MembraneSolver):
     """Ends badly at the runs named."""
 
-    def __init__(self, runs: Sequence[int]) -> None:
+    def __init__(self, runs: Sequence[int]):
         super().__init__()
         self.bad, self.runs = set(runs), 0
 

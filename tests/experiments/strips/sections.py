@@ -1,7 +1,5 @@
 """Sections of strips and their files, for the tests of what is read from them."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 
@@ -71,7 +69,7 @@ def rows(separator: str, *columns: np.ndarray, comma: bool = False) -> str:
     return text.replace(".", ",") if comma else text
 
 
-def write_exports(folder: Path) -> None:
+def write_exports(folder: Path):
     """MTS (warp, 200 N/mm, in kN), ZwickRoell (fill, 80 N/mm), Instron (bias, 50 N/mm)."""
     u = np.linspace(0, 4, 21)
     head = (

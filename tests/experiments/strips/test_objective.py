@@ -1,11 +1,9 @@
 """Residuals of strips: RMS errors as printed, weights, blocks, derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.strips.objective import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.comparison import Blocks
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import Unknowns
@@ -15,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from .problems import CUBIC, FORMS, LAW, SHIFTED, STRIPS, TIGHT, joint, near, strips
 
 
-def test_the_objective_is_the_sum_of_rms_errors_as_printed() -> None:
+def test_the_objective_is_the_sum_of_rms_errors_as_printed():
     """Eqs 3.4 to 3.7: RMS of the differences, in N, direction by direction."""
     fit = strips(law=LAW)
     point = fit.evaluate(near(CUBIC, LAW), False)
@@ -29,7 +27,7 @@ def test_the_objective_is_the_sum_of_rms_errors_as_printed() -> None:
     assert point.value == pytest.approx(total)
 
 
-def test_loads_between_the_increments_lie_on_a_spline_from_the_origin() -> None:
+def test_loads_between_the_increments_lie_on_a_spline_from_the_origin():
     model = STRIPS["warp"]
     history = MembraneSolver().run(model, LAW)
     u = np.array([0.0, 0.111, 0.7, 0.71, 2.9, model.elongations[-1]])
@@ -40,7 +38,7 @@ def test_loads_between_the_increments_lie_on_a_spline_from_the_origin() -> None:
 
 
 @pytest.mark.parametrize("scale, weight", [(1.0, 2.0), (1400.0, 1.0), (1400.0, 0.25)])
-def test_scale_and_weight_of_a_strip(scale: float, weight: float) -> None:
+def test_scale_and_weight_of_a_strip(scale: float, weight: float):
     model = STRIPS["fill"]
     history = MembraneSolver().run(model, LAW)
     load = history.load + np.linspace(-3, 9, 10)
@@ -61,12 +59,12 @@ def test_scale_and_weight_of_a_strip(scale: float, weight: float) -> None:
         ([1.0, 1e6], "1e\\+06"),
     ],
 )
-def test_load_curves_outside_the_model_are_refused(elongation: list[float], words: str) -> None:
+def test_load_curves_outside_the_model_are_refused(elongation: list[float], words: str):
     with pytest.raises(InputError, match=words):
         LoadObjective(STRIPS["warp"].elongations, elongation, np.zeros(len(elongation)))
 
 
-def test_an_elongation_at_the_model_s_end_is_inside_it() -> None:
+def test_an_elongation_at_the_model_s_end_is_inside_it():
     """Also where another sum of the same steps is larger by rounding."""
     end = float(STRIPS["warp"].elongations[-1])
     objective = LoadObjective(STRIPS["warp"].elongations, [0.0, end * (1 + 1e-12)], np.zeros(2))
@@ -74,7 +72,7 @@ def test_an_elongation_at_the_model_s_end_is_inside_it() -> None:
     assert objective.unit == "N"
 
 
-def test_blocks() -> None:
+def test_blocks():
     random = np.random.default_rng(8)
     r, j = random.standard_normal(9), random.standard_normal((9, 4))
     blocks = Blocks([2, 3, 4])
@@ -91,7 +89,7 @@ def test_blocks() -> None:
     assert blocks.gradient(r, j) == pytest.approx(rest.gradient(r[keep], j[keep]))
 
 
-def test_shifted_reckons_as_if_one_solver_gave_what_another_gives() -> None:
+def test_shifted_reckons_as_if_one_solver_gave_what_another_gives():
     model = STRIPS["bias"]
     here = MembraneSolver().run(model, LAW)
     there = MembraneSolver().run(model, LAW.with_beta(1.1 * LAW.beta))
@@ -103,7 +101,7 @@ def test_shifted_reckons_as_if_one_solver_gave_what_another_gives() -> None:
     assert np.linalg.norm(moved.residual(here) - objective.residual(here)) > 1e-3
 
 
-def test_rows_and_scale_belong_to_their_tests() -> None:
+def test_rows_and_scale_belong_to_their_tests():
     fit = joint()
     point = fit.evaluate(near(CUBIC, LAW), False)
     pieces = [fit.rows(k) for k in range(4)]
@@ -115,7 +113,7 @@ def test_rows_and_scale_belong_to_their_tests() -> None:
 
 
 @pytest.mark.parametrize("unknowns", [SHIFTED, CUBIC], ids=["offsets", "moduli"])
-def test_jacobian_of_a_joint_fit_against_finite_differences(unknowns: Unknowns) -> None:
+def test_jacobian_of_a_joint_fit_against_finite_differences(unknowns: Unknowns):
     fit = joint(unknowns)
     check_jacobian(fit, near(unknowns, LAW))
     jacobian = fit.evaluate(near(unknowns, LAW), True).jacobian
@@ -127,12 +125,12 @@ def test_jacobian_of_a_joint_fit_against_finite_differences(unknowns: Unknowns) 
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_jacobian_of_strips_against_finite_differences(form: str) -> None:
+def test_jacobian_of_strips_against_finite_differences(form: str):
     unknowns, law = FORMS[form]
     check_jacobian(strips(unknowns, law), near(unknowns, law))
 
 
-def check_jacobian(fit: FitProblem, y: np.ndarray) -> None:
+def check_jacobian(fit: FitProblem, y: np.ndarray):
     """Every column, of the residual and of e."""
     for experiment in fit.comparisons:
         experiment.solver = MembraneSolver(TIGHT)

@@ -1,7 +1,5 @@
 """Strips in a fit: comparisons, weights, folds; what a finished fit says, shows and writes."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,15 +11,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.kinds import FittedTest, Output, Weighting
+from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips import report as figures
-from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.polynomials import compare_orders
+from bubblefit.experiments.strips.data import Strip, compare_orders
 from bubblefit.experiments.strips.prepared import PreparedStrips
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
@@ -36,25 +33,25 @@ POINTS = ("[warp]", 'match = "points"\nincrements = 5\n[warp]')
 
 
 @pytest.fixture
-def published(tmp_path: Path) -> Callable[..., PreparedStrips]:
+def published(tmp_path) -> Callable[..., PreparedStrips]:
     """The published polynomials, five increments."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
         test = read(project_file(tmp_path, PUBLISHED, COARSE, *changes))
-        return test.prepare(LAW, MembraneSolver)
+        return KIND.prepare(test, LAW, MembraneSolver)
 
     return prepared
 
 
 @pytest.fixture
-def exported(tmp_path: Path) -> Callable[..., PreparedStrips]:
+def exported(tmp_path) -> Callable[..., PreparedStrips]:
     """Measured points of one or two specimens a direction, five increments."""
     write_exports(tmp_path)
 
     def prepared(*changes: tuple[str, str]) -> PreparedStrips:
         test = read(project_file(tmp_path, SMALL, POINTS, *changes))
-        return test.prepare(LAW, MembraneSolver)
+        return KIND.prepare(test, LAW, MembraneSolver)
 
     return prepared
 
@@ -186,7 +183,7 @@ def test_settings_are_what_a_result_depends_on(published, tmp_path):
 def test_findings(published):
     prepared = published()
     fit = fitted(prepared)
-    found = prepared.findings(fit)
+    found = report.findings(prepared, fit)
     directions = found.numbers["directions"]
     assert list(directions) == ["warp", "fill", "bias"]
     for (name, numbers), c, h in zip(
@@ -206,11 +203,11 @@ def test_findings(published):
 
 def test_what_the_data_leave_open_is_said(published, exported):
     prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
-    assert prepared.findings(fitted(prepared)).warnings == (
+    assert report.findings(prepared, fitted(prepared)).warnings == (
         "no fill strip of strips is matched: E2 rests on the other directions",
     )
     cut = exported(("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"))
-    (words,) = cut.findings(fitted(cut)).warnings
+    (words,) = report.findings(cut, fitted(cut)).warnings
     beyond = cut.test.strips["warp"].beyond
     left = "points beyond the final length (or before zero) were left out"
     assert words.line == f"warp: {beyond} {left}"
@@ -219,13 +216,13 @@ def test_what_the_data_leave_open_is_said(published, exported):
 def test_residuals_are_every_matched_load(exported):
     prepared = exported()
     fit = fitted(prepared)
-    table = prepared.residuals(fit)
+    table = report.residuals(prepared, fit)
     assert list(table.columns) == [
         "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit",
     ]  # fmt: skip
     assert set(table["unit"]) == {"N"}
     assert len(table) == sum(len(c.objective.load) for c in fit.comparisons)
-    for direction, numbers in prepared.findings(fit).numbers["directions"].items():
+    for direction, numbers in report.findings(prepared, fit).numbers["directions"].items():
         own = table[table["part"] == direction]
         np.testing.assert_allclose(own["modelled"] - own["measured"], own["difference"])
         assert np.sqrt((own["difference"] ** 2).mean()) == pytest.approx(numbers["rms_N"])
@@ -235,7 +232,9 @@ def test_residuals_are_every_matched_load(exported):
 def test_what_is_shown_is_written(exported, tmp_path, prefix):
     prepared = exported()
     fit = fitted(prepared)
-    shown = prepared.show(fit, prepared.findings(fit), Output(tmp_path / "out", prefix))
+    shown = report.show(
+        prepared, fit, report.findings(prepared, fit), Output(tmp_path / "out", prefix)
+    )
     names = [name for name, _ in (*shown.figures, *shown.files)]
     there = {p.name for p in (tmp_path / "out").iterdir()}
     assert set(names) == there and all(name.startswith(prefix) for name in names)
@@ -292,7 +291,7 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
     assert (min(told[0].rmse) < 1.0) == (not through_origin)
 
 
-def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path: Path) -> None:
+def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path):
     """Many specimens read at the same seven places settle no polynomial of order eight."""
     u = np.linspace(0.5, 3.5, 7)
     curves = tuple(LoadCurve("warp", s, u, 100 * u + i, None) for i, s in enumerate("abc"))
@@ -301,7 +300,7 @@ def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path: Path) -> 
     assert not (tmp_path / "orders.png").exists()
 
 
-def test_what_the_panels_of_loads_show() -> None:
+def test_what_the_panels_of_loads_show():
     """The polynomial from rest to the end of the model; points only where there are any."""
     u = np.linspace(0.5, 4.5, 9)
     polynomial = fit_load_polynomial(u, 100 * u + 3 * u**2)
@@ -333,7 +332,7 @@ def bias(*shear: float) -> tuple[Any, Any]:
     return SimpleNamespace(mesh=mesh, warp="warp"), SimpleNamespace(displacement=frames)
 
 
-def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch) -> None:
+def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
     model, history = bias(0.9, 0.2, -0.3, 0.8)
     strain = np.column_stack([np.ones(4), np.ones(4), [0.9, 0.2, -0.3, 0.8]])
 
@@ -395,7 +394,7 @@ def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeyp
     assert not figures.draw_orders(strips[1:2], Path("o.png"))
 
 
-def write_offset(folder: Path) -> None:
+def write_offset(folder: Path):
     """Two warp specimens that are pretensioned by 50 N."""
     u = np.linspace(0, 4, 21)
     for number, name in enumerate(("w1.csv", "w2.csv")):

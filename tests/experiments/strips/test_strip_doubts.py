@@ -1,7 +1,5 @@
 """Traps made from good load curves are named; good ones raise no doubt."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +7,7 @@ import pytest
 from bubblefit.experiments.kinds import Expected
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.doubts import curves_of, doubts_of_strips
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 GAUGE, WIDTH, THICKNESS = 20.0, 25.0, 0.8
 EXPECTED = Expected({"E1": (300.0, 1500.0), "E2": (100.0, 600.0), "G12": (5.0, 60.0)})

@@ -1,7 +1,5 @@
 """Variables of MAT-files part by part, and the limits of what a damaged one may say."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 
@@ -28,12 +26,12 @@ def doubles(*numbers: float) -> bytes:
 
 
 @pytest.mark.parametrize("kind", [6, 7, 15])
-def test_numbers_run_along_the_first_index_first(kind: int) -> None:
+def test_numbers_run_along_the_first_index_first(kind: int):
     found = value(kind, [2, 3], doubles(1, 2, 3, 4, 5, 6))
     np.testing.assert_array_equal(found, [[1, 3, 5], [2, 4, 6]])
 
 
-def test_every_type_of_numbers() -> None:
+def test_every_type_of_numbers():
     codes = {1: "b", 2: "B", 3: "h", 4: "H", 5: "i", 6: "I", 7: "f", 9: "d", 12: "q", 13: "Q"}
     for kind, code in codes.items():
         body = struct.pack(f"<3{code}", 1, 2, 3)
@@ -45,7 +43,7 @@ def test_every_type_of_numbers() -> None:
         value(6, [1, 1], part(9, b"\0" * 12))
 
 
-def test_text_truth_and_what_only_matlab_can_read() -> None:
+def test_text_truth_and_what_only_matlab_can_read():
     assert value(4, [1, 3], part(4, struct.pack("<3H", 97, 0, 98))) == "ab"
     assert value(4, [1, 5000], part(2, b"x" * 5000)) == "x" * 4096
     assert value(4, [1, 2], part(6, struct.pack("<2I", 0x110000, 0x10FFFF))) == "\U0010ffff"
@@ -59,7 +57,7 @@ def test_text_truth_and_what_only_matlab_can_read() -> None:
     assert MatrixParts(b"", "<").matrix(0).shape == (0, 0)
 
 
-def test_small_parts_and_the_other_order_of_bytes() -> None:
+def test_small_parts_and_the_other_order_of_bytes():
     """A part of four bytes or fewer stands in the second half of its own tag."""
     small = struct.pack("<HHBBxx", 2, 2, 7, 8)
     assert value(6, [1, 2], small).tolist() == [[7, 8]]
@@ -68,7 +66,7 @@ def test_small_parts_and_the_other_order_of_bytes() -> None:
     assert MatrixParts(body, ">").numbers().tolist() == [1.5, 2.5]
 
 
-def test_cells_and_structs() -> None:
+def test_cells_and_structs():
     one = part(14, variable(6, [1, 1], doubles(1)))
     two = part(14, variable(6, [1, 2], doubles(2, 3)))
     cells = value(1, [1, 2], one + two)
@@ -94,17 +92,17 @@ def test_cells_and_structs() -> None:
         (1, [1, 3], part(14, b"") * 2, "3 parts in 64 bytes"),
     ],
 )
-def test_what_a_damaged_variable_says(kind, shape, rest, words) -> None:
+def test_what_a_damaged_variable_says(kind, shape, rest, words):
     with pytest.raises(ValueError, match=words):
         value(kind, shape, rest)
 
 
-def test_empty_cells_fill_a_variable_to_its_last_byte() -> None:
+def test_empty_cells_fill_a_variable_to_its_last_byte():
     assert [cell.shape for cell in value(1, [1, 2], part(14, b"") * 2)] == [(0, 0)] * 2
     assert value(6, [0, 2], part(9, b"")).shape == (0, 2)
 
 
-def test_sixteen_cells_within_each_other() -> None:
+def test_sixteen_cells_within_each_other():
     def nested(depth: int) -> bytes:
         body = variable(6, [1, 1], doubles(1))
         for _ in range(depth):
@@ -119,7 +117,7 @@ def test_sixteen_cells_within_each_other() -> None:
         MatrixParts(nested(17), "<").matrix(0)
 
 
-def test_files(tmp_path: Path) -> None:
+def test_files(tmp_path):
     path = tmp_path / "a.mat"
     body = variable(6, [1, 1], doubles(4))
     path.write_bytes(mat(body))
@@ -144,7 +142,7 @@ def test_files(tmp_path: Path) -> None:
     )
 
 
-def test_numbers_among_other_things() -> None:
+def test_numbers_among_other_things():
     where = {"a": np.array([[True, False]]), "b": "text", "c": np.array(["x"])}
     assert numbers_of(Path("a.mat"), where, "a").tolist() == [[1.0, 0.0]]
     for name in "bcd":

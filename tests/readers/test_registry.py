@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, PlugInFailure
 from bubblefit.readers import registry
-from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.fields import read_fields
 from bubblefit.readers.frames import LOST, Frame, read_frames
-from bubblefit.readers.polynomials import read_published_polynomials
 from bubblefit.readers.registry import (
     Format,
     format_named,
@@ -166,7 +165,7 @@ def test_a_broken_reader_breaks_nothing_else(packages, tmp_path, caplog, text, w
 # --- data imports ---
 def test_the_library_loads_without_pandas_and_scipy_spatial():
     code = (
-        "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.polynomials;"
+        "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.data;"
         "assert not {'pandas', 'scipy.spatial'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

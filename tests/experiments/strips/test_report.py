@@ -1,34 +1,34 @@
 """What is told of strips whose numbers are known: findings, tables, cards side by side, noise."""
 
-from __future__ import annotations
-
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import CardRun, Output
-from bubblefit.experiments.strips import simulated
+from bubblefit.experiments.strips import report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip
-from bubblefit.experiments.strips.objective import LoadObjective
-from bubblefit.experiments.strips.prepared import FittedStrip
-from bubblefit.experiments.strips.report import (
-    findings_of,
-    load_table,
-    misfit_table,
-    residual_table,
-)
+from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective
+from bubblefit.experiments.strips.report import examine, load_table, misfit_table
+from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.notes import NoteKind
-from bubblefit.readers.curves import LoadCurve
-from bubblefit.readers.polynomials import fit_load_polynomial
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from bubblefit.solvers.base import History
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...drawings import caught
+from ...projects import project_file
+from ...published_laws import TABLE_3_2
+from .sections import CURVES as EXAMPLE
+from .sections import LENGTHS, PUBLISHED, SMALL, read
 
 WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])
 CURVES = (
@@ -52,12 +52,20 @@ def fitted(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
     return FittedStrip(strip, MODEL, objective, history(*loads))
 
 
+def prepared(test: Any, strips: list[FittedStrip]) -> Any:
+    return SimpleNamespace(test=test, fitted_strips=lambda _: strips)
+
+
+def findings(test: Any, strips: list[FittedStrip]) -> Any:
+    return report.findings(prepared(test, strips), cast(Any, None))
+
+
 BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
 
 
-def test_findings() -> None:
+def test_findings():
     test: Any = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
-    found = findings_of(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
+    found = findings(test, [fitted(), fitted(BIAS, (200.0, 410.0))])
     rms = np.sqrt(12.5), np.sqrt(50.0)
     warp = {
         "rms_N": pytest.approx(rms[0]), "scatter_N": 7.5, "weight": 1.0, "matched": 2,
@@ -84,10 +92,10 @@ def test_findings() -> None:
         (NoteKind.LEFT_OUT, left_out, "warp"),
     ]
     test.match_by = "polynomial"
-    assert [n.kind for n in findings_of(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
+    assert [n.kind for n in findings(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
 
 
-def test_tables() -> None:
+def test_tables():
     both = [fitted(), fitted(BIAS, (200.0, 410.0))]
     table = misfit_table(both)
     assert table.header == [
@@ -104,7 +112,7 @@ def test_tables() -> None:
     assert loads["direction"].tolist() == ["warp"] * 2 + ["bias"] * 2
     assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
     assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
-    rest = residual_table(both)
+    rest = report.residuals(prepared(None, both), cast(Any, None))
     assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
     assert list(rest.columns) == [
         "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit"
@@ -113,7 +121,7 @@ def test_tables() -> None:
                                      pytest.approx(-4.0), "N"]  # fmt: skip
 
 
-def test_points_of_a_strip_and_those_left_out() -> None:
+def test_points_of_a_strip_and_those_left_out():
     elongation, load = WARP.points
     assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
     assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
@@ -130,7 +138,7 @@ def test_points_of_a_strip_and_those_left_out() -> None:
     assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.beyond == 0
 
 
-def test_lengths_and_noise_of_a_strip() -> None:
+def test_lengths_and_noise_of_a_strip():
     assert WARP.elongation == 4.0 and WARP.strain == pytest.approx(np.log(1.2))
     some = np.array([True, True, True, True, True, False])
     assert WARP.strain_by(some) == WARP.strain
@@ -144,7 +152,7 @@ def test_lengths_and_noise_of_a_strip() -> None:
     assert BIAS.break_shares() is None
 
 
-def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
+def test_breaks_of_a_strip_are_shares_of_its_strain():
     """A load that bends at a quarter and at two thirds of the strain, and one that is cut there."""
     strain = np.log1p(np.linspace(0, 4, 400) / 20.0)
     end = strain[-1]
@@ -156,10 +164,10 @@ def test_breaks_of_a_strip_are_shares_of_its_strain() -> None:
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Any]]:
+def drawn(monkeypatch) -> dict[str, list[Any]]:
     biases: list[Any] = []
-    monkeypatch.setattr(simulated, "draw_bias", lambda *what: biases.append(what))
-    return {"loads": caught(monkeypatch, simulated, "load_charts"), "draw_bias": biases}
+    monkeypatch.setattr(report, "draw_bias", lambda *what: biases.append(what))
+    return {"loads": caught(monkeypatch, report, "load_charts"), "draw_bias": biases}
 
 
 def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = False) -> Any:
@@ -168,10 +176,10 @@ def told(folder: Path, outcomes: dict[tuple[str, str], Any], within: bool = Fals
     law = SimpleNamespace(strain_range=np.array([0.1, 0.1, 0.1]))
     cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
     runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
-    return simulated.simulate(test, cards, runs, Output(folder), within)
+    return report.simulate(test, cards, runs, Output(folder), within)
 
 
-def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
+def test_cards_side_by_side(tmp_path, drawn):
     """The polynomial says 220 and 440 N at 2 and 4 mm."""
     broken = SolverFailure("no equilibrium", "membrane")
     said = told(tmp_path, {
@@ -211,7 +219,7 @@ def test_cards_side_by_side(tmp_path: Path, drawn) -> None:
     assert [call[3].name for call in drawn["draw_bias"]] == ["bias-1.vtu", "bias-2.vtu"]
 
 
-def test_one_card_has_a_sum_and_files_without_a_number(tmp_path: Path, drawn) -> None:
+def test_one_card_has_a_sum_and_files_without_a_number(tmp_path, drawn):
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)})
     assert said.numbers["cards"]["soft"]["e_uniaxial_N"] == pytest.approx(np.sqrt(12.5))
     assert said.lines == ["soft: RMS warp 3.536 N to 4 mm; sum 3.536 N"]
@@ -227,11 +235,11 @@ def test_one_card_has_a_sum_and_files_without_a_number(tmp_path: Path, drawn) ->
     ],
 )  # fmt: skip
 def test_curves_end_where_the_range_of_the_card_does(
-    tmp_path: Path, drawn, monkeypatch: pytest.MonkeyPatch, strains, shown: int
-) -> None:
+    tmp_path, drawn, monkeypatch, strains, shown: int
+):
     """At the first increment nothing is strained, at the second so much."""
     strain = iter([np.zeros((1, 3)), np.array([strains])])
-    monkeypatch.setattr(simulated, "middle_strain", lambda *_: next(strain))
+    monkeypatch.setattr(report, "middle_strain", lambda *_: next(strain))
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     (card,) = said.numbers["cards"].values()
     warp = card["directions"]["warp"]
@@ -243,10 +251,133 @@ def test_curves_end_where_the_range_of_the_card_does(
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
 
 
-def test_a_card_whose_range_ends_at_once(tmp_path: Path, drawn, monkeypatch) -> None:
-    monkeypatch.setattr(simulated, "middle_strain", lambda *_: np.ones((1, 3)))
+def test_a_card_whose_range_ends_at_once(tmp_path, drawn, monkeypatch):
+    monkeypatch.setattr(report, "middle_strain", lambda *_: np.ones((1, 3)))
     said = told(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     warp = said.numbers["cards"]["soft"]["directions"]["warp"]
     assert (warp["shown_to_mm"], warp["rms_N"]) == (0.0, None)
     ((_, _, (panel,)),) = drawn["loads"]
     assert not panel.models
+
+
+WAY_EXAMINED = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
+LOAD = np.array([2.0, 50.0, 90.0, 160.0, 120.0])
+
+
+def test_every_cell(tmp_path):
+    curve = LoadCurve("warp", "W1", WAY_EXAMINED, LOAD, None)
+    line = fit_load_polynomial(np.linspace(0, 6, 9), 30 * np.linspace(0, 6, 9), 1)
+    test = SimpleNamespace(
+        strips={
+            "warp": Strip("warp", 20.0, 24.0, None, (curve,)),
+            "fill": Strip("fill", 25.0, 30.0, line),
+            "bias": Strip("bias", 20.0, 30.0),  # without data
+        }
+    )
+    shown = examine(SimpleNamespace(test=test), Output(tmp_path, "s/"))
+    assert shown.figures == [("s/curves.png", "load curves as they were read")]
+    assert (tmp_path / "s" / "curves.png").is_file()
+    (table,) = shown.tables
+    assert table.header == [
+        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
+        "first load, N", "largest load, N",
+    ]  # fmt: skip
+    first, second = table.rows
+    assert first[:2] == ["warp", "W1"] and second[:2] == ["fill", "polynomial"]
+    assert first[2:] == pytest.approx([5, 0.1, 3.9, np.log(23.9 / 20), 2.0, 160.0])
+    assert second[2:] == pytest.approx([50, 0.0, 5.0, np.log(1.2), 0.0, 150.0])
+    assert (table.title, table.text) == ("Load curves as read", (1,))
+
+
+SHORT = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2])
+LINEAR = HypoelasticLaw.linear(500.0, 200.0, 20.0)
+
+
+@pytest.fixture
+def test(tmp_path) -> StripsTest:
+    (tmp_path / "curves.csv").write_bytes((EXAMPLE / "curves.csv").read_bytes())
+    return read(project_file(tmp_path, PUBLISHED, ("increments = 100", "increments = 10")))
+
+
+def card(name: str, law: HypoelasticLaw) -> MaterialCard:
+    return MaterialCard(law, 0.81, name, "a test")
+
+
+def run(test: StripsTest, cards: Mapping[str, MaterialCard]) -> dict[tuple[str, str], CardRun]:
+    runs = {}
+    for name, own in cards.items():
+        for direction, model in test.models(own.thickness).items():
+            try:
+                outcome = MembraneSolver().run(model, own.law)
+            except SolverFailure as failure:
+                outcome = failure
+            runs[name, direction] = CardRun(model, outcome)
+    return runs
+
+
+def test_two_cards_side_by_side(test, tmp_path):
+    cards = {"table": card("table", replace(SHORT, strain_range=[0.153, 0.232, 0.883])),
+             "linear": card("linear", LINEAR)}  # fmt: skip
+    runs = run(test, cards)
+    told = report.simulate(test, cards, runs, Output(tmp_path / "sim"))
+    assert list(told.numbers["cards"]) == ["table", "linear"]
+    assert [name for name, _ in told.figures] == ["loads.png"]
+    table = told.numbers["cards"]["table"]
+    assert told.lines[0].startswith("table: RMS warp ") and "; sum " in told.lines[0]
+    loads = pd.read_csv(tmp_path / "sim/loads.csv")
+    for direction, strip in test.strips.items():
+        history = runs["table", direction].outcome
+        own = loads[(loads["card"] == "table") & (loads["direction"] == direction)]
+        np.testing.assert_allclose(own["load_N"], history.load)
+        off = history.load - strip.polynomial(own["elongation_mm"].to_numpy())
+        numbers = table["directions"][direction]
+        assert numbers["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2)))
+        assert numbers["end_load_N"] == history.load[-1]
+        assert numbers["shown_to_mm"] == pytest.approx(strip.elongation)
+    total = sum(n["rms_N"] for n in table["directions"].values())
+    assert table["e_uniaxial_N"] == pytest.approx(total)
+    assert {p.name for p in (tmp_path / "sim").iterdir()} == {
+        "loads.csv", "loads.png", "bias-1.png", "bias-1.vtu", "bias-2.png", "bias-2.vtu"
+    }  # fmt: skip
+
+
+def test_within_the_range_of_the_card(test, tmp_path):
+    """A card of small strains: its curves end early, and no sum of errors is made of them."""
+    cards = {"short": card("short", SHORT)}
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"), True)
+    (numbers,) = told.numbers["cards"].values()
+    assert numbers["e_uniaxial_N"] is None
+    for direction, end in (("warp", 0.08), ("fill", 0.1)):
+        shown, start = numbers["directions"][direction]["shown_to_mm"], LENGTHS[direction][0]
+        step = (LENGTHS[direction][1] - start) / 10
+        assert shown <= start * np.expm1(end) < shown + step
+    assert 0 < numbers["directions"]["bias"]["shown_to_mm"] < 5
+
+
+def test_a_card_that_fails_on_a_strip_is_told_as_such(test, tmp_path):
+    beta = np.zeros(12)
+    beta[[3, 7, 10, 11]] = 20.0, 220.0, -5000.0, 300.0  # E1 negative beyond a strain of 0.06
+    cards = {"brittle": card("brittle", HypoelasticLaw(beta)), "good": card("good", LINEAR)}
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim", "one-"))
+    brittle, fine = told.numbers["cards"].values()
+    assert "failed" in brittle["directions"]["warp"] and brittle["e_uniaxial_N"] is None
+    assert brittle["directions"]["fill"]["rms_N"] > 0 and fine["e_uniaxial_N"] > 0
+    text = "\n".join(told.lines)
+    assert "warp failed" in text
+    loads = pd.read_csv(tmp_path / "sim/one-loads.csv")
+    assert set(loads[loads["card"] == "good"]["direction"]) == set(LENGTHS)
+    assert "warp" not in set(loads[loads["card"] == "brittle"]["direction"])
+
+
+def test_without_data_the_loads_at_the_end_are_told(tmp_path):
+    ends = [(f"gauge_length = {a}.0", f"gauge_length = {a}.0\nfinal_length = {a + 1}.0")
+            for a in (20, 22, 19)]  # fmt: skip
+    steps = ("[warp]", "increments = 3\n[warp]")
+    test = read(project_file(tmp_path, SMALL, steps, *ends), need_data=False)
+    cards = {"some": card("some", LINEAR)}
+    told = report.simulate(test, cards, run(test, cards), Output(tmp_path / "sim"))
+    assert "N at the end" in told.lines[0]
+    (numbers,) = told.numbers["cards"].values()
+    assert numbers["e_uniaxial_N"] is None
+    directions = numbers["directions"].values()
+    assert all(n["rms_N"] is None and n["end_load_N"] > 0 for n in directions)

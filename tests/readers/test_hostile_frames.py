@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.readers import hdf5_files, mat_files, npz_files
+from bubblefit.readers import hdf5_files, mat_files
 from bubblefit.readers.fields import read_fields
+from bubblefit.readers.formats import pyaldic as npz_files
+from bubblefit.readers.formats.pyaldic import array_names, read_arrays
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.hdf5_files import array_of, check_readable, member, open_hdf5
 from bubblefit.readers.mat_files import (
@@ -25,7 +27,6 @@ from bubblefit.readers.mat_files import (
     read_variables,
     variable_names,
 )
-from bubblefit.readers.npz_files import array_names, read_arrays
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -96,7 +97,7 @@ def test_garbage_under_every_name_is_refused(tmp_path_factory, name, content):
 class Planted:
     """Unpickled, it leaves a file behind."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path):
         self.path = path
 
     def __reduce__(self):
@@ -217,7 +218,7 @@ def test_what_scipy_writes_is_read(tmp_path_factory, value, compressed):
     assert_same(read_variables(path, ["value"])["value"], value)
 
 
-def assert_same(read, value) -> None:
+def assert_same(read, value):
     if isinstance(value, dict):
         (read,) = read
         assert set(read) == set(value)
@@ -689,7 +690,7 @@ def test_matlab_7_3_by_class_and_by_depth(tmp_path, monkeypatch):
     path = tmp_path / "a.mat"
     with h5py.File(path, "w") as file:
 
-        def write(name: str, data, kind: str, **attributes) -> None:
+        def write(name: str, data, kind: str, **attributes):
             file[name] = data
             file[name].attrs["MATLAB_class"] = np.bytes_(kind)
             for key, value in attributes.items():

@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
-from bubblefit.experiments.strips.polynomials import compare_orders
-from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
-from bubblefit.readers.fields import read_fields
-from bubblefit.readers.frames import FLAGGED, FrameOptions
-from bubblefit.readers.polynomials import (
+from bubblefit.experiments.strips.data import compare_orders
+from bubblefit.readers.curves import (
+    LoadCurve,
     LoadPolynomial,
     fit_load_polynomial,
+    read_load_curves,
     read_published_polynomials,
     specimen_scatter,
+    split_at_restarts,
 )
+from bubblefit.readers.fields import read_fields
+from bubblefit.readers.frames import FLAGGED, FrameOptions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,9 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.materials.designers import shares
-from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
-from bubblefit.readers.biaxial import (
+from bubblefit.experiments.biaxial.data import (
     KNOWN,
     cycles_of,
     evaluated_paths,
@@ -15,6 +13,8 @@ from bubblefit.readers.biaxial import (
     plain_ratio,
     read_biaxial_table,
 )
+from bubblefit.materials.designers import shares
+from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
 from bubblefit.readers.machine_tables import Channel
 from hypothesis import given
 from hypothesis import strategies as st

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.equilibrium import apex_of, apex_shape
-from bubblefit.experiments.strips.polynomials import strain_regions
+from bubblefit.experiments.strips.data import strain_regions
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField, read_fields
 from bubblefit.readers.frames import Frame
-from bubblefit.readers.spheres import _linear, fit_sphere, points_of
 from bubblefit.readers.surfaces import (
     AXES,
     DisplacementSurface,
+    _linear,
+    fit_sphere,
     fit_surface,
+    points_of,
     read_surfaces,
     write_surfaces,
 )

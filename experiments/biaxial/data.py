@@ -1,36 +1,42 @@
-"""One file of a biaxial test: loads per width and strains along both yarns, row by row."""
+"""Data of biaxial tests: files with loads per width and strains along both yarns, their cycles.
+
+A cycle begins where the larger of the two loads turns from falling to rising and ends where it
+does so again. Turns that are small beside the range of the loads are noise or a hold.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..materials.designers import RATIOS, shares
-from .columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
-from .frames import FrameSource
-from .machine_tables import TableOptions, column_of, measured, read_machine_table, source_of
+from ...errors import InputError
+from ...materials.designers import RATIOS, shares
+from ...readers.columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
+from ...readers.frames import FrameSource
+from ...readers.machine_tables import (
+    TableOptions,
+    column_of,
+    measured,
+    read_machine_table,
+    source_of,
+)
 
-#: Those that a pair of loads may be taken for.
+Array = NDArray[np.float64]
+#: Ratios that a pair of loads may be taken for.
 KNOWN = (*RATIOS, "3:1", "1:3", "3:2", "2:3", "4:1", "1:4", "5:1", "1:5")
 #: Degrees between the direction of a pair of loads and that of a ratio: no more than it.
 NEAR = 4.0
 
 
 def plain_ratio(ratio: str) -> str:
-    """The same name for each spelling of a ratio: "2:1" of "2/1", "2.0 : 1" and "4:2".
-
-    Raises
-    ------
-    InputError : no such ratio.
-    """
+    """Return one name for every spelling of a ratio: "2:1" for "2/1", "2.0 : 1" and "4:2"."""
     warp, fill = shares(ratio)
     least = min(x for x in (warp, fill) if x > 0)
     whole = [round(x / least, 3) for x in (warp, fill)]
@@ -41,7 +47,7 @@ def plain_ratio(ratio: str) -> str:
 
 
 def nearest_ratio(loads: Sequence[float]) -> str:
-    """The ratio that loads along warp and fill are of; their own numbers where it is none.
+    """Return the ratio of loads along warp and fill; their own numbers where none is near.
 
     >>> nearest_ratio([30.0, 14.8]), nearest_ratio([25.0, 0.5])
     ('2:1', '1:0')
@@ -60,7 +66,6 @@ def nearest_ratio(loads: Sequence[float]) -> str:
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
 
 
-Array = NDArray[np.float64]
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
 
@@ -70,11 +75,10 @@ QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 @dataclass(frozen=True, eq=False)
 class BiaxialTable:
-    """The rows of a file in their order.
+    """The rows (n,) of a file in their order.
 
-    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the length
-    at the beginning. ratio : (n,) names of load ratios, None where the file has none. lines : (n,)
-    in the file. source : what of it was read.
+    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the first
+    length. ratio : (n,) names, None where the file has none. lines : (n,) in the file.
     """
 
     path: Path
@@ -97,16 +101,8 @@ def read_biaxial_table(
 ) -> BiaxialTable:
     """Read a table; names, units, separator and decimal mark are found as for load curves.
 
-    Parameters
-    ----------
     columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
-        `ratio`, where they are not found by meaning (n_w, eps_f, "Strain fill (%)" are).
-    load_unit, strain_unit : needed where the file names none.
-
-    Raises
-    ------
-    InputError : naming file, line and the columns there are: nothing or several things found for
-        a quantity, no unit or a different one, cells that are not finite numbers, no such ratio.
+    `ratio`. load_unit, strain_unit : where the file names none.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
@@ -130,24 +126,16 @@ def read_biaxial_table(
     ratio = None
     if column["ratio"]:
         cells, lines = found.table.text(column["ratio"]), found.table.lines
-        ratio = tuple(
-            _ratio(path, f"line {line}, column {column['ratio']!r}", cell)
-            for line, cell in zip(lines, cells, strict=True)
-        )
+        names = []
+        for line, cell in zip(lines, cells, strict=True):
+            try:
+                names.append(plain_ratio(cell))
+            except InputError as error:
+                at = f"line {line}, column {column['ratio']!r}"
+                raise InputError(path, at, error.problem) from None
+        ratio = tuple(names)
     return BiaxialTable(path, load, strain, ratio, found.table.lines, source)
 
-
-def _ratio(path: Path, at: str, cell: str) -> str:
-    try:
-        return plain_ratio(cell)
-    except InputError as error:
-        raise InputError(path, at, error.problem) from None
-
-
-# The cycles of a biaxial test: where each is loaded from, how far, and of which ratio it is.
-#
-# A cycle begins where the larger of the two loads turns from falling to rising and ends where it
-# does so again. Turns that are small beside the range of the loads are noise or a hold.
 
 #: Of the range of loads of a phase: a smaller turn is none.
 TURN = 0.2
@@ -158,11 +146,10 @@ HOLD = 0.01
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle, by rows of the test.
+    """One cycle, by rows of the test; numbers are from 1.
 
-    ratio : "2:1". phase : number, from 1, of the row of cycles of one ratio that it is in; number :
-    from 1, within its phase; count : from 1, in the whole test. first : row from which the
-    fabric is loaded; last : row at which it is loaded most (both are of the loading).
+    phase : of consecutive cycles of one ratio. number : within its phase. count : in the whole
+    test. first, last : rows where the loading begins and is highest.
     """
 
     ratio: str
@@ -174,50 +161,41 @@ class Cycle:
 
     @property
     def rows(self) -> slice:
-        """Of the loading."""
+        """Return the rows of the loading."""
         return slice(self.first, self.last + 1)
 
 
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
-    """The cycles in their order.
+    """Return the cycles in their order.
 
-    Parameters
-    ----------
-    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; where there are none,
-        that of the loads at the top of a cycle.
+    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; else by the loads at the
+    top.
     """
     larger = np.asarray(load).max(axis=1)
     cycles: list[Cycle] = []
     for label, start, stop in _stretches(len(larger), labels):
         for first, last in _loadings(larger[start:stop]):
-            ratio = label or nearest_ratio(load[start + last] - _base(load, start + first))
-            same = bool(cycles) and cycles[-1].ratio == ratio
-            before = cycles[-1] if cycles else None
-            phase = 1 if before is None else before.phase + (0 if same else 1)
-            number = before.number + 1 if before is not None and same else 1
+            # A prestress has no ratio of its own: what is below it does not count.
+            own = np.asarray(load[start + first])
+            ratio = label or nearest_ratio(load[start + last] - np.minimum(own, own.min()))
+            phase, number = 1, 1
+            if cycles:
+                same = cycles[-1].ratio == ratio
+                phase = cycles[-1].phase + (0 if same else 1)
+                number = cycles[-1].number + 1 if same else 1
             cycles.append(Cycle(ratio, phase, number, len(cycles) + 1, start + first, start + last))
     return cycles
-
-
-def _base(load: Array, row: int) -> Array:
-    """A prestress has no ratio of its own: what is below it does not count."""
-    return np.asarray(np.minimum(load[row], load[row].min()))
 
 
 def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | None, int, int]]:
     if labels is None:
         return [(None, 0, count)]
-    found: list[tuple[str | None, int, int]] = []
-    start = 0
-    for label, same in groupby(labels):
-        stop = start + len(list(same))
-        found.append((label, start, stop))
-        start = stop
-    return found
+    turns = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+    return [(labels[a], a, b) for a, b in pairwise([0, *turns, count])]
 
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
-    """First and last row of every loading in loads (n,)."""
+    """Return first and last row of every loading in loads (n,)."""
     least = TURN * float(np.ptp(s)) if len(s) else 0.0
     if not least > 0:
         return []
@@ -231,7 +209,7 @@ def _loadings(s: Array) -> list[tuple[int, int]]:
 
 
 def _rises(s: Array, least: float) -> list[tuple[int, int]]:
-    """Rows of a valley and of the peak after it, for each rise of more than `least`."""
+    """Return rows of a valley and of the peak after it, for each rise of more than `least`."""
     found, low, high, rising = [], 0, 0, False
     for i in range(len(s)):
         if rising:
@@ -255,9 +233,8 @@ Which = int | Literal["last"]
 class BiaxialPath:
     """The loading of one cycle.
 
-    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file, change
-    of length over the length there. residual : (2,) strain at the beginning of the loading, of the
-    same beginning. cycles : how many the phase has.
+    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file. cycles
+    : number in the phase.
     """
 
     table: BiaxialTable
@@ -267,28 +244,28 @@ class BiaxialPath:
     strain: Array
 
     @property
+    def larger(self) -> Array:
+        """Return the larger load of every row, (n,) N/mm."""
+        return np.asarray(self.load.max(axis=1))
+
+    @property
     def ratio(self) -> str:
-        """Of the loads."""
+        """Return the ratio of the loads."""
         return self.cycle.ratio
 
     @property
     def residual(self) -> Array:
-        """(2,) strain at the beginning of the loading."""
+        """Return (2,) strain at the beginning of the loading."""
         return np.asarray(self.strain[0] - self.table.strain[0])
 
     @property
     def since(self) -> Array:
-        """(n, 2) strain since the beginning of the loading."""
+        """Return (n, 2) strain since the beginning of the loading."""
         return np.asarray(self.strain - self.strain[0])
 
     def between(self, lowest: float, highest: float) -> BiaxialPath:
-        """The rows whose larger load (N/mm) lies between two.
-
-        Raises
-        ------
-        InputError : fewer than two of them.
-        """
-        larger = self.load.max(axis=1)
+        """Return the rows whose larger load (N/mm) lies between two."""
+        larger = self.larger
         keep = (larger >= lowest * (1 - 1e-9)) & (larger <= highest * (1 + 1e-9))
         if keep.sum() < 2:
             problem = (
@@ -299,10 +276,10 @@ class BiaxialPath:
         return replace(self, load=self.load[keep], strain=self.strain[keep])
 
     def thinned(self, most: int) -> BiaxialPath:
-        """At most so many rows, evenly spread over the larger load, both ends among them."""
+        """Return at most so many rows, evenly spread over the larger load, both ends among them."""
         if len(self.load) <= most:
             return self
-        larger = np.maximum.accumulate(self.load.max(axis=1))
+        larger = np.maximum.accumulate(self.larger)
         wanted = np.linspace(larger[0], larger[-1], most)
         rows = np.unique(np.clip(np.searchsorted(larger, wanted), 0, len(larger) - 1))
         rows[-1] = len(larger) - 1
@@ -310,12 +287,7 @@ class BiaxialPath:
 
 
 def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:
-    """The cycles of each file; named : the ratio that a file is listed for, None for none.
-
-    Raises
-    ------
-    InputError : a file without a cycle.
-    """
+    """Return the cycles of each file; `named` holds the ratio that each is listed for, or None."""
     found = []
     for table, name in zip(tables, named, strict=True):
         labels = [name] * len(table.load) if name is not None else table.ratio
@@ -333,18 +305,10 @@ def evaluated_paths(
     conditioning: int = 0,
     ratios: Collection[str] | None = None,
 ) -> list[BiaxialPath]:
-    """Of each ratio the loading of one cycle, in the order of `RATIOS`, then by name.
+    """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
 
-    Of a ratio that comes several times, the first time after the conditioning counts.
-
-    Parameters
-    ----------
-    which : of the cycles of a ratio. conditioning : cycles at the beginning of each file that
-        count for nothing. ratios : those that are wanted; all unless given.
-
-    Raises
-    ------
-    InputError : a ratio that is wanted and is not there, or has not so many cycles.
+    Of a ratio that comes several times, the first phase after the conditioning (cycles at the
+    beginning of each file) counts. ratios : those wanted; all unless given.
     """
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):

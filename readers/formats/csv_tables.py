@@ -1,6 +1,8 @@
-"""Load polynomials as a comma-separated table, a row a direction.
+"""Plain tables with a row of names: frames (a row a point), load polynomials (a row a direction).
 
-Columns direction, gauge_length_mm, final_length_mm, c1, c2 ...; c0 and data_scatter_N may be there.
+Of frames, separator, decimal mark, rows of names and of units are found (`text_frames`). Load
+polynomials have the columns direction, gauge_length_mm, final_length_mm, c1, c2 ... and perhaps c0,
+data_scatter_N.
 """
 
 from __future__ import annotations
@@ -11,20 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ..curves import direction_named
-from ..polynomials import LoadPolynomial, PublishedPolynomial
+from ..curves import LoadPolynomial, PublishedPolynomial, direction_named
 from ..registry import Format, register_format
 from ..tables import TextTable, read_table
+from ..text_frames import text_reader
+
+register_format(Format("csv", "frame", "columns of text in any dialect", text_reader("csv")))
 
 
-def read(path: Path) -> dict[str, PublishedPolynomial]:
-    """A polynomial a direction; load in N, elongation in mm, of the full strip.
-
-    Raises
-    ------
-    InputError : naming file, line and column: missing columns, powers left out, cells that are not
-        finite numbers, an unknown direction or one given twice, lengths that do not grow.
-    """
+def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
+    """Read a polynomial a direction; load in N, elongation in mm, of the full strip."""
     table = read_table(path)
     names = [str(name) for name in table.cells.columns]
     found = {int(name[1:]) for name in names if re.fullmatch(r"c\d{1,2}", name)}
@@ -56,4 +54,6 @@ def _direction(table: TextTable, row: int, before: dict[str, PublishedPolynomial
     return direction
 
 
-register_format(Format("csv", "load polynomials", "columns direction, lengths, c1, c2 ...", read))
+register_format(
+    Format("csv", "load polynomials", "columns direction, lengths, c1, c2 ...", read_polynomials)
+)
