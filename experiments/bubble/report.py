@@ -46,6 +46,7 @@ from .findings import (
     sheet_lines,
     used_of,
 )
+from .findings import findings as findings
 from .forward import apex_heights, at_nodes, inflated_sheets
 from .objective import displacement_offset
 from .point_files import PointFiles, RecordedFrames
