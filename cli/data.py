@@ -28,7 +28,7 @@ from ..readers.spheres import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save
-from ..runs.check import check
+from ..runs.fit import check
 from ..writing import replacing
 from .options import (
     DATA,

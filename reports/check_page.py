@@ -9,7 +9,7 @@ from pathlib import Path
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
 from ..files import __version__
-from ..runs.check import Check
+from ..runs.fit import Check
 from ..writing import write_text
 from .content import Exhibit, Report, Section, Table
 from .html import write_report

@@ -24,10 +24,10 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
+from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Store
 from .presenters import write_report
-from .refound import Card, Refound, refound
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
@@ -62,7 +62,7 @@ class BootstrapRecord:
     folder : None where nothing is written. resume : go on with what it holds.
     """
 
-    def __init__(self, folder: Path | None, found: Refound, over: str, resume: bool) -> None:
+    def __init__(self, folder: Path | None, found: Optimum, over: str, resume: bool) -> None:
         at = [f"{value:.6g}" for value in found.point.unknowns]
         parts = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
         self._mark = mark_of(parts)
@@ -110,7 +110,7 @@ class Bootstrap:
         analyses that were needed before the first sample.
     """
 
-    found: Refound
+    found: Optimum
     over: str
     groups: Sequence[Group]
     samples: Sequence[Sample]
@@ -330,7 +330,7 @@ def bootstrap(
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")
     project = project.with_fit(seed=seed)
-    found = refound(project, card, tests)
+    found = find_optimum(project, card, tests)
     groups = groups_of(found, over)
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -351,7 +351,7 @@ def bootstrap(
     return Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before)
 
 
-def groups_of(found: Refound, over: str) -> list[Group]:
+def groups_of(found: Optimum, over: str) -> list[Group]:
     """The units that are drawn, and among which.
 
     Raises
@@ -361,7 +361,7 @@ def groups_of(found: Refound, over: str) -> list[Group]:
     return _tests(found) if over == TESTS else _parts(found, over)
 
 
-def _tests(found: Refound) -> list[Group]:
+def _tests(found: Optimum) -> list[Group]:
     """Tests among those of their kind."""
     setup, problem = found.setup, found.problem
     numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
@@ -378,7 +378,7 @@ def _tests(found: Refound) -> list[Group]:
     return several
 
 
-def _parts(found: Refound, sort: str) -> list[Group]:
+def _parts(found: Optimum, sort: str) -> list[Group]:
     """Parts of tests: among those of their comparison, whole comparisons among those of the test.
 
     Specimens are so drawn direction by direction.
@@ -397,7 +397,7 @@ def _parts(found: Refound, sort: str) -> list[Group]:
     return several
 
 
-def _task(found: Refound, groups: Sequence[Group], seed: int) -> Task:
+def _task(found: Optimum, groups: Sequence[Group], seed: int) -> Task:
     problem = found.setup.problem()
     # With derivatives, from the unloaded state: every sample starts from here.
     point = problem.evaluate(found.point.unknowns, True, warm=False)

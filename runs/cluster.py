@@ -23,15 +23,16 @@ from typing import Any
 import cloudpickle
 from threadpoolctl import threadpool_limits
 
-from .. import __version__
 from ..errors import BubblefitError, InputError
+from ..files import __version__
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import Unwanted, unless
 from ..solvers.scheduler import ANSWER_S, connected
-from .executor import Task
 
 log = logging.getLogger(__name__)
+#: Does the task of a number; what it reports on the way and what it returns are records.
+Task = Callable[[int, Callable[[Any], None]], Any]
 #: s between two looks at who is there, and to an event.
 LOOK_S, WAIT_S = 1.0, 0.5
 #: s for the result of a task that has ended to come here.

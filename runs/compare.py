@@ -23,12 +23,11 @@ from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import executor_of
-from .fit import FitEvent
+from .fit import FitEvent, stored_fit
 from .presenters import write_report
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
-from .stored_fit import stored_fit
 
 #: Of a spline, where neither the project nor the caller says how many.
 KNOTS = 6

@@ -2,7 +2,7 @@
 
 The processes are not a pool of concurrent.futures or loky: those pools need the semaphores of
 /dev/shm, end every task when one process dies, and hang when a process is killed while it writes.
-Here every process has a pipe of its own and nothing is shared (tests/fits/test_processes.py).
+Here every process has a pipe of its own and nothing is shared (tests/runs/test_processes.py).
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ from ..inference.problem import FitProblem
 from ..project.project import Project
 from ..reading import process_context
 from ..solvers.base import Announcement, announce, hearing, pass_on
+from ..solvers.scheduler import check as check_scheduler
 from ..solvers.scratch import remove_interrupted, sweep_left
+from . import cluster
+from .cluster import Task
 from .starts import EvaluationRecord, MeshName, StartRecord, run_start
 
 Record = EvaluationRecord | StartRecord
-#: Does the task of a number; what it reports on the way and what it returns are records.
-Task = Callable[[int, Callable[[Any], None]], Any]
 #: Makes the record of a task that nobody could do, of its number and why.
 Lost = Callable[[int, str], Any]
 #: s between two looks of a process that waits, and at the parent.
@@ -72,9 +73,7 @@ class Executor:
         InputError : no scheduler answers, or Dask is not installed.
         """
         if self.scheduler is not None:
-            from ..solvers.scheduler import check
-
-            check(self.scheduler)
+            check_scheduler(self.scheduler)
 
     def run_tasks(
         self,
@@ -98,8 +97,6 @@ class Executor:
         """
         if self.scheduler is None:
             return run_tasks(prepare, numbers, self.jobs or cores(), what)
-        from . import cluster
-
         return cluster.run_tasks(prepare, numbers, self.scheduler, self.jobs, what, lost)
 
     def run_starts(

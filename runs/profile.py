@@ -26,9 +26,9 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
+from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .presenters import write_report
-from .refound import Card, Refound, refound
 from .setup import FitSetup
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ def profile(
     SolverFailure : the tests cannot be run with the card.
     """
     asked = _asked(moduli)
-    found = refound(project, card, tests)
+    found = find_optimum(project, card, tests)
     places = _places(found, asked)
     numbers = list(range(len(SIGNS) * len(places)))
     prepare = functools.partial(_task, found, places)
@@ -323,7 +323,7 @@ def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float
     return asked or {name: [] for name in COMPONENTS}
 
 
-def _places(found: Refound, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
+def _places(found: Optimum, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
     places = []
     for name, strains in asked.items():
         component = COMPONENTS[name]
@@ -336,7 +336,7 @@ def _places(found: Refound, asked: Mapping[str, Sequence[float]]) -> list[tuple[
     return places
 
 
-def _task(found: Refound, places: Sequence[tuple[str, float]]) -> Task:
+def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
     # Of the setup, which every process has anew: solvers are no one else's.
     setup: FitSetup = found.setup
     problem = setup.problem()
@@ -357,7 +357,7 @@ def _task(found: Refound, places: Sequence[tuple[str, float]]) -> Task:
     return side
 
 
-def _profile(found: Refound, name: str, strain: float, below: Side, above: Side) -> Profile:
+def _profile(found: Optimum, name: str, strain: float, below: Side, above: Side) -> Profile:
     unknowns = found.problem.unknowns
     row = modulus_row(unknowns, name, strain)
     band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]

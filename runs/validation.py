@@ -36,12 +36,11 @@ from ..writing import replacing
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
-from .fit import FitEvent
+from .fit import FitEvent, stored_fit
 from .folder import Store
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
-from .stored_fit import stored_fit
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,11 +18,10 @@ from ..notes import Note, NoteKind, rows, write_notes
 from ..project.project import Project
 from ..writing import replacing
 from .compare import errors
-from .fit import FitEvent
+from .fit import FitEvent, stored_fit
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints
-from .stored_fit import stored_fit
 
 if TYPE_CHECKING:
     import pandas as pd

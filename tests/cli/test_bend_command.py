@@ -240,7 +240,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path, monkeypatc
     table = pd.read_csv(tmp_path / "failed" / "runs.csv")
     assert table["ended"].tolist() == ["failed: made to fail", "finished"] * 2
 
-    # tests/fits/test_predictions.py draws those that stop.
+    # tests/runs/test_predictions.py draws those that stop.
     monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]

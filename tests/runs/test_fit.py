@@ -26,8 +26,7 @@ from bubblefit.reports.content import Exhibit, Report, Table, read_page_data
 from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
-from bubblefit.runs.check import Check
-from bubblefit.runs.fit import fit
+from bubblefit.runs.fit import Check, fit
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.runs.presenters import PRESENTERS
 from bubblefit.runs.result import notes_of_fit

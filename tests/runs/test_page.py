@@ -39,8 +39,8 @@ from bubblefit.reports.fit_page import (
     two_digits,
 )
 from bubblefit.reports.html import number, percent
-from bubblefit.runs.check import expected_of
 from bubblefit.runs.executor import cores
+from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import write_table
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.runs.record import versions

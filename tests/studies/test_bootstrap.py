@@ -115,7 +115,7 @@ def test_frames_drawn_again(tmp_path):
     project = read_project(project_file(tmp_path, text)).with_fit(jobs=1)
     law = HypoelasticLaw.linear(790.0, 395.0, 85.0, 0.24)
     card = MaterialCard(law, 0.81, "near")
-    found = module.refound(project, card, None)
+    found = module.find_optimum(project, card, None)
     (group,) = module.groups_of(found, "frames")
     assert [u.name.split(": ")[-1] for u in group.units] == ["22 kPa", "40 kPa", "59 kPa"]
     problem = found.problem
@@ -181,7 +181,7 @@ def test_what_cannot_be_meant(tmp_path, given, said):
 
 def test_values_of_no_known_part(tmp_path):
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
-    problem = module.refound(project, CARD, "one").problem
+    problem = module.find_optimum(project, CARD, "one").problem
     (warp, _) = problem.comparisons
     warp.objective = SimpleNamespace(sizes=warp.objective.sizes)
     with pytest.raises(InputError, match="--over: one: warp does not tell which"):

@@ -15,7 +15,7 @@ from bubblefit.materials.designers import shares
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations
 from bubblefit.notes import NoteKind
-from bubblefit.runs.check import check
+from bubblefit.runs.fit import check
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import simulate_cards
 
