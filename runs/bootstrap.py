@@ -277,13 +277,7 @@ class Bootstrap:
         return [*told, *note_lines(self.notes)]
 
     def write(self, folder: Path | str) -> None:
-        """Write bootstrap.csv, coefficients.csv, bootstrap.png, report.html, notes.csv and, last,
-        result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write all files and the page into a folder; raises OutputError."""
         write_report(self, folder)
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 from .stored_fit import stored_fit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Of a spline, where neither the project nor the caller says how many.
 KNOTS = 6
@@ -315,14 +318,59 @@ class LawComparison:
         """Everything in plain values: what result.json holds."""
         return result_of(self)
 
-    def report(self, folder: Path | str) -> Path:
-        """Write comparison.csv, figures, report.html and, last, result.json; the page's path.
+    def table(self) -> pd.DataFrame:
+        """Return a row a form: errors of the fit and at points left out, also by comparison."""
+        import pandas as pd
 
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        return write_report(self, folder)
+        rows = []
+        for form in self.forms:
+            units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
+            fitted = {f"rms {name}, {units[name]}": e for name, e in form.rms.items()}
+            left = {
+                f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
+                for name in form.compared
+            }
+            rows.append(
+                {
+                    "moduli": form.name,
+                    "coefficients": form.coefficients,
+                    "fitted": form.fitted,
+                    "cross_validated": form.validated,
+                    **fitted,
+                    **left,
+                }
+            )
+        return pd.DataFrame(rows)
+
+    def lines(self) -> list[str]:
+        """Return a table for the terminal, and the conclusion."""
+        result = self.result
+        lines = [
+            f"error: {result['objective_is']}",
+            f"{'moduli':<12}{'coefficients':>13}{'fitted':>12}{'cross-validated':>18}",
+        ]
+        for form in result["forms"]:
+            error = form["cross_validated"]
+            validated = "a fold failed" if error is None else f"{error:.4g}"
+            lines.append(
+                f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
+            )
+        return [*lines, f"the data's own noise: {result['noise']:.4g}", *self.conclusion]
+
+    @property
+    def conclusion(self) -> list[str]:
+        """The best form, and the simplest that is as good; empty where every form lost a fold."""
+        result = self.result
+        if result["simplest_as_good"] is None:
+            return []
+        return [
+            f"least at specimens left out: {result['least_cross_validated']}; simplest within "
+            f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
+        ]
+
+    def write(self, folder: Path | str) -> None:
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
 
 
 def compare_laws(

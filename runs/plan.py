@@ -219,12 +219,7 @@ class Plan:
         return [*told, ASSUMED, *note_lines(self.notes)]
 
     def write(self, folder: Path | str) -> None:
-        """Write plan.csv, plan.png, report.html, notes.csv and, last, result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write all files and the page into a folder; raises OutputError."""
         write_report(self, folder)
 
 

@@ -17,6 +17,7 @@ from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
+from .presenters import write_report
 from .series import (
     Part,
     Series,
@@ -25,7 +26,6 @@ from .series import (
     parts_of,
     studied_tests,
     thickness_notes,
-    write_study,
 )
 from .simulation import Progress
 
@@ -167,32 +167,8 @@ class Nu12Study:
         return [*of_parts, *self.warnings]
 
     def write(self, folder: Path | str) -> None:
-        """Write nu12.csv, nu12.png, notes.csv and result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        from ..reports.studies import nu12_charts
-        from ..reports.vega import save
-
-        panels = {
-            name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
-            for name, part in self.parts.items()
-        }
-        title = f"{self.project.name}: what nu12 changes"
-        charts = nu12_charts(panels, self.base, self.response, title)
-        write_study(
-            Path(folder),
-            "nu12",
-            self.table(),
-            lambda path: save(path, charts),
-            self.result,
-            self.notes,
-            title,
-            self.lines(),
-            [charts],
-        )
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
 
 
 def vary_nu12(

@@ -16,13 +16,17 @@ from ..errors import NoFeasibleStart, OutputError, SolverFailure
 
 #: Module of `reports` and its function, by the type of the result.
 PRESENTERS = {
-    "Bootstrap": ("bootstrap_page", "write_bootstrap"),
-    "Check": ("check_page", "write_check"),
-    "LawComparison": ("law_page", "write_comparison"),
+    "Bootstrap": ("study_pages", "write_bootstrap"),
+    "Check": ("run_pages", "write_check"),
     "Fit": ("fit_page", "write_fit"),
-    "Plan": ("plan_page", "write_plan"),
-    "Predictions": ("prediction_page", "write_predictions"),
-    "Profiles": ("profile_page", "write_profiles"),
+    "LawComparison": ("study_pages", "write_comparison"),
+    "Nu12Study": ("study_pages", "write_nu12"),
+    "Plan": ("study_pages", "write_plan"),
+    "Predictions": ("run_pages", "write_predictions"),
+    "Profiles": ("study_pages", "write_profiles"),
+    "Refinement": ("study_pages", "write_refinement"),
+    "Validation": ("study_pages", "write_validation"),
+    "WeightStudy": ("study_pages", "write_weights"),
 }
 
 

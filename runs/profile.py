@@ -236,12 +236,7 @@ class Profiles:
         return [*told, f"{self.analyses} analyses", *note_lines(self.notes)]
 
     def write(self, folder: Path | str) -> None:
-        """Write profile.csv, profile.png, report.html, notes.csv and, last, result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write all files and the page into a folder; raises OutputError."""
         write_report(self, folder)
 
 

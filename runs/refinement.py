@@ -22,6 +22,7 @@ from ..notes import Note, NoteKind, as_note, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
+from .presenters import write_report
 from .series import (
     Part,
     Series,
@@ -30,14 +31,11 @@ from .series import (
     parts_of,
     studied_tests,
     thickness_notes,
-    write_study,
 )
 from .simulation import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from ..reports.studies import ConvergencePanel
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
@@ -125,28 +123,8 @@ class Refinement:
         return [*notes, *self.warnings]
 
     def write(self, folder: Path | str) -> None:
-        """Write convergence.csv, convergence.png, notes.csv and result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        from ..reports.studies import convergence_charts
-        from ..reports.vega import save
-
-        drawn, title = panels(self), f"{self.project.name}: finer and finer {self.what}"
-        charts = convergence_charts(drawn, self.what, title)
-        write_study(
-            Path(folder),
-            "convergence",
-            self.table(),
-            lambda path: save(path, charts),
-            self.result,
-            self.notes,
-            title,
-            self.lines(),
-            [charts],
-        )
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
 
 
 def refine(
@@ -459,33 +437,6 @@ def table(study: Refinement) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def panels(study: Refinement) -> list[ConvergencePanel]:
-    """What the figure shows: relative changes from each level to the next finer one."""
-    from ..reports.studies import ConvergencePanel
-
-    drawn = []
-    for name, runs in study.runs.items():
-        good = ended(runs)
-        changes: dict[str, list[float]] = {}
-        for quantity, last in (_values(good[-1]) if good else {}).items():
-            seen = np.array([_values(run).get(quantity, np.nan) for run in good])
-            changes[quantity] = (100 * np.abs(np.diff(seen) / last)).tolist()
-        rms = rms_changes(runs)
-        if rms:
-            largest = _largest(good)
-            changes["RMS along the load curve"] = [100 * r / largest for r in rms]
-        drawn.append(
-            ConvergencePanel(
-                name,
-                [run.level.size for run in good],
-                changes,
-                [run.level.elements * run.level.part.increments for run in good],
-                [run.seconds for run in good],
-            )
-        )
-    return drawn
-
-
 def rms_changes(runs: Sequence[LevelRun]) -> list[float]:
     """RMS between the curves of each level that ended well and the next finer one."""
     curves = [run.curve for run in ended(runs) if run.curve is not None]
@@ -505,7 +456,7 @@ def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
     }
     changes = rms_changes(runs)
     if changes:
-        sizes, largest = [run.level.size for run in good], _largest(good)
+        sizes, largest = [run.level.size for run in good], largest_load(good)
         clear = min(changes[-2:]) > noise * largest
         order = observed_order(sizes[-3:], changes[-2:]) if len(changes) > 1 and clear else None
         said["rms_N"] = {"to_next_finer": changes, "largest_load": largest, "order": order}
@@ -547,7 +498,7 @@ def _values(run: LevelRun) -> Mapping[str, float]:
     return run.values or {}
 
 
-def _largest(good: Sequence[LevelRun]) -> float:
+def largest_load(good: Sequence[LevelRun]) -> float:
     """Largest load of the finest level's curve."""
     curve = good[-1].curve
     assert curve is not None

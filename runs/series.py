@@ -9,95 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import pandas as pd
-
 from ..errors import InputError
 from ..experiments.kinds import Refined, Studied, Test, notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import NOTES, NOTES_ARE, Note, write_notes
+from ..notes import Note
 from ..project.cards import FITTED, usual_folder
 from ..project.project import Project, chosen_cards
-from ..reports.charts import Charts
-from ..reports.content import Listing, Picture, Report, Section, Table
-from ..reports.fit_page import citation
-from ..reports.html import write_report
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from ..writing import replacing, write_text
-from .folder import RESULT, Store
+from .folder import Store
 from .simulation import Analyses, Progress
-
-#: Of every study's page, after what is its own.
-FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
-
-
-def write_folder(
-    folder: Path,
-    tables: Mapping[str, pd.DataFrame],
-    figures: Mapping[str, Callable[[Path], object]],
-    notes: Sequence[Note],
-    page: Report,
-    result: Mapping[str, Any],
-    digits: int | None = None,
-) -> Path:
-    """Write everything; the page's path.
-
-    Parameters
-    ----------
-    tables : by the names of their files. figures : what draws each, by the name of its file.
-    digits : significant ones of the tables' numbers, all unless given.
-
-    Raises
-    ------
-    OutputError : a file cannot be written.
-    """
-    if (folder / RESULT).exists():  # what is half written has none
-        (folder / RESULT).unlink()
-    form = None if digits is None else f"%.{digits}g"
-    for name, table in tables.items():
-        with replacing(folder / name) as path:
-            table.to_csv(path, index=False, float_format=form, lineterminator="\n")
-    for name, draw in figures.items():
-        draw(folder / name)
-    write_notes(folder, notes)
-    written = write_report(folder, page)
-    write_text(folder / RESULT, json.dumps(result, indent=1) + "\n")
-    return written
-
-
-def study_page(
-    title: str,
-    said: Sequence[str],
-    table: pd.DataFrame,
-    table_file: str,
-    notes: Sequence[Note],
-    figure: str | None = None,
-    charts: Sequence[Charts] = (),
-) -> Report:
-    """The page. said : the lines of the terminal. figure : a picture in the folder, which stands in
-    the page unless charts do.
-    """
-    from pandas.api.types import is_numeric_dtype
-
-    words = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
-    shown = Table("The numbers", list(table.columns), table.to_numpy(object).tolist(), text=words)
-    return Report(
-        title=title,
-        warnings=[note.line for note in notes],
-        sections=[
-            Section("What it comes to", [Listing("\n".join(said))] if said else []),
-            Section("Figure", charts or ([Picture(figure, title)] if figure else [])),
-            Section("The numbers", [shown]),
-            Section("How to cite", citation()),
-        ],
-        files=[
-            (table_file, "the table"),
-            *([(figure, "picture of the charts")] if figure else []),
-            *FILES,
-        ],
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,30 +168,6 @@ def card_words(card: MaterialCard | Path | str) -> str:
 def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
     """The card's thickness where it is not the fabric's: the card's counts."""
     return other_thickness(card, project.fabric.thickness)
-
-
-def write_study(
-    folder: Path,
-    name: str,
-    table: pd.DataFrame,
-    draw: Callable[[Path], Any],
-    result: Mapping[str, Any],
-    notes: Sequence[Note],
-    title: str = "",
-    said: Sequence[str] = (),
-    charts: Sequence[Charts] = (),
-) -> None:
-    """Write the table NAME.csv, the figure NAME.png, notes.csv, the page and, last, result.json.
-
-    title : of the page; said : the lines of the terminal. charts : what the figure shows.
-
-    Raises
-    ------
-    OutputError : the folder cannot be written.
-    """
-    file, figure = f"{name}.csv", f"{name}.png"
-    page = study_page(title or name, said, table, file, notes, figure, charts)
-    write_folder(folder, {file: table}, {figure: draw}, notes, page, result)
 
 
 T = TypeVar("T")

@@ -30,14 +30,13 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, rows, write_notes
+from ..notes import Note, NoteKind, rows
 from ..project.project import Project
-from ..writing import replacing
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
 from .fit import FitEvent
-from .folder import Store
+from .presenters import write_report
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -160,9 +159,6 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
     return notes
 
 
-TABLE = "validation.csv"
-
-
 @dataclass(frozen=True, eq=False)
 class Judged:
     """One law at one test.
@@ -261,36 +257,25 @@ class Validation:
             said.append(f"foretells best: {min(means, key=means.__getitem__)}")
         return said
 
-    def _shown(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
+    def errors(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
         """Names of the tests or parts; by law the errors there, foretold and fitted."""
         names = list(dict.fromkeys(one.foretold.test for one in self.judged))
         laws = dict.fromkeys(one.law for one in self.judged)
         of = {(one.law, one.foretold.test): one for one in self.judged}
 
-        def errors(law: str, fitted: bool) -> list[float]:
+        def of_law(law: str, fitted: bool) -> list[float]:
             found = [of.get((law, name)) for name in names]
             return [
                 np.nan if one is None else _relative(one.fitted if fitted else one.foretold)
                 for one in found
             ]
 
-        after = {law: own for law in laws if np.isfinite(own := errors(law, True)).any()}
-        return names, {law: errors(law, False) for law in laws}, after
+        after = {law: own for law in laws if np.isfinite(own := of_law(law, True)).any()}
+        return names, {law: of_law(law, False) for law in laws}, after
 
-    def write(self, folder: Path) -> None:
-        """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
-        from ..reports.html import write_report
-        from ..reports.studies import held_out_charts
-        from .series import study_page
-
-        with replacing(folder / TABLE) as path:
-            self.table().to_csv(path, index=False, float_format="%.9g")
-        write_notes(folder, self.notes)
-        title = f"{self.title}: does a fit foretell what it was not given?"
-        charts = held_out_charts(*self._shown(), "Errors at what a fit was not given, and was")
-        said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_report(folder, study_page(*said, charts=[charts]))
-        Store(folder).finish(self.result)
+    def write(self, folder: Path | str) -> None:
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
 
 
 def _relative(one: HeldOut | None) -> float:

@@ -14,11 +14,11 @@ from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, rows, write_notes
+from ..notes import Note, NoteKind, rows
 from ..project.project import Project
-from ..writing import replacing
 from .compare import errors
 from .fit import FitEvent
+from .presenters import write_report
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints
@@ -86,7 +86,6 @@ def _by_count(content: dict[str, Any]) -> dict[float, dict[str, Any]]:
     return {row["count"]: WeightedFit(**row).to_json() for row in content["runs"]}
 
 
-TABLE, FIGURE = "weights.csv", "weights.png"
 ERROR = "mean relative RMS error of a test"
 
 
@@ -205,38 +204,9 @@ class WeightStudy:
             said.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
         return said
 
-    def write(self, folder: Path) -> None:
-        """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
-        from ..reports.charts import Charts
-        from ..reports.html import write_report
-        from ..reports.studies import weights_charts
-        from ..reports.vega import save
-        from .folder import Store
-        from .series import study_page
-
-        with replacing(folder / TABLE) as path:
-            self.table().to_csv(path, index=False, float_format="%.9g")
-        shown = (
-            self.counted,
-            [run.count for run in self.ended],
-            {name: [run.relative[name] for run in self.ended] for name in self.ended[0].relative},
-            {
-                name: {
-                    self.strain(name, place): [run.moduli[name][k] for run in self.ended]
-                    for k, place in enumerate(PLACES)
-                }
-                for name in COMPONENTS
-            },
-            {name: self.sigma(name) for name in COMPONENTS},
-        )
-        parts = weights_charts(*shown)
-        every = [chart for part in parts for chart in part.charts]
-        save(folder / FIGURE, Charts("weights", every, "", columns=2))
-        write_notes(folder, self.notes)
-        title = f"{self.title}: the weight of {self.counted}"
-        said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_report(folder, study_page(*said, FIGURE, parts))
-        Store(folder).finish(self.result)
+    def write(self, folder: Path | str) -> None:
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
 
 
 STARTS = 5
