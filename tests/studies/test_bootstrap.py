@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,8 +12,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
-from bubblefit.experiments.bubble import candidates as bubbles
-from bubblefit.experiments.strips import candidates as strips
 from bubblefit.inference.assessment import pinned_by
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
 from bubblefit.inference.noise import Noise
@@ -41,6 +40,9 @@ from ..page_charts import charts_of
 from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, small
 from ..published_laws import TABLE_4_2
 
+# Packages of kinds have functions of the same names.
+bubbles = import_module("bubblefit.experiments.bubble.candidates")
+strips = import_module("bubblefit.experiments.strips.candidates")
 #: MPa, near the optima of the tests.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")
 ENDS = {"one": 2.9, "two": 2.5}
