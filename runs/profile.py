@@ -193,7 +193,7 @@ class Profiles:
     notes: Sequence[Note] = ()
 
     def table(self) -> pd.DataFrame:
-        """Return a row a value held; by_sigma : -2 log L by the fit's 1 sigma, without curvature."""
+        """Return a row a value held; by_sigma : -2 log L by the 1 sigma of the fit."""
         import pandas as pd
 
         found = []

@@ -25,7 +25,7 @@ from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
 from bubblefit.runs import weights as study_of
 from bubblefit.runs.bootstrap import MOST, Bootstrap, bootstrap
-from bubblefit.runs.plan import NOW, Plan, Planned, Present, plan
+from bubblefit.runs.plan import NOW, Plan, Present, Prospect, plan
 from bubblefit.runs.poisson import Nu12Study, PartRatios, by_response, ratios, vary_nu12
 from bubblefit.runs.profile import Profile, profile
 from bubblefit.runs.result import Fit
@@ -232,7 +232,7 @@ def few(monkeypatch):
     monkeypatch.setattr(strips, "INCREMENTS", 4)
 
 
-def known(made: Plan) -> dict[str, Planned]:
+def known(made: Plan) -> dict[str, Prospect]:
     return {planned.name: planned for planned in made.candidates}
 
 
