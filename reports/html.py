@@ -1,4 +1,4 @@
-"""The page: report.html, one file with everything inside, made of the data in page.json."""
+"""Make the page: report.html, one file with everything inside, and report.pdf by a browser."""
 
 from __future__ import annotations
 
@@ -168,12 +168,12 @@ PATIENCE, SCRIPT = 180, 10000
 
 
 def find_browser() -> str | None:
-    """Path of a browser, None where there is none."""
+    """Return the path of a browser, None where there is none."""
     return next((path for name in BROWSERS if (path := shutil.which(name))), None)
 
 
 def browser_command(browser: str, home: Path) -> list[str]:
-    """What every call of a browser begins with: no window, no network, a home of its own."""
+    """Return how every call of a browser begins: no window, no network, a home of its own."""
     # As root, as in a container, it starts only without its sandbox; the page is our own.
     bare = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
     return [

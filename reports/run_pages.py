@@ -36,7 +36,7 @@ RUNS_TABLE = "runs.csv"
 
 
 def write_predictions(predictions: Predictions, folder: Path) -> Path:
-    """Write everything; raises OutputError."""
+    """Write the folder of predictions; return the page's path. Raises OutputError."""
     (folder / RESULT).unlink(missing_ok=True)
     if predictions.record is not None:
         predictions.record.write(folder)
@@ -184,12 +184,11 @@ UNFINISHED = (
 
 
 def page_of_folder(folder: Path) -> Report:
-    """The page of an output folder: of its page.json, else of what its records say so far.
+    """Return the page of an output folder: of its page.json, else of its records so far.
 
     Raises
     ------
-    InputError : nothing of bubblefit is in the folder, or what is there is damaged or of a version
-        that wrote no page.json.
+    InputError : no output folder, or a damaged one, or one of a version that wrote no page.json.
     """
     if (folder / PAGE_DATA).exists():
         return read_page_data(folder)
@@ -216,7 +215,7 @@ def _title(folder: Path) -> str:
 
 
 def _starts(folder: Path) -> list[Part]:
-    """How many starts ended, and how; nothing of a folder that holds no fit."""
+    """Return facts and a table of the starts that ended; nothing of a folder without a fit."""
     if not (folder / STARTS).exists():
         return []
     records = RunningFiles(Store(folder), (), ()).finished()
@@ -234,13 +233,13 @@ def _starts(folder: Path) -> list[Part]:
 
 
 def _runs(folder: Path) -> list[Part]:
-    """How many predictions are kept."""
+    """Return the number of predictions that are kept."""
     kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
     return [Facts([("runs that ended", len(kept))])] if kept else []
 
 
 def _folders_within(folder: Path) -> list[Part]:
-    """The fits of a study, a folder each, and how far they are."""
+    """Return a table of the fits of a study, a folder each, and how far they are."""
     rows: list[list[object]] = []
     for path in sorted(folder.glob("*/")):
         if (path / RESULT).exists():
@@ -251,7 +250,7 @@ def _folders_within(folder: Path) -> list[Part]:
 
 
 def _provenance(folder: Path) -> dict[str, Any]:
-    """What the results are to come from; empty where that is not told or damaged."""
+    """Read the provenance of the results; empty where it is missing or damaged."""
     try:
         content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
