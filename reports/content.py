@@ -175,12 +175,7 @@ def _adapter() -> TypeAdapter[Report]:
 
 
 def write_page_data(folder: Path, report: Report) -> Path:
-    """Write page.json.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
+    """Write page.json. Raises OutputError: it cannot be written."""
     content = {"layout": LAYOUT, **plain(report)}
     path = folder / PAGE_DATA
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -190,9 +185,7 @@ def write_page_data(folder: Path, report: Report) -> Path:
 def read_page_data(folder: Path) -> Report:
     """Read the page of a folder's page.json.
 
-    Raises
-    ------
-    InputError : it is missing, damaged, or of another version's layout.
+    Raises InputError: it is missing, damaged, or of another version's layout.
     """
     path = folder / PAGE_DATA
     try:

@@ -57,9 +57,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     """Write only the page: report.html of the folder, or another file.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises OutputError: it cannot be written.
     """
     path = folder / PAGE if path is None else path
     with replacing(path) as temporary:
@@ -187,9 +185,7 @@ def browser_command(browser: str, home: Path) -> list[str]:
 def print_page(page: Path, path: Path) -> Path:
     """Print a page on A4 as PDF.
 
-    Raises
-    ------
-    OutputError : there is no browser, it fails, or the file cannot be written.
+    Raises OutputError: there is no browser, it fails, or the file cannot be written.
     """
     browser = find_browser()
     if browser is None:

@@ -42,9 +42,7 @@ class Packed:
     def values(self) -> Array:
         """The array; each value within half a `step` of the packed one.
 
-        Raises
-        ------
-        ValueError : the data are damaged, or of another shape.
+        Raises ValueError: the data are damaged, or of another shape.
         """
         count = prod(self.shape)
         try:

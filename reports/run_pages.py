@@ -125,9 +125,7 @@ def _notes(predictions: Predictions) -> list[Table]:
 def write_check(check: Check, folder: Path) -> Path:
     """Write check.json, the tests' own figures and report.html; return the page's path.
 
-    Raises
-    ------
-    OutputError : they cannot be written.
+    Raises OutputError: they cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "check.json", json.dumps(check.result, indent=1) + "\n")

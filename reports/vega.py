@@ -192,9 +192,7 @@ def dark_style() -> str:
 def library() -> str:
     """Return Vega as one script for the page, kept in the cache of the computer.
 
-    Raises
-    ------
-    OutputError : vl-convert does not give it.
+    Raises OutputError: vl-convert does not give it.
     """
     import vl_convert
 

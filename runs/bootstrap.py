@@ -26,7 +26,7 @@ from ..notes import lines as note_lines
 from ..project.project import Project
 from .executor import Task, cores, executor_of
 from .folder import Store
-from .presenters import write_report
+from .presenters import Presented
 from .refound import Card, Refound, refound
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
@@ -103,7 +103,7 @@ def _by_number(content: dict[str, Any]) -> dict[int, Sample]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bootstrap:
+class Bootstrap(Presented):
     """Fits to samples of a fit's data.
 
     found : the fit to all of the data. over : the sort of units, by `groups`. before : analyses
@@ -266,10 +266,6 @@ class Bootstrap:
         if self.unfinished:
             lines.append(f"{self.unfinished} samples used up their analyses before they settled")
         return [*lines, *note_lines(self.notes)]
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def bootstrap(

@@ -24,7 +24,7 @@ from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import executor_of
 from .fit import FitEvent
-from .presenters import write_report
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
@@ -285,7 +285,7 @@ class FormFit:
 
 
 @dataclass(frozen=True, eq=False)
-class LawComparison:
+class LawComparison(Presented):
     """Forms of the moduli side by side."""
 
     forms: tuple[FormFit, ...]
@@ -376,10 +376,6 @@ class LawComparison:
             f"least at specimens left out: {result['least_cross_validated']}; simplest within "
             f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
         ]
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def compare_laws(

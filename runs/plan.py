@@ -35,7 +35,7 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from .presenters import write_report
+from .presenters import Presented
 from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
 
@@ -101,7 +101,7 @@ class Prospect:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Presented):
     """The tests that could be made next, best first.
 
     Parameters
@@ -211,10 +211,6 @@ class Plan:
             lines.append(f"after the first, {self.following.title} would give {numbers}")
         return [*lines, ASSUMED, *note_lines(self.notes)]
 
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
-
 
 @dataclass(frozen=True, eq=False)
 class Present:
@@ -249,9 +245,7 @@ class Present:
 def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
     """Run the tests with a card, and fit offsets and the sheet's surface to them.
 
-    Raises
-    ------
-    SolverFailure : they cannot be run with it.
+    Raises SolverFailure: they cannot be run with it.
     """
     law = _law(setup, card)
     make = setup.make_leading

@@ -17,7 +17,7 @@ from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
-from .presenters import write_report
+from .presenters import Presented
 from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import Progress
 
@@ -81,7 +81,7 @@ class PartRatios:
 
 
 @dataclass(frozen=True, eq=False)
-class Nu12Study:
+class Nu12Study(Presented):
     """The result of a study of nu12, by part of a test. base : the card's own nu12."""
 
     project: Path
@@ -156,10 +156,6 @@ class Nu12Study:
         """Notes of every run, then those of the whole study."""
         of_parts = [n.about(name) for name, part in self.parts.items() for n in part.notes]
         return [*of_parts, *self.warnings]
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def vary_nu12(

@@ -27,7 +27,7 @@ from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
 from .executor import Task, cores, executor_of
-from .presenters import write_report
+from .presenters import Presented
 from .refound import Card, Refound, refound
 from .setup import FitSetup
 
@@ -181,7 +181,7 @@ def _end(end: float | None, side: Side, limit: float) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Profiles:
+class Profiles(Presented):
     """Profiles of moduli. card : its name. analyses : in all, those of the optimum included."""
 
     title: str
@@ -226,10 +226,6 @@ class Profiles:
         """Return the result in words, for the terminal."""
         lines = [f"{one.name}: {one.words}" for one in self.each]
         return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def profile(

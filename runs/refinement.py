@@ -27,7 +27,7 @@ from ..notes import Note, NoteKind, as_note, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
-from .presenters import write_report
+from .presenters import Presented
 from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import Progress
 
@@ -97,9 +97,7 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
     """Return the value at size zero from the two finest levels (2,), coarse and fine.
 
-    Raises
-    ------
-    ValueError : sizes that do not decrease.
+    Raises ValueError: sizes that do not decrease.
     """
     h, f = _sizes(sizes, 2), np.asarray(values, dtype=float)
     return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
@@ -207,7 +205,7 @@ class LevelRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Refinement:
+class Refinement(Presented):
     """The result of a study of refinement: runs by part, coarse to fine.
 
     noise : relative accuracy of the solver's displacements and loads. warnings : about the whole
@@ -301,10 +299,6 @@ class Refinement:
                 failed = [Note(NoteKind.FAILED, run.failure)] if run.failure else []
                 notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
         return [*notes, *self.warnings]
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def _quantity_words(name: str, found: Mapping[str, Any]) -> str:

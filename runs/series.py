@@ -82,9 +82,7 @@ class Series:
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests of a project that a study can run: those named, of a kind named, or all.
 
-    Raises
-    ------
-    InputError : no such test; none that can be studied.
+    Raises InputError: no such test; none that can be studied.
     """
     known = kinds()
     able = [t for t in project.chosen(tests or None) if known[t.kind].studied is not None]
@@ -102,9 +100,7 @@ def parts_of(
 ) -> dict[str, Part]:
     """Return every model of the tests by name, refined, with the thickness (mm) of a card.
 
-    Raises
-    ------
-    InputError : a mesh or increments that cannot be made.
+    Raises InputError: a mesh or increments that cannot be made.
     """
     parts: dict[str, Part] = {}
     for test in tests:
@@ -133,9 +129,7 @@ def part_name(test: Test, part: str, parts: int, tests: int) -> str:
 def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
     """Return a card that is given as itself, its file, or its name in the project.
 
-    Raises
-    ------
-    InputError : there is none, or the file is no card.
+    Raises InputError: there is none, or the file is no card.
     """
     if isinstance(card, MaterialCard):
         return card
@@ -146,9 +140,7 @@ def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
 def fitted_card(project: Project) -> Path:
     """Return the path of the card that the project's fit left in its usual folder.
 
-    Raises
-    ------
-    InputError : there is none.
+    Raises InputError: there is none.
     """
     path = usual_folder(project.path) / FITTED
     if not path.is_file():

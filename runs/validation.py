@@ -40,7 +40,7 @@ from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
 from .fit import FitEvent
-from .presenters import write_report
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -177,7 +177,7 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Validation:
+class Validation(Presented):
     """Laws at data that they were not fitted to: whole tests, or the parts named by `leave`."""
 
     title: str
@@ -271,10 +271,6 @@ class Validation:
         after = {law: own for law in laws if np.isfinite(own := of_law(law, True)).any()}
         return names, {law: of_law(law, False) for law in laws}, after
 
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
-
 
 def _relative(one: HeldOut | None) -> float:
     return np.nan if one is None or one.error is None else one.error
@@ -303,9 +299,7 @@ def sorts_of(tests: Sequence[PreparedTest]) -> list[str]:
 def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     """Return every part of a sort, test by test; option : named by errors.
 
-    Raises
-    ------
-    InputError : no test has two or more of them.
+    Raises InputError: no test has two or more of them.
     """
     parts = [
         Part(number, name, masks)
@@ -498,9 +492,7 @@ def judge_cards(
 ) -> Validation:
     """Judge cards at the tests of a project, without any fit of the law.
 
-    Raises
-    ------
-    InputError : in the project or its data, a card of another thickness than the fabric's.
+    Raises InputError: in the project or its data, a card of another thickness than the fabric's.
     """
     for name, card in cards.items():
         if (words := thickness_difference(card, project.fabric.thickness)) is not None:

@@ -18,7 +18,7 @@ from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from .compare import errors
 from .fit import FitEvent
-from .presenters import write_report
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints
@@ -91,7 +91,7 @@ def _by_count(content: dict[str, Any]) -> dict[float, dict[str, Any]]:
 
 
 @dataclass(frozen=True, eq=False)
-class WeightStudy:
+class WeightStudy(Presented):
     """Fits over the weight of some of the tests.
 
     counted : the kind or name asked for, names : of the tests. found : the fit at the project's
@@ -201,10 +201,6 @@ class WeightStudy:
             beside = "" if sigma is None else f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
             lines.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
         return lines
-
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
 
 
 def weight_study(

@@ -177,9 +177,7 @@ def strips() -> Iterator[Number]:
 def measured_strips(folder: Path) -> Iterator[Number]:
     """Compare R^2 of the fourth-order polynomials through the measured points in `folder`.
 
-    Raises
-    ------
-    InputError : the file is missing, or cannot be read.
+    Raises InputError: the file is missing, or cannot be read.
     """
     for curve in read_load_curves(folder / FILE):
         ours = fit_load_polynomial(curve.elongation, curve.load).r_squared
