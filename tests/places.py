@@ -8,6 +8,6 @@ ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "examples"
 KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"
 #: Tables of published numbers, with their sources.
-PUBLISHED = ROOT / "studies" / "verification" / "published"
+PUBLISHED = ROOT / "runs" / "verification" / "published"
 #: Measured data beside the repository.
 SHARED = ROOT.parent / "shared" / "data"

@@ -28,7 +28,7 @@ from bubblefit.notes import Note, NoteKind, foremost, marks, rows
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import SHIPPED, _plain, _used, schema_text
 from bubblefit.reports import fit_page as page
-from bubblefit.reports import prediction_page
+from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Report, Table, Words
 from bubblefit.reports.fit_page import (
@@ -506,7 +506,7 @@ def test_an_end_that_is_asked_for_is_run_alone(tmp_path):
 def test_the_page_says_which_wall_a_note_is_of(tmp_path, monkeypatch):
     pages: list[Report] = []
     monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
-    monkeypatch.setattr(prediction_page, "write_report", lambda folder, page: pages.append(page))
+    monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
     banded(tmp_path, FAILS, out=tmp_path / "out").report(tmp_path / "out")
     (page,) = pages
     (notes,) = [table for table in page.tables if table.title == "Notes"]

@@ -22,7 +22,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW, Note, NoteKind, rows
 from bubblefit.project import project as project_module
 from bubblefit.project.project import Project, chosen_cards, read_project
-from bubblefit.reports import prediction_page
+from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit, Report, Words
 from bubblefit.reports.html import percent
 from bubblefit.runs import executor
@@ -284,7 +284,7 @@ def seen(monkeypatch, no_pictures):
         reports.append(report)
         return folder / "report.html"
 
-    monkeypatch.setattr(prediction_page, "write_report", keep)
+    monkeypatch.setattr(run_pages, "write_report", keep)
     return reports
 
 
