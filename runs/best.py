@@ -232,7 +232,7 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
 def _certainty(
     problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array, limit: Limit | None
 ) -> Certainty:
-    """Return the certainty by first derivatives; by second if the residual is large and they differ."""
+    """Return the certainty by first derivatives, by second if much is left and they differ."""
     first = certainty(problem, best, law, reached, limit)
     left = best.residual if limit is None else limit.residual
     if not large(problem, left):
