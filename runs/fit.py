@@ -199,19 +199,11 @@ def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> It
             continue
         assert fit is not None  # where none has a fit, each was tried
         yield replace(
-            fit,
-            number=coarse.number,
-            seed=coarse.seed,
-            status=f"as start {fit.number}",
-            analyses=coarse.analyses,
-            wall_s=coarse.wall_s,
-            external_runs=coarse.external_runs,
-            cached_runs=coarse.cached_runs,
-            failure="",
-            coarse_objective=coarse.objective,
-            coarse_analyses=coarse.analyses,
-            same_as=fit.number,
-        )
+            coarse, objective=fit.objective, status=f"as start {fit.number}",
+            unknowns=fit.unknowns, coefficients=fit.coefficients, reached=fit.reached,
+            mesh=fit.mesh, failure="", coarse_objective=coarse.objective,
+            coarse_analyses=coarse.analyses, same_as=fit.number,
+        )  # fmt: skip
 
 
 FitEvent = EvaluationRecord | StartRecord | Stage

@@ -81,23 +81,18 @@ class Predictions:
                 test = self.each[i].test
                 tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
         return {
-            "command": "predict",
-            "title": self.project.title,
-            "solver": self.project.fit.solver,
-            "tests": tests,
+            "command": "predict", "title": self.project.title,
+            "solver": self.project.fit.solver, "tests": tests,
             "cards": list(dict.fromkeys(run.card for run in self.each)),
             "walls": [
                 {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
                 for end in self.band
             ],
             "runs": [self._numbers(i) for i in range(len(self.each))],
-            "notes": note_rows(self.notes),
-            "worst_relative_error": self.worst,
-            "cached_runs": self.cached,
-            "wall_s": self.wall_s,
-            "versions": versions(),
+            "notes": note_rows(self.notes), "worst_relative_error": self.worst,
+            "cached_runs": self.cached, "wall_s": self.wall_s, "versions": versions(),
             **({} if self.record is None else {"provenance": PROVENANCE}),
-        }
+        }  # fmt: skip
 
     @property
     def notes(self) -> list[Note]:
@@ -154,11 +149,9 @@ class Predictions:
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             tail = {
-                "ended": self.ended(i),
-                "marks": "; ".join(marks(run.notes)),
-                "notes": "; ".join(run.notes),
-                "seconds": run.record.seconds,
-            }
+                "ended": self.ended(i), "marks": "; ".join(marks(run.notes)),
+                "notes": "; ".join(run.notes), "seconds": run.record.seconds,
+            }  # fmt: skip
             head = {"test": run.test.name, "card": run.card, "wall": run.wall}
             rows.append({**head, **outcome.columns(own), **tail})
         columns = list(dict.fromkeys(name for row in rows for name in row))
@@ -173,9 +166,8 @@ class Predictions:
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             curve = outcome.curve(own)
-            curve.insert(0, "wall", run.wall)
-            curve.insert(0, "card", run.card)
-            curve.insert(0, "test", run.test.name)
+            for name, value in ("wall", run.wall), ("card", run.card), ("test", run.test.name):
+                curve.insert(0, name, value)
             curves.append(curve)
         return pd.concat(curves, ignore_index=True)
 
@@ -197,14 +189,10 @@ class Predictions:
         run = self.each[number]
         outcome, own = self._own(number)
         head: dict[str, Any] = {
-            "test": run.test.name,
-            "card": run.card,
-            "wall": run.wall,
-            "predicted": run.predicted,
-            "ended": self.ended(number),
-            "marks": marks(run.notes),
-            "seconds": run.record.seconds,
-        }
+            "test": run.test.name, "card": run.card, "wall": run.wall,
+            "predicted": run.predicted, "ended": self.ended(number),
+            "marks": marks(run.notes), "seconds": run.record.seconds,
+        }  # fmt: skip
         if run.record.failure:
             return head
         tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}

@@ -201,20 +201,12 @@ class Fit:
                     lower, upper = (np.interp(strain, at, end) for end in sure.band[name])
                 if sure.mesh is not None:
                     mesh = np.interp(strain, at, sure.mesh[name])
-            rows.append(
-                pd.DataFrame(
-                    {
-                        "modulus": name,
-                        "strain": strain,
-                        "MPa": self.law.modulus(name, strain),
-                        "lower_MPa": lower,
-                        "upper_MPa": upper,
-                        "sigma_relative": sigma,
-                        "noise_relative": noise,
-                        "mesh_relative": mesh,
-                    }
-                )
-            )
+            columns = {
+                "modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain),
+                "lower_MPa": lower, "upper_MPa": upper, "sigma_relative": sigma,
+                "noise_relative": noise, "mesh_relative": mesh,
+            }  # fmt: skip
+            rows.append(pd.DataFrame(columns))
         return pd.concat(rows, ignore_index=True)
 
     def coefficients(self) -> pd.DataFrame:
@@ -258,21 +250,16 @@ class Fit:
         """
         import pandas as pd
 
-        return pd.DataFrame(
-            [
-                {
-                    "start": r.number,
-                    "objective": np.nan if r.objective is None else r.objective,
-                    "status": r.status,
-                    "analyses": r.analyses,
-                    "external_runs": r.external_runs,
-                    "cached_runs": r.cached_runs,
-                    "seconds": r.wall_s,
-                    **({} if self.coarse_to_fine is None else coarse_columns(r)),
-                }
-                for r in self.best.records
-            ]
-        )
+        rows = [
+            {
+                "start": r.number, "objective": np.nan if r.objective is None else r.objective,
+                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
+                "cached_runs": r.cached_runs, "seconds": r.wall_s,
+                **({} if self.coarse_to_fine is None else coarse_columns(r)),
+            }
+            for r in self.best.records
+        ]  # fmt: skip
+        return pd.DataFrame(rows)
 
     @property
     def laws(self) -> list[HypoelasticLaw]:
@@ -283,12 +270,7 @@ class Fit:
         return [self.law, *(unknowns.law(self.law, y) for y in others)]
 
     def report(self, folder: Path | str) -> Path:
-        """Write card, tables, figures, report.html and last result.json; return the page's path.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write card, tables, figures, report.html and last result.json; return the page's path."""
         return write_report(self, folder)
 
     def output(self, folder: Path, test: str) -> Output:
@@ -406,31 +388,20 @@ def result_of(fit: Fit) -> dict[str, Any]:
     project, best, law = fit.project, fit.best, fit.law
     records, sure = best.records, best.certainty
     result: dict[str, Any] = {
-        "command": fit.command,
-        "title": project.title,
-        "solver": project.fit.solver,
-        "method": project.fit.method,
-        "objective": fit.objective,
-        "objective_is": fit.setup.objective_is,
-        "moduli": law.form.name,
+        "command": fit.command, "title": project.title, "solver": project.fit.solver,
+        "method": project.fit.method, "objective": fit.objective,
+        "objective_is": fit.setup.objective_is, "moduli": law.form.name,
         "beta": {
-            "unit": project.scales.modulus_unit,
-            "labels": list(law.form.labels),
+            "unit": project.scales.modulus_unit, "labels": list(law.form.labels),
             "values": (law.beta / project.scales.modulus).tolist(),
         },
         **law.form.to_card(),
-        "nu12": law.nu12,
-        "strain_reached": by_strain(best.reached),
-        "valid_strain": by_strain(best.valid),
-        "seed": project.fit.seed,
+        "nu12": law.nu12, "strain_reached": by_strain(best.reached),
+        "valid_strain": by_strain(best.valid), "seed": project.fit.seed,
         "starts": [
             {
-                "start": r.number,
-                "seed": list(r.seed),
-                "objective": r.objective,
-                "status": r.status,
-                "analyses": r.analyses,
-                "external_runs": r.external_runs,
+                "start": r.number, "seed": list(r.seed), "objective": r.objective,
+                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
                 "cached_runs": r.cached_runs,
                 **({} if fit.coarse_to_fine is None else coarse_columns(r)),
             }
@@ -440,11 +411,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
         "cached_runs": sum(r.cached_runs for r in records),
-        "warnings": [],
-        "notes": [],
-        "wall_s": fit.wall_s,
-        "versions": versions(),
-    }
+        "warnings": [], "notes": [], "wall_s": fit.wall_s, "versions": versions(),
+    }  # fmt: skip
     result["misfit"] = {
         name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
         for name, m in fit.misfits.items()

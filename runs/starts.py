@@ -133,19 +133,12 @@ def run_start(
         nonlocal analyses, runs
         analyses += 1
         runs += problem.solver.external and solver == problem.solver.name
-        coefficients = problem.unknowns.to_coefficients @ y[:size]
-        tell(
-            EvaluationRecord(
-                number,
-                analyses,
-                value,
-                status,
-                tuple(coefficients.tolist()),
-                tuple(np.asarray(y[size:]).tolist()),
-                solver,
-                mesh,
-            )
+        coefficients = tuple((problem.unknowns.to_coefficients @ y[:size]).tolist())
+        nuisance = tuple(np.asarray(y[size:]).tolist())
+        record = EvaluationRecord(
+            number, analyses, value, status, coefficients, nuisance, solver, mesh
         )
+        tell(record)
 
     watched = [p for p in (problem, problem.surrogate) if p is not None]
     for p in watched:
