@@ -414,9 +414,8 @@ def _run(
 
     def end(number: int, record: RunRecord, again: bool) -> None:
         pair = pairs[number]
-        card = pair.material
-        thick = other_thickness(card, project.fabric.thickness)
-        notes = [*notes_of_record(record, card), *thick]
+        thick = other_thickness(pair.material, project.fabric.thickness)
+        notes = [*notes_of_record(record, pair.material), *thick]
         ended[number] = replace(pair, record=record, notes=notes)
         log_run(pair.title, record, again)
         progress(RunEvent(ended[number], len(ended), len(pairs), again))

@@ -469,12 +469,8 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
     """Return least, median and largest of `Fit.pinned` along the strains."""
     return {
         source: {
-            name: {
-                "least": float(s.min()),
-                "median": float(np.median(s)),
-                "largest": float(s.max()),
-            }
-            for name, s in sigmas.items()
+            n: {"least": float(s.min()), "median": float(np.median(s)), "largest": float(s.max())}
+            for n, s in sigmas.items()
         }
         for source, sigmas in fit.pinned.items()
     }

@@ -499,10 +499,9 @@ class CoarseToFine:
         coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
         if coarse is None:
             return None
-        pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
         quads = {
             own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
-            for other, own in pairs
+            for other, own in zip(coarse.comparisons, setup.problem().comparisons, strict=True)
             if hasattr(own.model, "mesh")
         }
         before = sum(record.coarse_analyses for record in records)
@@ -523,8 +522,5 @@ class CoarseToFine:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values."""
-        quads = {
-            name: dict(zip(("coarse", "full"), own, strict=True))
-            for name, own in self.quads.items()
-        }
+        quads = {name: {"coarse": own[0], "full": own[1]} for name, own in self.quads.items()}
         return {**asdict(self), "quads": quads}
