@@ -18,8 +18,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.readers.fields import DisplacementField, read_fields
-from bubblefit.reports.html import PAGE
-from bubblefit.reports.pdf import find_browser
+from bubblefit.reports.html import PAGE, find_browser
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -367,7 +367,7 @@ def _write_points(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    import bubblefit.reports
+    import bubblefit.reports.study_pages
     import bubblefit.runs.fit
     import bubblefit.runs.predictions
     import bubblefit.runs.validation  # noqa: F401

@@ -29,7 +29,7 @@ from ..readers.surfaces import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save
-from ..runs.check import check
+from ..runs.fit import check
 from .options import (
     DATA,
     PROJECT,

@@ -16,7 +16,6 @@ from ..errors import InputError
 from ..notes import Note
 from ..notes import lines as note_lines
 from ..project.project import Project, chosen_cards
-from ..reports.law_page import lines_of
 from ..runs import compare as laws
 from ..runs import validation, weights
 from ..runs.bootstrap import bootstrap
@@ -258,9 +257,7 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
             starts=starts, fold_starts=fold_starts, out=folder, resume=options["resume"],
             overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
         )  # fmt: skip
-    comparison.report(folder)
-    lines = [*lines_of(comparison.result), *note_lines(comparison.notes), written_to(folder)]
-    show(comparison.result, lines, options["as_json"])
+    _finish(comparison, folder, options, comparison.notes)
 
 
 @command(

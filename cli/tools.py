@@ -17,9 +17,8 @@ import click
 
 from ..errors import InputError
 from ..reports.content import beside
-from ..reports.html import PAGE, write_page
-from ..reports.pdf import print_page
-from ..reports.unfinished import page_of_folder
+from ..reports.html import PAGE, print_page, write_page
+from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, numbers
 from ..runs.verification.number import Number
 from ..solvers.bars import diagnose

@@ -29,7 +29,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
         "Studies",
         ("runs.refinement:refine,Refinement,convergence,Convergence",
          "runs.poisson:vary_nu12,Nu12Study,Ratios", "runs.compare:compare_laws,LawComparison",
-         "runs.plan:plan,Plan,Planned", "runs.profile:profile,Profiles,Profile",
+         "runs.plan:plan,Plan,Prospect", "runs.profile:profile,Profiles,Profile",
          "runs.bootstrap:bootstrap,Bootstrap",
          "runs.validation:validate,judge_cards,Validation",
          "runs.weights:weight_study,WeightStudy"),

@@ -1,4 +1,4 @@
-"""The content of a page as plain data: sections of words, tables, charts, maps and pictures.
+"""Hold the content of a page as plain data: words, tables, charts, maps and pictures.
 
 It is written as page.json (`write_page_data`), from which report.html is made, now or later; two
 pages can be laid beside each other (`beside`).
@@ -50,7 +50,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Words:
-    """Paragraphs, or a list with a mark before each; warning: what must not be passed over."""
+    """Paragraphs, or a list with a mark before each; warning : set off from the text."""
 
     lines: Sequence[str]
     marked: bool = False
@@ -101,17 +101,16 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """All that a page shows, in its order. Empty parts are left out.
+    """The content of a page, in its order; empty parts are left out.
 
     Parameters
     ----------
     title : of the project.
-    summary : a sentence or two: how good is the fit.
+    summary : a sentence or two on the quality of the result.
     facts : for the head of the page.
     warnings : what a reader must know before using the numbers.
-    sections : what follows.
-    files : (name, what it is) of the output folder.
-    versions : name and version of what computed this.
+    files : name and content of the files of the output folder.
+    versions : of the programs, by name.
     """
 
     title: str
@@ -124,12 +123,12 @@ class Report:
 
     @property
     def parts(self) -> Iterator[Part]:
-        """Of all sections, in order."""
+        """Parts of all sections, in order."""
         return (part for section in self.sections for part in section.parts)
 
     @property
     def tables(self) -> list[Table]:
-        """Of all sections, in order."""
+        """Tables of all sections, in order."""
         return [part for part in self.parts if isinstance(part, Table)]
 
     @property
@@ -139,15 +138,15 @@ class Report:
 
 
 def pictures(shown: Sequence[tuple[str, str]]) -> list[Picture]:
-    """Of (file relative to the page, caption)."""
+    """Return pictures of files, named from the page, and captions."""
     return [Picture(file, caption) for file, caption in shown]
 
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """The contribution of one test to a page: facts, figures, tables, files that it wrote.
+    """The contribution of one test to a page.
 
-    figures, files : a file below the output folder, and its caption or what it is.
+    figures, files : a file below the output folder, and its caption or content.
     parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
     record : tables of how it was measured, for the record at the end of the page.
     """
@@ -160,13 +159,13 @@ class Exhibit:
     record: Sequence[Table] = ()
 
     def all_parts(self, title: str = "") -> list[Part]:
-        """What stands in the body of the page, in order; title : before it, "" for none."""
+        """Return the parts for the body of the page, in order, below a title unless that is ""."""
         facts = [Facts(self.facts, title)] if self.facts or title else []
         return [*facts, *self.parts, *pictures(self.figures), *self.tables]
 
 
 PAGE_DATA = "page.json"
-#: Of the file's layout; a page of another one is not made again.
+#: Number of the file's layout; a page of another layout is not made again.
 LAYOUT = 1
 
 
@@ -176,12 +175,7 @@ def _adapter() -> TypeAdapter[Report]:
 
 
 def write_page_data(folder: Path, report: Report) -> Path:
-    """Write page.json.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
+    """Write page.json. Raises OutputError: it cannot be written."""
     content = {"layout": LAYOUT, **plain(report)}
     path = folder / PAGE_DATA
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -189,11 +183,9 @@ def write_page_data(folder: Path, report: Report) -> Path:
 
 
 def read_page_data(folder: Path) -> Report:
-    """The page of a folder's page.json.
+    """Read the page of a folder's page.json.
 
-    Raises
-    ------
-    InputError : it is not there, damaged, or of another version's layout.
+    Raises InputError: it is missing, damaged, or of another version's layout.
     """
     path = folder / PAGE_DATA
     try:
@@ -214,12 +206,12 @@ def read_page_data(folder: Path) -> Report:
 
 
 def as_written(report: Report) -> Report:
-    """The report as page.json gives it back: what a page is made of, whenever it is made."""
+    """Return the report as read back from page.json, so that pages made later are the same."""
     return _adapter().validate_python(plain(report))
 
 
 def plain(value: object) -> Any:
-    """Plain values of dataclasses, arrays and numbers; None for what is no finite number."""
+    """Return plain values of dataclasses, arrays and numbers; None for NaN and infinity."""
     if is_dataclass(value):
         return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, np.generic | np.ndarray):
@@ -239,9 +231,9 @@ Named = tuple[str, Report]
 
 
 def beside(one: Named, other: Named) -> Report:
-    """A page of two, each with the folder by which its parts and pictures are named.
+    """Merge two pages, each with the folder that names its parts and pictures.
 
-    Pictures are named by their place below the folder that both have in common.
+    Pictures are named from the folder that both have in common.
     """
     names = one[0], other[0]
     reports = [_with_folder(report, name) for name, report in (one, other)]
@@ -262,7 +254,7 @@ def beside(one: Named, other: Named) -> Report:
 
 
 def _with_folder(report: Report, name: str) -> Report:
-    """The report with its pictures named from the common folder; those outside stay outside."""
+    """Return the report with pictures named from the common folder; others lose their file."""
 
     def moved(part: Part) -> Part:
         if not isinstance(part, Picture):
@@ -277,7 +269,7 @@ def _with_folder(report: Report, name: str) -> Report:
 
 
 def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]) -> Iterator[Part]:
-    """Parts of both: together where they are of one kind, title and heading."""
+    """Yield parts of both, merged where kind, title and heading are the same."""
     left = list(others)
     for part in ones:
         twin = next((own for own in left if _alike(part, own)), None)
@@ -314,7 +306,7 @@ def _named(name: str, part: Part) -> list[Part]:
 
 
 def _tables(names: tuple[str, str], one: Table, other: Table) -> Table:
-    """Rows that begin alike next to each other."""
+    """Merge tables row by row."""
     pairs = zip_longest(one.rows, other.rows)
     rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
     note = (

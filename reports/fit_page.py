@@ -1,4 +1,4 @@
-"""The folder of a finished fit: card, tables, figures, report.html, and last result.json."""
+"""Write the folder of a finished fit: card, tables, figures, report.html, last result.json."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,33 +22,24 @@ from ..materials.law import HypoelasticLaw
 from ..notes import NOTES, NOTES_ARE, write_notes
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Store
 from ..runs.record import Record
-from ..runs.result import STRAINS, answer_at, coefficients_of
+from ..runs.result import STRAINS, Fit, answer_at, coefficients_of
 from .charts import Charts
-from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
+from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
 from .moduli import moduli_charts, pinned_charts
 from .studies import optima_chart
 from .vega import save
 
-if TYPE_CHECKING:
-    from ..runs.folder import AS_RUN, DIGITS, PROVENANCE
-from ..runs.result import Fit
-
 Array = NDArray[np.float64]
 
 TITLE = "What the data determine"
-#: A modulus is said to be unknown from here on: as uncertain as it was before, but for rounding.
+#: 1 sigma from which a modulus is unknown: that before the tests, but for rounding.
 UNKNOWN = 0.999 * PRIOR
-
-
-def determined_section(fit: Fit, pinned: Sequence[Part]) -> Section:
-    """Tables, and `pinned`, the picture of what each test pins down."""
-    parts = [*_determined(fit), *_beside(fit), *pinned, *_pinned_table(fit.pinned)]
-    return Section(TITLE, parts)
+NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
 
 
 def _beside(fit: Fit) -> list[Table]:
-    """What the data say of every unknown beside the moduli."""
+    """Return a table of every unknown beside the moduli."""
     rows: list[list[object]] = [
         [v.name, v.unit, v.value, v.sigma if v.determined else "not determined", v.lower, v.upper,
          v.prior, v.words]
@@ -63,7 +54,7 @@ def _beside(fit: Fit) -> list[Table]:
 
 
 def sigma_words(value: float) -> str:
-    """A relative uncertainty as percent, as long as it says anything."""
+    """Return a relative uncertainty as percent, or "unknown"."""
     return percent(value) if value < UNKNOWN else "unknown"
 
 
@@ -82,13 +73,8 @@ def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
     return [Table("What each test pins down", header, rows, note)] if rows else []
 
 
-def _together(alike: float) -> str:
-    """How many neighbouring values count as one; nothing where each counts."""
-    return f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
-
-
 def _determined(fit: Fit) -> Sequence[Table]:
-    """What the data determine, modulus by modulus; nothing where it is not known."""
+    """Return the uncertainty of each modulus; nothing where it is not known."""
     sure = fit.best.certainty
     if sure is None:
         return []
@@ -101,9 +87,12 @@ def _determined(fit: Fit) -> Sequence[Table]:
         for name, s in sure.sigma.items()
     ]  # fmt: skip
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
+    together = {
+        name: f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
+        for name, alike in sure.alike.items()
+    }
     noise = ", ".join(
-        f"{value:.2g} {units[name]} ({name}{_together(sure.alike[name])})"
-        for name, value in sure.noise.items()
+        f"{value:.2g} {units[name]} ({name}{together[name]})" for name, value in sure.noise.items()
     )
     note = (
         f"noise of {noise} on everything matched; a law or a model of the wrong form is not in it; "
@@ -117,23 +106,6 @@ def _determined(fit: Fit) -> Sequence[Table]:
     return [Table(TITLE, header, rows, note)]
 
 
-TITLE_TRUST = "Can it be trusted?"
-NO_WARNING = "No warning: nothing that the program looks at speaks against these numbers."
-
-
-def trust_section(fit: Fit) -> Section:
-    """What a reader should know before using the numbers, and what the fit leaves."""
-    result = fit.result
-    parts: list[Part] = [
-        Words([f"{_said_by_tests(fit)}", *_checked(fit)]),
-        warnings_of(fit),
-        misfit_table(fit),
-        *known_solution_table(result.get("moduli_error", {}), result.get("moduli_error_range", {})),
-        Facts(assumed(fit)),
-    ]
-    return Section(TITLE_TRUST, parts)
-
-
 def _said_by_tests(fit: Fit) -> str:
     said = "; ".join(
         f"{name}: {f.summary}" if len(fit.findings) > 1 else f.summary
@@ -143,7 +115,7 @@ def _said_by_tests(fit: Fit) -> str:
 
 
 def _checked(fit: Fit) -> list[str]:
-    """What the look at the data before the fit, and the solver's look at stability, showed."""
+    """Return the results of the checks of the data before the fit, and of stability."""
     lines = []
     if fit.judgements:
         doubts = sum(len(judgement.doubts) for judgement in fit.judgements)
@@ -165,13 +137,13 @@ def _checked(fit: Fit) -> list[str]:
 
 
 def warnings_of(fit: Fit) -> Words:
-    """Every note of the fit, or that there is none."""
+    """Return every note of the fit, or that there is none."""
     lines = [note.line for note in fit.notes]
     return Words(lines, marked=True, warning=True) if lines else Words([NO_WARNING])
 
 
 def misfit_table(fit: Fit) -> Table:
-    """The residual of every comparison beside the noise of its data."""
+    """Return the residual of every comparison beside the noise of its data."""
     rows: list[list[object]] = [
         [name, m.rms, m.noise, m.unit, m.noise_is, m.ratio] for name, m in fit.misfits.items()
     ]
@@ -187,7 +159,7 @@ def misfit_table(fit: Fit) -> Table:
 def known_solution_table(
     errors: dict[str, float], ranges: dict[str, tuple[float, float]]
 ) -> list[Table]:
-    """The largest errors of the moduli, where the solution is known."""
+    """Return the largest errors of the moduli, where the solution is known."""
     rows: list[list[object]] = [
         [name, percent(error), *ranges.get(name, (None, None))] for name, error in errors.items()
     ]
@@ -201,7 +173,7 @@ def known_solution_table(
 
 
 def assumed(fit: Fit) -> list[tuple[str, object]]:
-    """What was not measured here but taken as known."""
+    """Return the quantities that were taken as known."""
     unknowns, project = fit.project.fit.unknowns, fit.project
     fitted = {name: getattr(unknowns, name) is not None for name in ("nu12", "thickness")}
     thick = f"{fit.thickness:.4g} mm, {project.fabric.thickness_change}"
@@ -212,19 +184,8 @@ def assumed(fit: Fit) -> list[tuple[str, object]]:
     ]
 
 
-TITLE_WAYS = "How it was found"
-
-
-def ways_section(fit: Fit, parts: list[Part]) -> Section:
-    """Facts, `parts` (the picture of the optima), and the tables."""
-    every = [
-        Facts(found_by(fit)), *parts, starts_table(fit), bounds_table(fit), *coefficients_table(fit)
-    ]  # fmt: skip
-    return Section(TITLE_WAYS, every)
-
-
 def found_by(fit: Fit) -> list[tuple[str, object]]:
-    """Method, starts and cost."""
+    """Return method, starts and cost."""
     result, project, best = fit.result, fit.project, fit.best
     runs, cached = result["external_runs"], result["cached_runs"]
     return [
@@ -240,7 +201,7 @@ def found_by(fit: Fit) -> list[tuple[str, object]]:
 
 
 def starts_table(fit: Fit) -> Table:
-    """Every start, best first."""
+    """Return every start, best first."""
 
     def value(objective: float | None) -> float:
         return objective if objective is not None and isfinite(objective) else inf
@@ -254,7 +215,7 @@ def starts_table(fit: Fit) -> Table:
 
 
 def bounds_table(fit: Fit) -> Table:
-    """Value, lower and upper bound of everything that was fitted of the law."""
+    """Return value and bounds of every coefficient of the law."""
     form, unknowns, scale = fit.law.form, fit.problem.unknowns, fit.project.scales.modulus
     rows: list[list[object]] = [
         [form.labels[i], f"{float(fit.law.beta[i] / scale):.6g}", float(low / scale),
@@ -266,33 +227,20 @@ def bounds_table(fit: Fit) -> Table:
     return Table("Coefficients of the law", header, rows)
 
 
-def optima(fit: Fit) -> np.ndarray:
-    """(starts,) objective of every start, NaN where it has none."""
-    return np.array([np.nan if r.objective is None else r.objective for r in fit.best.records])
-
-
-def optima_words(fit: Fit) -> str:
-    """The caption of their picture."""
-    words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
-    if fit.coarse_to_fine is not None:
-        words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
-    return words
-
-
-#: What the moduli are called where nobody knows their letters.
+#: Names of the moduli in words.
 WORDS: Mapping[str, str] = {
     "E1": "Young's modulus along the warp, E1",
     "E2": "Young's modulus along the fill, E2",
     "G12": "shear modulus between warp and fill, G12",
 }
-#: Within what stays on one line.
+#: Between words that stay on one line.
 SPACE = "\u00a0"
-#: The strain of the summary, and what it is called.
+#: The strain of the summary.
 FIRST = 0.01
 
 
 def modulus_at(fit: Fit, name: str, strain: float) -> tuple[float, float, float] | None:
-    """MPa and the ends of its band, NaN where that is not known; None beyond where it is known."""
+    """Return MPa and the ends of the band, NaN where unknown; None beyond the valid strains."""
     if strain > fit.best.valid[COMPONENTS[name]]:
         return None
     found = answer_at(fit, name, strain)
@@ -300,19 +248,19 @@ def modulus_at(fit: Fit, name: str, strain: float) -> tuple[float, float, float]
 
 
 def band_words(value: float, lower: float, upper: float) -> str:
-    """A value with its band, as many digits as it bears."""
+    """Return a value with its band, with as many digits as are known."""
     if not np.isfinite([lower, upper]).all():
         return f"{value:.3g}"
     return f"{_short(value)}{SPACE}({_short(lower)}{SPACE}to{SPACE}{_short(upper)})"
 
 
 def _short(value: float) -> str:
-    """Three digits, without powers of ten."""
+    """Return three digits, without powers of ten."""
     return f"{value:.0f}" if abs(value) >= 99.5 else f"{value:.3g}"
 
 
 def answer_table(fit: Fit) -> Table:
-    """A row a modulus and unit, a column a strain that one of them reaches."""
+    """Return a row a modulus and unit, a column a strain that one of them reaches."""
     far = max(float(fit.best.valid[c]) for c in COMPONENTS.values())
     strains = [strain for strain in STRAINS if strain <= far]
     rows: list[list[object]] = []
@@ -336,7 +284,7 @@ def answer_table(fit: Fit) -> Table:
 
 
 def reached_table(fit: Fit) -> Table:
-    """How far the moduli are known, beside how far the tests went."""
+    """Return the ends of the moduli beside the largest strains of the tests."""
     reached, valid = (by_strain(ends) for ends in (fit.best.reached, fit.best.valid))
     rows: list[list[object]] = [[name, valid[name], strain] for name, strain in reached.items()]
     note = (
@@ -348,7 +296,7 @@ def reached_table(fit: Fit) -> Table:
 
 
 def answer_words(fit: Fit) -> str:
-    """The same in a sentence, at a small strain that every modulus reaches."""
+    """Return the moduli in a sentence, at a small strain that every one reaches."""
     least = min(float(fit.best.valid[c]) for c in COMPONENTS.values())
     at = FIRST if least >= FIRST else 0.0
     said = []
@@ -379,7 +327,7 @@ BIBTEX = """@software{{bubblefit,
 
 
 def citation() -> list[Part]:
-    """Words and BibTeX, as CITATION.cff of the program has it."""
+    """Return words and BibTeX, as in CITATION.cff of the program."""
     said = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
     return [Words([said]), Listing(BIBTEX.format(version=__version__))]
 
@@ -405,7 +353,7 @@ FILES = (
 
 
 def write_fit(fit: Fit, folder: Path) -> Path:
-    """Write everything; raises OutputError."""
+    """Write the folder of a fit; return the page's path. Raises OutputError."""
     store = Store(folder)
     (folder / RESULT).unlink(missing_ok=True)
     if fit.record is not None:
@@ -443,11 +391,25 @@ def _page(fit: Fit, folder: Path) -> Report:
             Section("The answer", [
                 answer_table(fit), Download(CARD, card, SAVE_CARD), reached_table(fit),
             ]),
-            trust_section(fit),
+            Section("Can it be trusted?", [
+                Words([_said_by_tests(fit), *_checked(fit)]), warnings_of(fit), misfit_table(fit),
+                *known_solution_table(
+                    result.get("moduli_error", {}), result.get("moduli_error_range", {})
+                ),
+                Facts(assumed(fit)),
+            ]),
             Section("The moduli over strain", [_moduli(fit, folder)]),
-            Section("Measured beside modelled", _shown(exhibits)),
-            determined_section(fit, _pinned(fit, folder)),
-            ways_section(fit, [_optima(fit, folder)]),
+            Section("Measured beside modelled", [
+                part for name, exhibit in exhibits.items()
+                for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
+            ]),
+            Section(TITLE, [
+                *_determined(fit), *_beside(fit), *_pinned(fit, folder), *_pinned_table(fit.pinned),
+            ]),
+            Section("How it was found", [
+                Facts(found_by(fit)), _optima(fit, folder), starts_table(fit), bounds_table(fit),
+                *coefficients_table(fit),
+            ]),
             Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
             Section("How to cite", citation()),
         ],
@@ -456,23 +418,18 @@ def _page(fit: Fit, folder: Path) -> Report:
     )  # fmt: skip
 
 
-def _shown(exhibits: Mapping[str, Exhibit]) -> list[Part]:
-    """What the tests show, each after its name where there are several."""
-    return [
-        part
-        for name, exhibit in exhibits.items()
-        for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
-    ]
-
-
 def _optima(fit: Fit, folder: Path) -> Charts:
-    charts = optima_chart(optima(fit), optima_words(fit))
+    words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
+    if fit.coarse_to_fine is not None:
+        words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
+    objectives = [np.nan if r.objective is None else r.objective for r in fit.best.records]
+    charts = optima_chart(objectives, words)
     save(folder / OPTIMA, charts)
     return charts
 
 
 def _moduli(fit: Fit, folder: Path) -> Charts:
-    """The moduli over the strains that they are fitted to, as far as the card is valid."""
+    """Return the chart of the moduli over the strains that they are fitted to."""
     strains = _strains(fit)
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
@@ -499,7 +456,7 @@ def _strains(fit: Fit, count: int = SMOOTH) -> Array:
 
 
 def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
-    """(3, k) E1, E2, G12 in MPa at strains (3, k)."""
+    """Return E1, E2, G12 (3, k) MPa at strains (3, k)."""
     return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
 
 
@@ -532,12 +489,12 @@ COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"
 
 
 def two_digits(correlation: float) -> str:
-    """Without a sign of nothing."""
+    """Return a correlation with two digits, without a negative zero."""
     return f"{round(correlation, 2) + 0.0:.2f}"
 
 
 def coefficients_table(fit: Fit) -> list[Table]:
-    """The same for the page, without the bounds; nothing where it is not known."""
+    """Return the unknowns with their correlations; nothing where these are not known."""
     if fit.best.certainty is None or fit.best.certainty.posterior is None:
         return []
     found = coefficients_of(fit)

@@ -1,10 +1,14 @@
-"""The page: report.html, one file with everything inside, made of the data in page.json."""
+"""Make the page: report.html, one file with everything inside, and report.pdf by a browser."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
+import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Mapping
 from dataclasses import fields
 from datetime import date
@@ -17,6 +21,7 @@ from jinja2 import FileSystemLoader
 from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
+from ..errors import OutputError
 from ..files import TEMPLATES, environment, replacing
 from ..notes import percent as percent
 from . import maps, vega
@@ -51,9 +56,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     """Write only the page: report.html of the folder, or another file.
 
-    Raises
-    ------
-    OutputError : it cannot be written.
+    Raises OutputError: it cannot be written.
     """
     path = folder / PAGE if path is None else path
     with replacing(path) as temporary:
@@ -152,3 +155,51 @@ def number(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     return f"{value:.4g}" if isfinite(value) else "–"
+
+
+#: Programs that print pages, in the order in which they are looked for.
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome",
+            "microsoft-edge")  # fmt: skip
+#: Seconds that a browser may take, and milliseconds that the page's own script gets.
+PATIENCE, SCRIPT = 180, 10000
+
+
+def find_browser() -> str | None:
+    """Return the path of a browser, None where there is none."""
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
+
+
+def browser_command(browser: str, home: Path) -> list[str]:
+    """Return how every call of a browser begins: no window, no network, a home of its own."""
+    # As root, as in a container, it starts only without its sandbox; the page is our own.
+    bare = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    return [
+        browser, "--headless=new", "--disable-gpu", *bare, f"--user-data-dir={home}",
+        # A container's shared memory may be too small for a page.
+        "--disable-dev-shm-usage",
+        "--host-resolver-rules=MAP * ~NOTFOUND", f"--virtual-time-budget={SCRIPT}",
+    ]  # fmt: skip
+
+
+def print_page(page: Path, path: Path) -> Path:
+    """Print a page on A4 as PDF.
+
+    Raises OutputError: there is no browser, it fails, or the file cannot be written.
+    """
+    browser = find_browser()
+    if browser is None:
+        said = f"needs a browser to print with, and there is none of {', '.join(BROWSERS)}"
+        raise OutputError(f"{path}: {said}; install chromium, or print {page} from any browser")
+    with replacing(path) as temporary, tempfile.TemporaryDirectory() as home:
+        command = browser_command(browser, Path(home))
+        command += ["--no-pdf-header-footer", f"--print-to-pdf={temporary.resolve()}"]
+        try:
+            done = subprocess.run(
+                [*command, page.resolve().as_uri()], capture_output=True, timeout=PATIENCE
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise OutputError(f"{path}: {browser} failed: {error}") from None
+        if done.returncode or not temporary.exists():
+            last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+            raise OutputError(f"{path}: {browser} printed nothing: {' '.join(last)}")
+    return path

@@ -1,4 +1,4 @@
-"""Values at places and surfaces over several loads: the page's maps and its body to turn.
+"""Draw values at places and surfaces over several loads: maps, and a body to turn.
 
 Arrays are kept packed (`Packed`); maps are charts of coloured dots that Vega draws; the surface is
 drawn here for paper, and moved by a script of the page.
@@ -40,15 +40,13 @@ class Packed:
 
     @property
     def values(self) -> Array:
-        """The array; each value within half a `step` of what was packed.
+        """The array; each value within half a `step` of the packed one.
 
-        Raises
-        ------
-        ValueError : the data are damaged, or of another shape.
+        Raises ValueError: the data are damaged, or of another shape.
         """
         count = prod(self.shape)
         try:
-            # One byte more than wanted shows what is longer; nothing longer is unpacked.
+            # One byte more than expected shows longer data, which are not unpacked.
             raw = zlib.decompressobj().decompress(base64.b64decode(self.data), 2 * count + 1)
         except zlib.error as error:
             raise ValueError(f"packed numbers are damaged: {error}") from None
@@ -60,7 +58,7 @@ class Packed:
 
 
 def pack(values: ArrayLike) -> Packed:
-    """Numbers as text; infinite ones and NaN are missing."""
+    """Pack numbers as text; infinite ones and NaN are missing."""
     array = np.asarray(values, dtype=float)
     known = np.isfinite(array)
     least = float(array[known].min()) if known.any() else 0.0
@@ -72,7 +70,7 @@ def pack(values: ArrayLike) -> Packed:
     return Packed(array.shape, least, step, data)
 
 
-#: What stands beside each other in a row of maps, and how it is coloured.
+#: Maps of a row, and their colours.
 BESIDE: Mapping[str, Shades] = {
     "measured": "from least",
     "modelled": "from least",
@@ -120,7 +118,7 @@ class Maps:
 
 @dataclass(frozen=True)
 class Shade:
-    """What a solid can be coloured by: (loads, faces) in a unit."""
+    """Values that colour a solid: (loads, faces) in a unit."""
 
     name: str
     unit: str
@@ -153,10 +151,10 @@ def maps_of(
     caption: str,
     alt: str,
 ) -> Maps:
-    """Measured, modelled and their difference of several quantities.
+    """Return maps of several quantities: measured, modelled and their difference.
 
-    places : (n, 2) mm of each load. rows : name, unit, and of each load (n,) measured, modelled,
-    and what is left between them, of each quantity. labels : of the axes.
+    places : (n, 2) mm of each load. rows : name, unit, and of each load (n,) measured, modelled and
+    their difference, of each quantity. labels : of the axes.
     """
     every = [max(1, -(-len(own) // MOST_PLACES)) for own in places]
 
@@ -177,13 +175,13 @@ def maps_of(
 
 
 def frame_of(maps: Maps, values: Array, load: int) -> Array:
-    """What of values (all, ...) belongs to a load."""
+    """Return the part of values (all, ...) that belongs to a load."""
     first = sum(maps.counts[:load])
     return values[first : first + maps.counts[load]]
 
 
 def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
-    """Of the colours: the same for the maps of a row that have the same shades."""
+    """Return the ends of the colours, the same for maps of a row with the same shades."""
     alike = [p for p in maps.panels if p.row == panel.row and p.shades == panel.shades]
     every = np.concatenate([frame_of(maps, p.values.values, load) for p in alike])
     return ends_of(every, panel.shades)
@@ -214,14 +212,14 @@ def map_views(maps: Maps) -> list[dict[str, Any]]:
 
 
 def maps_data(maps: Maps) -> dict[str, Any]:
-    """Return what the page's script needs: all values, packed, and the ends of the colours."""
+    """Return all values, packed, and the ends of the colours, for the page's script."""
     loads = range(len(maps.loads))
     ends = [[row_ends(maps, panel, load) for panel in maps.panels] for load in loads]
     return asdict(maps) | {"ends": ends}
 
 
 def solid_data(solid: Solid) -> dict[str, Any]:
-    """Return what the page's script needs to turn a surface: values, and the first view."""
+    """Return values and first view of a surface, for the page's script."""
     every = solid.points.values
     return asdict(solid) | {
         "colours": COLOURS, "scale": scale_of(every), "middle": middle_of(every).tolist(),
@@ -241,7 +239,7 @@ CENTRE = (0.5 * (WIDTH - BAR), 0.5 * HEIGHT)
 
 
 def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
-    """The surface at a load, coloured by one of its shades."""
+    """Draw the surface at a load, coloured by one of its shades."""
     every = solid.points.values
     faces = np.rint(solid.faces.values).astype(int)
     flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
@@ -264,20 +262,20 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
 
 
 def middle_of(points: Array) -> Array:
-    """(3,) of the box around all loads, about which it is turned."""
+    """Return the middle (3,) of the box around all loads, about which the surface is turned."""
     flat = points.reshape(-1, 3)
     return np.asarray(0.5 * (flat.min(axis=0) + flat.max(axis=0)))
 
 
 def scale_of(points: Array) -> float:
-    """Of the picture, so that it fits however it is turned."""
+    """Return the scale at which the surface fits however it is turned."""
     flat = points.reshape(-1, 3)
     radius = float(np.linalg.norm(flat - middle_of(points), axis=1).max()) or 1.0
     return (min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / radius
 
 
 def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
-    """(n, 2) to the right and up, and (n,) how near, of points (n, 3) mm."""
+    """Return right and up (n, 2), and nearness (n,), of points (n, 3) mm."""
     a, b = np.radians(turn), np.radians(height)
     right = points @ (np.cos(a), np.sin(a), 0.0)
     away = points @ (-np.sin(a), np.cos(a), 0.0)
@@ -287,7 +285,7 @@ def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
 
 
 def scale_bar(shades: Shades, unit: str, low: float, high: float) -> str:
-    """The colours from low to high, upwards, with three values and the unit."""
+    """Draw the colours from low to high, upwards, with three values and the unit."""
     colours = COLOURS[shades]
     each = BAR_HEIGHT / len(colours)
     bars = "".join(
@@ -309,7 +307,7 @@ def short(value: float) -> str:
 
 
 def classes(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.intp]:
-    """Number of each value's colour, -1 where there is no value."""
+    """Return the number of each value's colour, -1 where there is no value."""
     share = (values - low) / (high - low)
     number = np.clip(np.floor(np.nan_to_num(share) * CLASSES), 0, CLASSES - 1).astype(np.intp)
     return np.where(np.isfinite(values), number, -1)

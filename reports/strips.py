@@ -277,9 +277,7 @@ def _grips(rest: Array, now: Array) -> list[Series]:
 def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
     """Return the strains of both yarns over the larger load, a chart a ratio.
 
-    Raises
-    ------
-    ValueError : no panels.
+    Raises ValueError: no panels.
     """
     if not panels:
         raise ValueError("biaxial_charts: no ratio to draw")

@@ -193,9 +193,7 @@ def nu12_charts(
 def profile_charts(panels: Sequence[ProfilePanel], threshold: float, caption: str) -> Charts:
     """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends.
 
-    Raises
-    ------
-    ValueError : no panels.
+    Raises ValueError: no panels.
     """
     if not panels:
         raise ValueError("profile_charts: no profiles to draw")

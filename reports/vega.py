@@ -1,4 +1,4 @@
-"""Charts drawn by Vega: as a file, as a figure of the page, and as what the page's script moves.
+"""Draw charts with Vega: as files, as figures of the page, and as views that a script moves.
 
 `panel` turns one `Chart` into the data, scales, axes, legends and marks of a Vega group. A file is
 a grid of such groups; on the page each is a view of its own. vl-convert runs Vega without a
@@ -239,9 +239,7 @@ def dark_style() -> str:
 def library() -> str:
     """Return Vega as one script for the page, kept in the cache of the computer.
 
-    Raises
-    ------
-    OutputError : vl-convert does not give it.
+    Raises OutputError: vl-convert does not give it.
     """
     path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
     try:

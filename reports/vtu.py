@@ -1,4 +1,4 @@
-"""Files for ParaView: deformed meshes (.vtu), and series of them (.pvd)."""
+"""Write files for ParaView: deformed meshes (.vtu), and series of them (.pvd)."""
 
 from __future__ import annotations
 

@@ -1,17 +1,20 @@
-"""The best of a fit's starts, run once more from the unloaded state: what counts as its result."""
+"""The best of a fit's starts, run again; its certainty; the optimum found again from its card."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
-from ..experiments.kinds import Refinable, strains_of
+from ..experiments.kinds import FittableTest, Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
+from ..inference.descent import descend
 from ..inference.linear import (
     NOT_DEFINITE,
     TOO_LITTLE,
@@ -26,35 +29,34 @@ from ..inference.linear import (
     second_of,
 )
 from ..inference.noise import Noise
+from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem
-from ..materials.card import CardCertainty, certainty_of, words_of
+from ..inference.search import evaluate_law
+from ..materials.card import CardCertainty, MaterialCard, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind
-from .setup import FitSetup, with_shared
+from ..project.project import Project
+from .series import card_of, card_words, fitted_card
+from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .starts import StartRecord
 
 Array = NDArray[np.float64]
 
-#: Relative difference of an objective and of the same, run again, that is rounding; and of what
-#: the data's own noise would add to it, which an objective near zero cannot be told from.
+#: Rounding of an objective run again, relative to itself and to the share of the data's noise.
 ROUNDING, UNTOLD = 1e-5, 1e-6
-#: Least strain that counts as reached.
+#: Least reached strain.
 LEAST_STRAIN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class BestFit:
-    """The best fit as it is run again.
+    """The best fit, run again.
 
-    Parameters
-    ----------
-    point : the analysis by the solver that counts; differentiated : the same point by the solver
-        that differentiates, where it could.
-    ranked : the starts that ended with a fit, best first, the best with the objective of `point`;
-        records : all of them, by number.
-    reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. certainty : of
-        `budget.with_certainty`; None before it, and where there are no derivatives.
+    point : analysis by the project's solver. differentiated : same point by the solver that
+    differentiates, if it could. ranked : starts with a fit, best first. records : all starts, by
+    number. reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. certainty : of
+    `with_certainty`; None without derivatives.
     """
 
     point: Evaluation
@@ -67,23 +69,18 @@ class BestFit:
 
     @property
     def objective(self) -> float:
-        """What the best fit leaves, from the unloaded state."""
+        """Return the objective of the best fit, from the unloaded state."""
         return self.point.value
 
     @property
     def valid(self) -> Array:
-        """(3,) ends of the strains for which the moduli are fitted, not held."""
+        """Return the ends (3,) of the strains for which the moduli are fitted, not held."""
         return np.minimum(self.reached, self.law.strain_range)
 
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
-    """Run the best of the starts again.
+    """Run the best of the starts again; another program gets a second try.
 
-    It ran once. Another program that fails now has lost its licence or its machine, most likely,
-    and gets a second try.
-
-    Parameters
-    ----------
     tolerance : objectives below it are the same.
 
     Raises
@@ -112,23 +109,20 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
 
 
 def _like(record: StartRecord, first: StartRecord) -> StartRecord:
-    """A record as it is; that of the best start, or with its fit, as it was run again."""
+    """Return a record with the objective run again if its fit is that of the best start."""
     if record.number == first.number:
         return first
     return replace(record, objective=first.objective) if record.same_as == first.number else record
 
 
 def ranking(records: Sequence[StartRecord]) -> list[StartRecord]:
-    """The starts that ended with a fit, best first."""
+    """Return the starts that ended with a fit, best first."""
     ended = [r for r in records if r.objective is not None]
     return sorted(ended, key=lambda r: (r.objective, r.number))
 
 
 def noise_of(problem: FitProblem) -> dict[str, float]:
-    """What the data's own noise adds to the objective, by comparison: no law can do better.
-
-    The noise is the specimens' scatter where it is known, or what the instrument is good for.
-    """
+    """Return the share of noise (scatter or instrument) in the objective, by comparison."""
     return {
         c.name: Blocks(c.objective.sizes).value(c.objective.least_noise / c.objective.scale)
         for c in problem.comparisons
@@ -138,7 +132,7 @@ def noise_of(problem: FitProblem) -> dict[str, float]:
 def _repeated(
     problem: FitProblem, record: StartRecord, point: Evaluation, tolerance: float
 ) -> StartRecord:
-    """The record of the best start with the objective that the run from the unloaded state has."""
+    """Return the best record with the objective of the run from the unloaded state."""
     assert record.objective is not None
     before, now = record.objective, point.value
     untold = tolerance + UNTOLD * sum(noise_of(problem).values())
@@ -152,23 +146,19 @@ def _repeated(
     return replace(record, objective=now)
 
 
-#: Elements and increments are divided by it, once.
+#: Factor of the finer mesh.
 FINER = 2.0
-#: What a project says of it (`fit.mesh_error`).
+#: Values of `fit.mesh_error`.
 TOLD, TAKEN_OUT = "told", "taken out"
-#: Less of a modulus is no matter, whatever the noise.
+#: Relative error of a modulus that needs no note, whatever the noise.
 LEAST = 0.01
 
 
 def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
-    """Where ever finer meshes would take the best fit, and what they would leave.
+    """Return the limit of the best fit on ever finer meshes, and its residual.
 
-    None where its derivatives are not known, where another program runs the tests (a finer run of
-    it is not made unasked), or where a kind of test knows no finer model.
-
-    Raises
-    ------
-    InputError, SolverFailure : the finer model cannot be made or does not run.
+    None without derivatives, if another program runs the tests (it is not run unasked), or if a
+    kind of test has no finer model. Raises InputError, SolverFailure of the finer model.
     """
     if best.differentiated is None or problem.solver.external:
         return None
@@ -186,7 +176,7 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
 
 
 def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
-    """Each modulus that the mesh moves by more than the noise does, where that is most."""
+    """Return a note a modulus that the mesh moves by more than the noise, where most."""
     notes = []
     for name in COMPONENTS:
         beyond = np.abs(mesh[name]) - np.maximum(sure.sigma[name], LEAST)
@@ -202,7 +192,7 @@ def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
 
 
 def note_of_limit(mesh: dict[str, Array]) -> Note:
-    """That the card is not that of the mesh that the fit was run with."""
+    """Return the note that the card is not that of the mesh of the fit."""
     by = ", ".join(f"{name} {100 * off[np.abs(off).argmax()]:+.2g} %" for name, off in mesh.items())
     words = (
         f"the error of the mesh is taken out of the moduli ({by} at most): the card is the law of "
@@ -216,10 +206,10 @@ NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of
 
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
-    """The best fit with its certainty; as it is where its derivatives are not known.
+    """Return the best fit with its certainty, if its derivatives are known.
 
-    What the mesh leaves is no noise: that is what finer models would leave. Where the project asks
-    for it, the law is that of ever finer meshes; the analysis stays that of the fit.
+    Noise is the residual of finer models. If the project asks for it, the law is that of ever finer
+    meshes; the analysis stays that of the fit.
     """
     slopes = best.differentiated
     if slopes is None:
@@ -244,7 +234,7 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
 def _certainty(
     problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array, limit: Limit | None
 ) -> Certainty:
-    """By the first derivatives; by the second where much is left, and they say something else."""
+    """Return the certainty by first derivatives, by second if much is left and they differ."""
     first = certainty(problem, best, law, reached, limit)
     left = best.residual if limit is None else limit.residual
     if not large(problem, left):
@@ -273,17 +263,17 @@ def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit |
         return None, [Note(NoteKind.MESH, words)]
 
 
-#: Draws within the bounds of the fit of which the directions are made.
+#: Number of draws for the certainty of a card.
 DRAWS = 2000
 
 
 def card_certainty(
     problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
 ) -> CardCertainty | None:
-    """About the card's law, from draws that keep the bounds of the fit; None where none is known.
+    """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
 
-    Where the error of the mesh is told and not taken out, the draws lie about the law of ever
-    finer meshes: how far that is from the card's counts as a standard deviation does.
+    With an error of the mesh that is not taken out, draws lie about the law of ever finer meshes:
+    its distance from the card's counts as a standard deviation.
     """
     sure = best.certainty
     known = None if sure is None else sure.fine or sure.posterior
@@ -294,3 +284,122 @@ def card_certainty(
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
     return certainty_of(law, drawn @ unknowns.to_coefficients.T, words)
+
+
+#: A card, its file or its name; None for that of the project's fit.
+Card = MaterialCard | Path | str | None
+
+
+#: Limit of analyses from the card to the optimum, and damping of the first.
+MOST, DAMPING = 40, 1e-6
+
+
+#: Relative change of a modulus beyond which the card was not the optimum.
+MOVED = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """A fit's optimum, found again from its card, with derivatives and certainty.
+
+    card : name of the card. moved : largest relative change of each modulus from the card.
+    """
+
+    setup: FitSetup
+    problem: FitProblem
+    best: BestFit
+    card: str
+    analyses: int
+    moved: dict[str, float]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def sure(self) -> Certainty:
+        """Return the certainty."""
+        assert self.best.certainty is not None
+        return self.best.certainty
+
+    @property
+    def posterior(self) -> Posterior:
+        """Return the posterior of the unknowns, from the noise alone."""
+        assert self.sure.posterior is not None
+        return self.sure.posterior
+
+    @property
+    def point(self) -> Evaluation:
+        """Return the optimum."""
+        return self.best.point
+
+    @property
+    def linear(self) -> Linear:
+        """Return the linear fit there, with the noise of the certainty."""
+        assert self.sure.rows is not None
+        noise = replace(Noise.of(self.problem, self.point.residual), rows=self.sure.rows)
+        return Linear.of(self.problem, self.point, noise, self.sure.second)
+
+
+def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> Optimum:
+    """Find the optimum of the project's fit from a card, by a solver that differentiates.
+
+    card : of a fit of these tests; unless given that of the project's fit in its usual folder.
+
+    Raises
+    ------
+    InputError : in the project or its data; no card, or one of another form. SolverFailure : the
+        tests cannot be run with it.
+    """
+    notes = []
+    named = project.fit.solver
+    if make_solver(project).external:
+        said = f"run by {SURROGATE}, which leads {named}: that gives no derivatives"
+        notes.append(Note(NoteKind.SOLVER, said))
+        project = project.with_solver(SURROGATE, {})
+    material = card_of(project, card if card is not None else fitted_card(project))
+    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
+    problem = setup.problem()
+    point = evaluate_law(problem, _unknowns(setup, problem, material), with_jacobian=True)
+    if point is None:
+        said = f"the tests cannot be run with the card: {problem.failure}"
+        raise SolverFailure(said, problem.solver.name)
+    tolerance, most = project.fit.tolerance, problem.analyses + MOST
+    found, status = descend(problem, point, tolerance, most, norms=True, damping=DAMPING)
+    y, coefficients = (tuple(v.tolist()) for v in (found.unknowns, found.coefficients))
+    analyses = problem.analyses
+    record = StartRecord(
+        0, (project.fit.seed, 0), found.value, status, analyses, y, coefficients, 0.0
+    )
+    best = with_certainty(setup, problem, best_fit(problem, [record], tolerance))
+    moved = _moved(material, best)
+    far = [f"{name} by {100 * by:+.2g} %" for name, by in moved.items() if abs(by) > MOVED]
+    if far:
+        words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
+        notes.append(Note(NoteKind.NOT_THE_CARD, words))
+    words = "of the fit" if card is None else card_words(card)
+    return Optimum(setup, problem, best, words, analyses + 1, moved, tuple(notes))
+
+
+def _unknowns(setup: FitSetup, problem: FitProblem, card: MaterialCard) -> Array:
+    """Return the unknowns (count,) of a card; raises InputError for another form."""
+    own, unknowns = card.law.form, problem.unknowns
+    if own != setup.law.form:
+        expected = (
+            f"expected a card of this project's fit: its moduli are {setup.law.form.describe()}, "
+            f"those of the card {own.describe()}"
+        )
+        raise InputError(setup.project.path, "--card", expected)
+    y = unknowns.at(card.law.beta[list(unknowns.free)])
+    known = {"nu12": card.law.nu12, "thickness": card.thickness}
+    for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
+        if shared.name in known:
+            y[place] = min(max(known[shared.name], shared.lower), shared.upper)
+    return y
+
+
+def _moved(card: MaterialCard, best: BestFit) -> dict[str, float]:
+    moved = {}
+    for name, component in COMPONENTS.items():
+        end = min(float(best.valid[component]), float(card.law.strain_range[component]))
+        strain = np.linspace(0.0, end, 21)
+        change = best.law.modulus(name, strain) / card.law.modulus(name, strain) - 1.0
+        moved[name] = float(change[np.abs(change).argmax()])
+    return moved

@@ -1,4 +1,4 @@
-"""Bootstrap of a fit: its frames, specimens or tests drawn again and again, and fitted anew."""
+"""Bootstrap a fit: draw its frames, specimens or tests with replacement and fit every draw."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
+from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Store
-from .presenters import write_report
-from .refound import Card, Refound, refound
+from .presenters import Presented
 from .series import mark_of, read_marked, write_marked
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
@@ -35,15 +35,34 @@ from .validation import TESTS, name_of, parts_of
 if TYPE_CHECKING:
     import pandas as pd
 
+Array = NDArray[np.float64]
+
+#: Units of a group, and samples, below which percentiles are noted as unreliable.
+FEW, FEW_SAMPLES = 5, 40
+#: Relative difference below which numbers are equal.
+ROUNDING = 1e-9
+#: Strains of each modulus in the table.
+PLACES = 21
+METHOD = (
+    "Units are drawn with replacement, each among its own group, and count as often as they were "
+    "drawn; every sample is fitted from the optimum of all. The bands are percentiles of the "
+    "samples. They hold what differs between the units, and nothing that all of them share: "
+    "the error of the mesh, a wrong form of the law or of the model, noise that is given and not "
+    "in the residual."
+)
+COUNT = 100
+#: Analyses of a refit, at most, beside the optimum's, which none runs again; its first damping.
+MOST, DAMPING = 4, 1e-9
+#: Predicted decrease of the sum of squares, relative, that is not worth an analysis.
+NEGLIGIBLE = 1e-5
+#: Called with the samples done, all samples, and what is running.
+Progress = Callable[[int, int, str], None]
 SAMPLES = "bootstrap-samples.json"
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One refit. counts : by group, how often each unit was drawn. unknowns : the optimiser's.
-
-    status : how the descent ended, as that of a fit.
-    """
+    """One refit: how often each unit of each group was drawn, and the optimiser's unknowns."""
 
     number: int
     counts: Sequence[Sequence[int]]
@@ -52,17 +71,17 @@ class Sample:
     status: str
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, exact in JSON."""
+        """Return plain values, exact in JSON."""
         return asdict(self)
 
 
 class BootstrapRecord:
     """Samples under a mark of all that they depend on, the optimum they began at among it.
 
-    folder : None where nothing is written. resume : go on with what it holds.
+    folder : None where nothing is written. resume : read what the folder holds.
     """
 
-    def __init__(self, folder: Path | None, found: Refound, over: str, resume: bool) -> None:
+    def __init__(self, folder: Path | None, found: Optimum, over: str, resume: bool) -> None:
         at = [f"{value:.6g}" for value in found.point.unknowns]
         parts = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
         self._mark = mark_of(parts)
@@ -83,34 +102,15 @@ def _by_number(content: dict[str, Any]) -> dict[int, Sample]:
     return {row["number"]: Sample(**row) for row in content["samples"]}
 
 
-Array = NDArray[np.float64]
-
-#: Units of a group, below which their percentiles say little; samples, likewise.
-FEW, FEW_SAMPLES = 5, 40
-#: Of a number: what differs by less does not differ.
-ROUNDING = 1e-9
-#: Strains of each modulus in the table.
-PLACES = 21
-METHOD = (
-    "Units are drawn with replacement, each among its own group, and count as often as they were "
-    "drawn; every sample is fitted from the optimum of all. The bands are percentiles of the "
-    "samples. They hold what differs between the units, and nothing that all of them share: "
-    "the error of the mesh, a wrong form of the law or of the model, noise that is given and not "
-    "in the residual."
-)
-
-
 @dataclass(frozen=True, eq=False)
-class Bootstrap:
-    """Samples of a fit's data, fitted.
+class Bootstrap(Presented):
+    """Fits to samples of a fit's data.
 
-    Parameters
-    ----------
-    found : the fit to all of the data. over : the sort of units. groups : the units. before :
-        analyses that were needed before the first sample.
+    found : the fit to all of the data. over : the sort of units, by `groups`. before : analyses
+    before the first sample.
     """
 
-    found: Refound
+    found: Optimum
     over: str
     groups: Sequence[Group]
     samples: Sequence[Sample]
@@ -118,46 +118,46 @@ class Bootstrap:
 
     @property
     def analyses(self) -> int:
-        """In all."""
+        """Number of all analyses."""
         return self.before + sum(sample.analyses for sample in self.samples)
 
     @property
     def unfinished(self) -> int:
-        """Samples whose analyses were used up on the way."""
+        """Number of samples that used up their analyses before they converged."""
         return sum(sample.status == ANALYSES_USED_UP for sample in self.samples)
 
     @property
     def strains(self) -> dict[str, Array]:
-        """(n,) by modulus, up to what the tests reached."""
+        """Strains (n,) by modulus, up to those that the tests reached."""
         valid = self.found.best.valid
         return {name: np.linspace(0.0, valid[c], PLACES) for name, c in COMPONENTS.items()}
 
     @cached_property
     def unknowns(self) -> Array:
-        """(samples, count)."""
+        """Unknowns of the optimiser, (samples, count)."""
         return np.array([sample.unknowns for sample in self.samples])
 
     @cached_property
     def moduli(self) -> dict[str, Array]:
-        """(samples, n) MPa by modulus."""
+        """Moduli of the samples, MPa (samples, n) by name."""
         own = self.found.problem.unknowns
         each = [moduli_of(own, y, self.strains) for y in self.unknowns]
         return {name: np.array([one[name] for one in each]) for name in COMPONENTS}
 
     @cached_property
     def bands(self) -> dict[str, Array]:
-        """(2, n) MPa by modulus: percentiles."""
+        """Percentiles of the moduli, MPa (2, n) by name."""
         ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
         return {name: np.quantile(own, ends, axis=0) for name, own in self.moduli.items()}
 
     @cached_property
     def of_fit(self) -> dict[str, Array]:
-        """(2, n) MPa by modulus: the fit's own bands by the noise alone."""
+        """The fit's own bands by the noise alone, MPa (2, n) by modulus."""
         return bands_of(self.found.posterior, self.found.best.law, self.strains)
 
     @cached_property
     def sigma(self) -> dict[str, tuple[float, float]]:
-        """By modulus, 1 sigma relative, root mean square along its strain: samples, and fit."""
+        """1 sigma of samples and fit by modulus, relative, root mean square along its strain."""
         spread, first, sure = {}, {}, self.found.sure
         for name, own in self.moduli.items():
             best = self.found.best.law.modulus(name, self.strains[name])
@@ -167,10 +167,10 @@ class Bootstrap:
         return {name: (samples[name], fit[name]) for name in samples}
 
     def coefficients(self) -> pd.DataFrame:
-        """A row an unknown: value, sigma of the samples and of the fit, and correlations.
+        """Return a row an unknown: value, sigma of the samples and of the fit, and correlations.
 
         Columns unknown, value, sigma, sigma_of_fit (MPa of a coefficient, else its own unit),
-        and by each unknown's name the correlation over the samples.
+        then the correlations over the samples by name of the other unknown.
         """
         import pandas as pd
 
@@ -196,34 +196,25 @@ class Bootstrap:
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
 
     def table(self) -> pd.DataFrame:
-        """The moduli along their strains: modulus, strain, MPa, lower_MPa, upper_MPa, median_MPa,
-        sigma_relative of the samples, fit_lower_MPa, fit_upper_MPa (noise alone)."""
+        """Return the moduli along their strains, with both bands."""
         import pandas as pd
 
         found = []
         for name, strain in self.strains.items():
-            best = self.found.best.law.modulus(name, strain)
-            found.append(
-                pd.DataFrame(
-                    {
-                        "modulus": name,
-                        "strain": strain,
-                        "MPa": best,
-                        "lower_MPa": self.bands[name][0],
-                        "upper_MPa": self.bands[name][1],
-                        "median_MPa": np.median(self.moduli[name], axis=0),
-                        "sigma_relative": self.moduli[name].std(axis=0, ddof=1) / best,
-                        "fit_lower_MPa": self.of_fit[name][0],
-                        "fit_upper_MPa": self.of_fit[name][1],
-                    }
-                )
-            )
+            best, own = self.found.best.law.modulus(name, strain), self.moduli[name]
+            (low, high), (fit_low, fit_high) = self.bands[name], self.of_fit[name]
+            found.append(pd.DataFrame({
+                "modulus": name, "strain": strain, "MPa": best, "lower_MPa": low,
+                "upper_MPa": high, "median_MPa": np.median(own, axis=0),
+                "sigma_relative": own.std(axis=0, ddof=1) / best,
+                "fit_lower_MPa": fit_low, "fit_upper_MPa": fit_high,
+            }))  # fmt: skip
         return pd.concat(found, ignore_index=True)
 
     @property
     def notes(self) -> list[Note]:
-        """Where percentiles say little."""
-        told = list(self.found.notes)
+        """Notes of the fit, and where percentiles are unreliable."""
+        notes = list(self.found.notes)
         for group in self.groups:
             count = len(group.units)
             if count < FEW:
@@ -231,15 +222,15 @@ class Bootstrap:
                     f"{count} {self.over} only: so few drawn from themselves scatter less than "
                     "others would, and the percentiles are too narrow"
                 )
-                told.append(Note(NoteKind.FEW_UNITS, words, group.name))
+                notes.append(Note(NoteKind.FEW_UNITS, words, group.name))
         if len(self.samples) < FEW_SAMPLES:
             words = f"{len(self.samples)} samples: the ends of the bands are those of one or two"
-            told.append(Note(NoteKind.FEW_UNITS, words))
-        return told
+            notes.append(Note(NoteKind.FEW_UNITS, words))
+        return notes
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         setup = self.found.setup
         return {
             "command": "bootstrap",
@@ -262,9 +253,9 @@ class Bootstrap:
         }
 
     def lines(self) -> list[str]:
-        """For the terminal."""
+        """Return the result in words, for the terminal."""
         drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
-        told = [
+        lines = [
             f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
             "1 sigma, root mean square along the strain: "
             + ", ".join(
@@ -273,27 +264,8 @@ class Bootstrap:
             ),
         ]
         if self.unfinished:
-            told.append(f"{self.unfinished} samples used up their analyses before they settled")
-        return [*told, *note_lines(self.notes)]
-
-    def write(self, folder: Path | str) -> None:
-        """Write bootstrap.csv, coefficients.csv, bootstrap.png, report.html, notes.csv and, last,
-        result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        write_report(self, folder)
-
-
-COUNT = 100
-#: Analyses of a refit, at most, beside the optimum's, which none runs again; its first damping.
-MOST, DAMPING = 4, 1e-9
-#: Predicted decrease of the sum of squares, relative, that is not worth an analysis.
-NEGLIGIBLE = 1e-5
-#: Told how many of how many samples are done, and of what.
-Progress = Callable[[int, int, str], None]
+            lines.append(f"{self.unfinished} samples used up their analyses before they settled")
+        return [*lines, *note_lines(self.notes)]
 
 
 def bootstrap(
@@ -309,28 +281,28 @@ def bootstrap(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> Bootstrap:
-    """Draw parts of the data with replacement and fit them, again and again.
+    """Draw parts of the data with replacement and fit every draw.
 
-    Every refit begins at the optimum of the fit that left the card, whose analysis it does not
-    repeat, and takes a few of its own. Nothing is read anew: what was drawn twice counts twice.
+    Every refit begins at the optimum of the fit that wrote the card and takes a few analyses. What
+    is drawn twice counts twice.
 
     Parameters
     ----------
     over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
-        "specimens", "directions", "ratios". samples : how often. card : the one that the project's
-        fit left in its usual folder unless given. tests : as for `fit`. seed : of the draws, the
-        project's unless given. out : folder in which every sample is kept as it ends; resume :
-        go on with what it holds.
+        "specimens", "directions", "ratios". samples : number of draws. card : the one that the
+        project's fit left in its usual folder unless given. tests : as for `fit`. seed : of the
+        draws, the project's unless given. out : folder in which every sample is kept as it ends;
+        resume : read what it holds.
 
     Raises
     ------
-    InputError : in the project or its data; nothing of which there are two. OutputError : the
+    InputError : in the project or its data; fewer than two units. OutputError : the
         folder is used or cannot be written. SolverFailure : the tests cannot be run with the card.
     """
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")
     project = project.with_fit(seed=seed)
-    found = refound(project, card, tests)
+    found = find_optimum(project, card, tests)
     groups = groups_of(found, over)
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -351,18 +323,13 @@ def bootstrap(
     return Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before)
 
 
-def groups_of(found: Refound, over: str) -> list[Group]:
-    """The units that are drawn, and among which.
-
-    Raises
-    ------
-    InputError : there are no two of them.
-    """
+def groups_of(found: Optimum, over: str) -> list[Group]:
+    """Return the units that are drawn, each among its group; raises InputError without any."""
     return _tests(found) if over == TESTS else _parts(found, over)
 
 
-def _tests(found: Refound) -> list[Group]:
-    """Tests among those of their kind."""
+def _tests(found: Optimum) -> list[Group]:
+    """Return tests, grouped by kind."""
     setup, problem = found.setup, found.problem
     numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
     kinds: dict[str, list[Unit]] = {}
@@ -378,10 +345,10 @@ def _tests(found: Refound) -> list[Group]:
     return several
 
 
-def _parts(found: Refound, sort: str) -> list[Group]:
-    """Parts of tests: among those of their comparison, whole comparisons among those of the test.
+def _parts(found: Optimum, sort: str) -> list[Group]:
+    """Return parts of tests, grouped by comparison; whole comparisons are grouped by test.
 
-    Specimens are so drawn direction by direction.
+    So specimens are drawn direction by direction.
     """
     setup, problem = found.setup, found.problem
     grouped: dict[str, list[Unit]] = {}
@@ -397,7 +364,7 @@ def _parts(found: Refound, sort: str) -> list[Group]:
     return several
 
 
-def _task(found: Refound, groups: Sequence[Group], seed: int) -> Task:
+def _task(found: Optimum, groups: Sequence[Group], seed: int) -> Task:
     problem = found.setup.problem()
     # With derivatives, from the unloaded state: every sample starts from here.
     point = problem.evaluate(found.point.unknowns, True, warm=False)

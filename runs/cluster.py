@@ -1,8 +1,7 @@
-"""Tasks on a Dask cluster: handed to workers one by one, again elsewhere where a worker dies.
+"""Tasks on a Dask cluster: handed to workers one by one, again elsewhere if a worker dies.
 
-Every worker thread has one task at a time, which is meant for it alone: so it is known which task a
-worker had when it died, nothing waits behind a long task while another worker is idle, and workers
-that come later are used. What a task told comes with what it gives, once.
+Each worker thread has one task of its own at a time: so the task of a dead worker is known, nothing
+waits behind a long task, and later workers are used. Reports of a task come with its result, once.
 """
 
 from __future__ import annotations
@@ -28,9 +27,10 @@ from ..files import __version__
 from ..solvers.base import Announcement, announce, hearing, pass_on
 from ..solvers.decks import CODE, file_mark
 from ..solvers.process import ANSWER_S, Unwanted, connected, unless
-from .executor import Task
 
 log = logging.getLogger(__name__)
+#: Does the task of a number; what it reports on the way and what it returns are records.
+Task = Callable[[int, Callable[[Any], None]], Any]
 #: s between two looks at who is there, and to an event.
 LOOK_S, WAIT_S = 1.0, 0.5
 #: s for the result of a task that has ended to come here.
@@ -90,7 +90,7 @@ class Series:
         client.subscribe_topic(self.name, lambda event: self.events.put(Announcement(*event[1])))
 
     def run(self) -> Iterator[Any]:
-        """Records as they come, None now and then."""
+        """Yield records as they come, None now and then."""
         while self.waiting or any(number is not None for _, _, number in self.running.values()):
             if time.monotonic() - self._looked >= LOOK_S:
                 yield from self._look()
@@ -108,14 +108,14 @@ class Series:
                 yield from self._ended(*self.running.pop(event.key))
 
     def cancel(self) -> None:
-        """Let nothing run on: workers look now and then whether their task is still wanted."""
+        """Cancel all tasks: workers look now and then if their task is still wanted."""
         futures = [future for future, _, _ in self.running.values()]
         if futures and self.client.status == "running":
             self.client.cancel(futures, force=True)
         self.running.clear()
 
     def _look(self) -> Iterator[Any]:
-        """Look which workers have gone and which have come."""
+        """Register workers that have gone or come."""
         try:
             ask = self.client.scheduler.ncores
             there = self.client.sync(ask, workers=None, callback_timeout=ANSWER_S)
@@ -151,9 +151,7 @@ class Series:
     def _submit(self, worker: str, number: int | None) -> None:
         options = {"workers": [worker], "allow_other_workers": False, "pure": False}
         if number is None:
-            wanted = version()
-            give = self.client.submit
-            future = give(join, self.name, self.prepare, wanted, **options)
+            future = self.client.submit(join, self.name, self.prepare, version(), **options)
         else:
             future = self.client.submit(work, self.name, number, self.name, **options)
         self.running[future.key] = (future, worker, number)
@@ -222,7 +220,7 @@ class Series:
 
 
 def _other(said: Any, wanted: tuple[str, str, str]) -> str:
-    """In what a worker is another."""
+    """Return the differences of a worker."""
     if isinstance(said, BaseException):
         return f"no bubblefit of this version ({type(said).__name__}: {said})".splitlines()[0]
     names = ("Python", "bubblefit", "code of bubblefit")
@@ -249,11 +247,11 @@ def version() -> tuple[str, str, str]:
 
 
 def _code() -> str:
-    """SHA-256 of every module and template of the package, not of tests and documents beside it."""
+    """Return the SHA-256 of all modules and templates of the package."""
     files = [*ROOT.glob("*.py")]
-    for room in ROOT.iterdir():
-        if room.name == "templates" or (room / "__init__.py").exists():
-            files += [path for path in room.rglob("*") if path.suffix in CODE]
+    for folder in ROOT.iterdir():
+        if folder.name == "templates" or (folder / "__init__.py").exists():
+            files += [path for path in folder.rglob("*") if path.suffix in CODE]
     named = {path.relative_to(ROOT).as_posix(): path for path in files}
     marks = [(name, file_mark(named[name])) for name in sorted(named)
              if name.split("/")[0] not in ("tests", "setup.py")]  # fmt: skip
@@ -261,7 +259,7 @@ def _code() -> str:
 
 
 def join(series: str, prepare: bytes, wanted: tuple[str, str, str]) -> tuple[str, str, str]:
-    """Take what prepares a series of tasks, if this is the version that is wanted; which it is."""
+    """Return this version; keep what prepares a series of tasks if it is the wanted one."""
     if version() == wanted:
         _prepared[series] = prepare
         while len(_prepared) > MOST:
@@ -270,16 +268,11 @@ def join(series: str, prepare: bytes, wanted: tuple[str, str, str]) -> tuple[str
 
 
 class NotJoined(Exception):
-    """A worker that came again under its address, without what it was given before."""
+    """A worker that came back under its address without the series."""
 
 
 def work(series: str, number: int, topic: str) -> list[Any]:
-    """Do the task of a number: everything that it told, and last what it gives.
-
-    Raises
-    ------
-    NotJoined : the worker knows nothing of the series. Unwanted : the task was cancelled.
-    """
+    """Return the reports of a task and last its result; raises NotJoined, Unwanted."""
     from distributed import get_worker
 
     worker: Any = get_worker()
@@ -305,7 +298,7 @@ def work(series: str, number: int, topic: str) -> list[Any]:
 
 
 def _task(series: str) -> Any:
-    """Return what does the tasks of a series; made once a thread, as solvers keep things."""
+    """Return the task of a series, made once a thread, as solvers keep things."""
     ready: dict[str, Any] | None = getattr(_ready, "tasks", None)
     if ready is None or series not in ready:
         if series not in _prepared:

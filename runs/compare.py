@@ -1,4 +1,4 @@
-"""Which form of the moduli do the tests support? Fits of several forms, cross-validated."""
+"""Fit several forms of the moduli and cross-validate them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -23,21 +23,28 @@ from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import executor_of
-from .fit import FitEvent
-from .presenters import write_report
+from .fit import FitEvent, stored_fit
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
-from .stored_fit import stored_fit
 
-#: Of a spline, where neither the project nor the caller says how many.
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Knots of a spline where neither the project nor the caller gives a number.
 KNOTS = 6
+VALIDATION = "validation.json"
+#: Share of the least cross-validated error within which a simpler form is as good.
+AS_GOOD = 0.05
+#: Starts of the fit of a form, and of the fit of a fold.
+STARTS, FOLD_STARTS = 5, 2
+FOLDS = 5
+LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
 
 
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
-    """The project with each of the forms asked for, by name; with all unless any is.
-
-    All are those that the project's solver carries.
+    """Return the project with each of the forms, by name; all that its solver carries unless given.
 
     names : of forms; "spline:8" is a spline of eight knots for each modulus.
 
@@ -74,13 +81,13 @@ def _carried(project: Project) -> list[str]:
 
 
 def plain(name: str) -> str:
-    """A form's name as that of a folder."""
+    """Return a form's name as that of a folder."""
     return name.replace(":", "-")
 
 
 @dataclass(frozen=True)
 class FoldError:
-    """One fold: errors at the points left out.
+    """Errors at the points that a fold leaves out.
 
     value : their part of the objective; rms : root mean square by comparison, in its unit. None and
     empty where no fit without them, or no analysis, ended well.
@@ -91,20 +98,24 @@ class FoldError:
     rms: Mapping[str, float]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, exact in JSON."""
+        """Return plain values, exact in JSON."""
         return asdict(self)
 
 
+#: Called with the name of each form, then the records of its starts and folds; None now and then.
+Progress = Callable[[str | FitEvent | FoldError | None], None]
+
+
 def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
-    """Number of the specimen of each point that can be left out, by comparison."""
+    """Return the specimen's number of each point that can be left out, by comparison."""
     return {name: list(own) for test in setup.tests for name, own in test.specimens.items()}
 
 
 def folds(setup: FitSetup, count: int) -> list[Masks]:
-    """Which points the folds keep: at most `count` folds, and no more than there are specimens."""
-    whose = specimens_of(setup)
-    several = [len(set(own)) for own in whose.values() if len(set(own)) > 1]
-    return folds_of(whose, min([count, *several]), setup.project.fit.seed)
+    """Return the points that the folds keep: at most `count` folds, one a specimen at most."""
+    specimens = specimens_of(setup)
+    several = [len(set(own)) for own in specimens.values() if len(set(own)) > 1]
+    return folds_of(specimens, min([count, *several]), setup.project.fit.seed)
 
 
 def validate(
@@ -112,14 +123,13 @@ def validate(
 ) -> Iterator[FoldError | None]:
     """Fit without the points of each fold and judge at these points; None now and then.
 
-    What follows from the data (strain range and breaks of the law, what a relative error is over)
-    follows from the points matched, and the fits begin at random starts of their own: nothing of
-    the points left out is in them but how far the models are strained, to be judged there.
+    Strain range and breaks of the law, and scales of relative errors, follow from the points
+    matched, and the fits begin at random starts of their own: the points left out enter only by
+    how far the models are strained.
 
     Parameters
     ----------
-    count : of folds, at most. starts : random starts a fold, the best of which counts. done : folds
-        that are known already.
+    count : of folds, at most. starts : random starts a fold, the best of which counts.
     """
     parts = folds(setup, count)
     missing = [fold for fold in range(len(parts)) if fold not in done]
@@ -136,7 +146,7 @@ def _task(
 
 
 def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.ndarray | None]:
-    """The fit with a law of the points that the masks keep; unknowns None where all starts fail."""
+    """Fit a law to the points that the masks keep; unknowns are None where all starts fail."""
     law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
     own = replace(setup, law=law)
     return own, best_of(own, own.problem(masks), starts)
@@ -157,7 +167,7 @@ def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
 
 
 def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
-    """Unknowns of the best of some starts; None where all failed."""
+    """Return the unknowns of the best of some starts; None where all failed."""
     best, least = None, np.inf
     for number in range(starts):
         problem.reset()
@@ -172,20 +182,17 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
 
 
 def part_of_objective(problem: FitProblem, residual: np.ndarray) -> float:
-    """What the problem's comparisons add to the objective."""
+    """Return the share of the problem's comparisons in the objective."""
     return float(problem.blocks.norms(residual).sum())
 
 
 def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
-    """Root mean square by comparison, in its unit."""
+    """Return the root mean square by comparison, in its unit."""
     misfit = residual * problem.scale
     return {
         c.name: float(np.sqrt(np.mean(misfit[problem.rows(k)] ** 2)))
         for k, c in enumerate(problem.comparisons)
     }
-
-
-VALIDATION = "validation.json"
 
 
 def validated_folds(
@@ -196,10 +203,10 @@ def validated_folds(
     folder: Path | None,
     tell: Callable[[FoldError | None], None],
 ) -> tuple[FoldError, ...]:
-    """Errors of the folds, as they were written where they are of this fit.
+    """Return the errors of the folds, read where the folder has them of this fit.
 
-    folds, starts : how many folds at most, and random starts of each. folder : of the fit, where
-    the errors are written; None where nothing is. tell : hears each fold that ended, and time pass.
+    folds : at most; starts : random starts of each. folder : None where nothing is written. tell :
+    called with each fold that ended, and with None now and then.
     """
     parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
     mark = mark_of(parts)
@@ -215,28 +222,16 @@ def validated_folds(
 
 
 def written_folds(path: Path, mark: str) -> dict[int, FoldError]:
-    """What an interrupted run has validated already, by fold; nothing of another fit."""
+    """Read the errors of an interrupted run, by fold; none of another fit."""
     found = read_marked(path, mark, lambda told: [FoldError(**fold) for fold in told["folds"]])
     return {error.fold: error for error in found or ()}
 
 
-#: Of the smallest cross-validated error: a simpler form within it is as good.
-AS_GOOD = 0.05
-#: Starts of the fit of a form, and of the fit of a fold, unless said otherwise.
-STARTS, FOLD_STARTS = 5, 2
-FOLDS = 5
-LOST = "no fit without its points ended well, or no analysis at them: the form is not judged"
-
-#: Told the name of each form as its turn comes, then the records of its starts and folds; None
-#: now and then.
-Progress = Callable[[str | FitEvent | FoldError | None], None]
-
-
 @dataclass(frozen=True, eq=False)
 class FormFit:
-    """One form of the moduli: its best fit, and its errors in the folds.
+    """The best fit of one form of the moduli, and its errors in the folds.
 
-    name : as it was asked for. compared : the comparisons whose points can be left out.
+    compared : the comparisons whose points can be left out.
     """
 
     name: str
@@ -246,7 +241,7 @@ class FormFit:
 
     @property
     def coefficients(self) -> int:
-        """How many are fitted."""
+        """Number of coefficients that are fitted."""
         return self.fit.problem.unknowns.size
 
     @property
@@ -256,11 +251,11 @@ class FormFit:
 
     @property
     def fitted(self) -> float:
-        """What those comparisons leave of the objective in the fit to all points."""
+        """Share of those comparisons in the objective of the fit to all points."""
         return part_of_objective(self._judged, self._residual)
 
     def left_out(self, comparison: str | None = None) -> list[float]:
-        """Error of each fold at the points left out, NaN where it failed.
+        """Return each fold's error at the points left out, NaN where it failed.
 
         Their part of the objective, or the root mean square of one comparison in its unit.
         """
@@ -289,8 +284,8 @@ class FormFit:
 
 
 @dataclass(frozen=True, eq=False)
-class LawComparison:
-    """Forms of the moduli side by side, in the order in which they were asked for."""
+class LawComparison(Presented):
+    """Forms of the moduli side by side."""
 
     forms: tuple[FormFit, ...]
     fold_starts: int
@@ -302,7 +297,7 @@ class LawComparison:
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader should know of every form's fit, and of its folds."""
+        """Notes of every form's fit, and of its folds."""
         notes = []
         for form in self.forms:
             lost = [fold.fold + 1 for fold in form.folds if fold.value is None]
@@ -312,17 +307,74 @@ class LawComparison:
 
     @property
     def result(self) -> dict[str, Any]:
-        """Everything in plain values: what result.json holds."""
-        return result_of(self)
+        """The content of result.json, with the simplest form that is as good as the best."""
+        forms, first = self.forms, self.forms[0]
+        whole = [f for f in forms if math.isfinite(f.validated)]
+        best = min(whole, key=lambda f: f.validated, default=None)
+        simplest = None
+        if best is not None:
+            limit = (1 + AS_GOOD) * best.validated
+            simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
+        return {
+            "command": "compare",
+            "title": self.project.title,
+            "tests": [test.test.name for test in first.fit.setup.tests],
+            "objective_is": first.fit.setup.objective_is,
+            "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
+                      if c.name in first.compared},
+            "fold_starts": self.fold_starts,
+            "forms": [_form(f) for f in forms],
+            "noise": sum(noise(first).values()),
+            "noise_by_part": noise(first),
+            "least_cross_validated": best.name if best else None,
+            "simplest_as_good": simplest.name if simplest else None,
+            "as_good_within": AS_GOOD,
+            "notes": rows(self.notes),
+        }  # fmt: skip
 
-    def report(self, folder: Path | str) -> Path:
-        """Write comparison.csv, figures, report.html and, last, result.json; the page's path.
+    def table(self) -> pd.DataFrame:
+        """Return a row a form: errors of the fit and at points left out, also by comparison."""
+        import pandas as pd
 
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        return write_report(self, folder)
+        rows = []
+        for form in self.forms:
+            units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
+            fitted = {f"rms {name}, {units[name]}": e for name, e in form.rms.items()}
+            left = {
+                f"left out {name}, {units[name]}": float(np.mean(form.left_out(name)))
+                for name in form.compared
+            }
+            rows.append({
+                "moduli": form.name, "coefficients": form.coefficients, "fitted": form.fitted,
+                "cross_validated": form.validated, **fitted, **left,
+            })  # fmt: skip
+        return pd.DataFrame(rows)
+
+    def lines(self) -> list[str]:
+        """Return a table for the terminal, and the conclusion."""
+        result = self.result
+        lines = [
+            f"error: {result['objective_is']}",
+            f"{'moduli':<12}{'coefficients':>13}{'fitted':>12}{'cross-validated':>18}",
+        ]
+        for form in result["forms"]:
+            error = form["cross_validated"]
+            validated = "a fold failed" if error is None else f"{error:.4g}"
+            lines.append(
+                f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
+            )
+        return [*lines, f"the data's own noise: {result['noise']:.4g}", *self.conclusion]
+
+    @property
+    def conclusion(self) -> list[str]:
+        """The best form, and the simplest that is as good; empty where every form lost a fold."""
+        result = self.result
+        if result["simplest_as_good"] is None:
+            return []
+        return [
+            f"least at specimens left out: {result['least_cross_validated']}; simplest within "
+            f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
+        ]
 
 
 def compare_laws(
@@ -341,7 +393,7 @@ def compare_laws(
 ) -> LawComparison:
     """Fit every form to the tests, then without some specimens, and judge it at those.
 
-    Tests whose specimens are not known stay whole in every fold.
+    Tests without known specimens stay whole in every fold.
 
     Parameters
     ----------
@@ -349,19 +401,22 @@ def compare_laws(
     forms : as for `candidates`.
     folds : at most; fold_starts : random starts of the fit of each.
     starts : random starts of the fit of each form.
-    out : folder with a folder for each form, in which everything is written as it ends.
+    out : folder with a folder for each form, written as the fits end.
     command_line : as for `fit`.
 
     Raises
     ------
-    InputError : in the project or its data, no test with specimens, nothing to go on with.
+    InputError : in the project or its data, no test with specimens, nothing to resume.
     OutputError, NoFeasibleStart, SolverFailure : as `fit`.
     """
     tell = progress or (lambda event: None)
     # All of them first: a mistake in the project shows before the first fit.
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
-    setups = {name: prepare_fit(own, _fittable(chosen)) for name, own in projects.items()}
+    setups = {
+        name: prepare_fit(own, cast(Sequence[FittableTest], chosen))
+        for name, own in projects.items()
+    }
     compared = tuple(specimens_of(next(iter(setups.values()))))
     if not compared:
         problem = (
@@ -378,48 +433,12 @@ def compare_laws(
         tell(name)
         place = None if folder is None else folder / plain(name)
         found = stored_fit(
-            own,
-            [test.name for test in chosen],
-            place,
-            resume=resume,
-            overwrite=overwrite,
-            progress=tell,
-            command_line=command_line,
-        )
+            own, [test.name for test in chosen], place, resume=resume, overwrite=overwrite,
+            progress=tell, command_line=command_line,
+        )  # fmt: skip
         errors = validated_folds(setups[name], found, folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return LawComparison(tuple(done), fold_starts)
-
-
-def _fittable(tests: Sequence[Any]) -> Sequence[FittableTest]:
-    return tests
-
-
-def result_of(comparison: LawComparison) -> dict[str, Any]:
-    """Errors form by form, and the simplest form that is as good as the best."""
-    forms, first = comparison.forms, comparison.forms[0]
-    whole = [f for f in forms if math.isfinite(f.validated)]
-    best = min(whole, key=lambda f: f.validated, default=None)
-    simplest = None
-    if best is not None:
-        limit = (1 + AS_GOOD) * best.validated
-        simplest = min((f for f in whole if f.validated <= limit), key=lambda f: f.coefficients)
-    return {
-        "command": "compare",
-        "title": comparison.project.title,
-        "tests": [test.test.name for test in first.fit.setup.tests],
-        "objective_is": first.fit.setup.objective_is,
-        "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
-                  if c.name in first.compared},
-        "fold_starts": comparison.fold_starts,
-        "forms": [_form(f) for f in forms],
-        "noise": sum(noise(first).values()),
-        "noise_by_part": noise(first),
-        "least_cross_validated": best.name if best else None,
-        "simplest_as_good": simplest.name if simplest else None,
-        "as_good_within": AS_GOOD,
-        "notes": rows(comparison.notes),
-    }  # fmt: skip
 
 
 def _form(form: FormFit) -> dict[str, Any]:
@@ -444,6 +463,6 @@ def _number(value: float) -> float | None:
 
 
 def noise(form: FormFit) -> dict[str, float]:
-    """What the data's own noise adds to the objective, by comparison: no form can do better."""
+    """Return the share of the data's noise in the objective, by comparison."""
     every = noise_of(form.fit.problem)
     return {name: every[name] for name in form.compared}

@@ -2,7 +2,7 @@
 
 The processes are not a pool of concurrent.futures or loky: those pools need the semaphores of
 /dev/shm, end every task when one process dies, and hang when a process is killed while it writes.
-Here every process has a pipe of its own and nothing is shared (tests/fits/test_processes.py).
+Here every process has a pipe of its own and nothing is shared (tests/runs/test_processes.py).
 """
 
 from __future__ import annotations
@@ -29,19 +29,20 @@ from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..project.project import Project
 from ..solvers.base import Announcement, announce, hearing, pass_on
+from ..solvers.process import check as check_scheduler
 from ..solvers.scratch import remove_interrupted, sweep_left
+from . import cluster
+from .cluster import Task
 from .starts import EvaluationRecord, MeshName, StartRecord, run_start
 
 Record = EvaluationRecord | StartRecord
-#: Does the task of a number; what it reports on the way and what it returns are records.
-Task = Callable[[int, Callable[[Any], None]], Any]
-#: Makes the record of a task that nobody could do, of its number and why.
+#: Returns the record of a lost task from its number and the reason.
 Lost = Callable[[int, str], Any]
-#: s between two looks of a process that waits, and at the parent.
+#: s between two looks for events, and at the parent.
 WAIT_S, LOOK_S = 0.5, 0.3
-#: s, for a worker to kill its solver and remove its scratch folder once it is asked to end.
+#: s for a worker to kill its solver and remove its scratch folder.
 GRACE_S = 20.0
-#: How often a task is tried in all where the process that does it dies.
+#: Tries of a task if its process dies.
 TRIES = 2
 
 
@@ -57,24 +58,17 @@ def cores() -> int:
 class Executor:
     """Do tasks here or on a cluster, with the same results.
 
-    jobs : at once, at most; all cores of this machine, or of the cluster, unless given. scheduler :
-    address of a Dask scheduler; processes of this machine unless given.
+    jobs : at once; by default all cores of machine or cluster. scheduler : address of a Dask
+    scheduler; by default processes of this machine.
     """
 
     jobs: int | None = None
     scheduler: str | None = None
 
     def check(self) -> None:
-        """Check that the cluster is there, now rather than after the data are read.
-
-        Raises
-        ------
-        InputError : no scheduler answers, or Dask is not installed.
-        """
+        """Raise InputError if no scheduler answers, or Dask is not installed."""
         if self.scheduler is not None:
-            from ..solvers.process import check
-
-            check(self.scheduler)
+            check_scheduler(self.scheduler)
 
     def run_tasks(
         self,
@@ -85,21 +79,16 @@ class Executor:
     ) -> Iterator[Any]:
         """Do the task of every number; yield records as they come, None now and then.
 
-        Parameters
-        ----------
-        prepare : makes what does a task; called once in every process.
-        what : the tasks are called, for complaints.
-        lost : of a task at which worker after worker died; an error unless given.
+        prepare : makes the task, once a process. what : name of the tasks. lost : for a task at
+        which worker after worker died; by default an error.
 
         Raises
         ------
-        BubblefitError : an error of a task; processes that died (exit code 4: nothing is lost but
-            the current tasks).
+        BubblefitError : of a task; of processes that died (exit code 4: only current tasks are
+            lost).
         """
         if self.scheduler is None:
             return run_tasks(prepare, numbers, self.jobs or cores(), what)
-        from . import cluster
-
         return cluster.run_tasks(prepare, numbers, self.scheduler, self.jobs, what, lost)
 
     def run_starts(
@@ -110,9 +99,9 @@ class Executor:
         numbers: Sequence[int],
         mesh: MeshName = "full",
     ) -> Iterator[Record | None]:
-        """Fit every start; yield records as they come, None now and then while nothing does.
+        """Fit every start; yield records as they come, None now and then.
 
-        build : makes the problem; called once in every process. mesh : of it, for the records.
+        build : makes the problem, once a process. mesh : of it, for the records.
         """
 
         def lost(number: int, why: str) -> StartRecord:
@@ -132,7 +121,7 @@ def _starting(
 
 
 def executor_of(project: Project) -> Executor:
-    """Return what runs the starts and other tasks of a project side by side."""
+    """Return the executor of a project's tasks."""
     return Executor(project.fit.jobs, project.scheduler)
 
 
@@ -141,13 +130,8 @@ def run_tasks(
 ) -> Iterator[Any]:
     """Do the task of every number here; yield records as they come, None now and then.
 
-    A task whose process dies is done again, once, from its beginning: what it reported before comes
-    twice. A task whose process dies again, and an error of a task, end them all.
-
-    Parameters
-    ----------
-    prepare, what : as of `Executor.run_tasks`.
-    jobs : processes beside this one, which only listens.
+    A task whose process dies is done again, once: its earlier reports come twice. A second death,
+    or an error of a task, ends all. jobs : processes beside this one, which only listens.
     """
     context = process_context()
     waiting, left, died = deque(numbers), len(numbers), Counter[int]()
@@ -206,10 +190,7 @@ class _Ended:
 
 
 class _Worker:
-    """A process that does tasks one by one, and the pipe to it.
-
-    context : of multiprocessing. prepare : makes what does a task; called once, over there.
-    """
+    """A process that does tasks one by one, and the pipe to it."""
 
     def __init__(self, context: Any, prepare: Callable[[], Task]) -> None:
         self.connection, there = context.Pipe()
@@ -223,14 +204,14 @@ class _Worker:
         there.close()  # the only other one is the worker's: where that dies, reading ends
 
     def give(self, number: int | None) -> None:
-        """Send the number of the next task; None: there is none, and the worker ends by itself."""
+        """Send the number of the next task; None ends the worker."""
         self.task = number
         with suppress(OSError):  # it is dead, which shows when it is listened to
             self.connection.send(number)
 
 
 def _again(worker: _Worker, what: str, waiting: deque[int], died: Counter[int]) -> None:
-    """Put the task of a dead worker back into the queue, or raise where it is given up."""
+    """Queue the task of a dead worker again, or raise at the last try."""
     worker.process.join(GRACE_S)
     code, number = worker.process.exitcode, worker.task
     if number is None:  # it had done all it was given
@@ -251,7 +232,7 @@ def _again(worker: _Worker, what: str, waiting: deque[int], died: Counter[int]) 
 
 
 def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
-    """Do tasks until there are no more; the main function of a worker process."""
+    """Do tasks until there are no more, in a worker process."""
     # Ctrl-C reaches the whole group; the parent decides and terminates us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -293,10 +274,9 @@ def _send_error(listener: connection.Connection, error: Exception) -> None:
 
 
 def _end_with_parent(number: int) -> None:
-    """Interrupt this process when its parent is gone, however that ended; kill it GRACE_S later.
+    """Interrupt this process when its parent is gone, and kill it GRACE_S later.
 
-    A thread looks: a signal of the kernel's would also come where the parent lives on and only the
-    thread that started us has ended, and other systems than Linux have none.
+    The kernel's signal is of Linux only, and comes when the starting thread ends.
     """
     me = psutil.Process()
     with suppress(psutil.NoSuchProcess):

@@ -5,23 +5,24 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import NoFeasibleStart, SolverFailure
-from ..experiments.kinds import FittableTest
+from ..errors import InputError, NoFeasibleStart, SolverFailure
+from ..experiments.kinds import Expected, FittableTest, Judgement, judged
+from ..experiments.registry import kinds
+from ..files import __version__
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, settings_of
 from .best import BestFit, best_fit, with_certainty
-from .check import judge
 from .executor import Task, executor_of
 from .folder import Store
-from .presenters import failure_page
+from .presenters import failure_page, write_report
 from .record import Record, data_rows, facts_of, solver_facts, this_run
 from .result import Fit
 from .setup import FitSetup, coarse_problem, fingerprints, prepare_fit
@@ -51,13 +52,11 @@ POINTS = 31
 def distinct(
     problem: FitProblem, records: Sequence[StartRecord], tolerance: float
 ) -> list[list[StartRecord]]:
-    """Starts that ended in the same optimum together, each group in the order of their numbers.
+    """Return the starts grouped by optimum, in the order of their numbers.
 
-    Each is compared with the first of a group: by its moduli up to the strains that either of the
-    two optima reached, and by what it leaves. So groups do not depend on starts of higher numbers.
-    One without an optimum is a group of its own.
-
-    tolerance : of the objective; below it objectives are the same.
+    Each is compared with the first of a group, by objective (beyond `tolerance`) and by moduli up
+    to the strains that either reached: so groups do not depend on starts of higher numbers. A start
+    without an optimum is a group of its own.
     """
     groups: list[list[StartRecord]] = []
     for record in sorted(records, key=lambda r: r.number):
@@ -80,7 +79,7 @@ def _are_one(problem: FitProblem, a: StartRecord, b: StartRecord, tolerance: flo
 
 
 def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
-    """Largest relative difference of a modulus between two optima, over the strains reached."""
+    """Return the largest relative difference of a modulus of two optima over their strains."""
     one, other = (problem.unknowns.law(problem.law, np.array(record.unknowns)) for record in (a, b))
     ends = np.maximum(a.reached, b.reached)
     apart = []
@@ -89,13 +88,6 @@ def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
         apart.append(np.abs(one.modulus(name, strain) / other.modulus(name, strain) - 1.0).max())
     return float(max(apart))
 
-
-# All starts of a fit: each on its mesh, or all on a coarse one and what differs on the full one.
-#
-# A start takes most of its analyses to come near an optimum, and an optimum of a coarse mesh is
-# near one of the full mesh. So all starts can run on quads of twice the edge; one start of each
-# distinct optimum there goes on to the full mesh, from where it ended, and the others take its
-# fit.
 
 Event = EvaluationRecord | StartRecord
 Records = Iterator[Event | None]
@@ -107,12 +99,16 @@ def every_start(
     ran: Callable[[Event | None], None],
     told: Callable[[StartRecord | Stage], None],
 ) -> list[StartRecord]:
-    """How every start of a fit ended, by number.
+    """Return how every start of a fit ended, by number.
+
+    Coarse to fine, all starts run on quads of twice the edge, as most analyses only come near an
+    optimum; one start of each distinct optimum is continued on the full mesh, the others take its
+    fit.
 
     Parameters
     ----------
-    done : starts that have ended before. ran : is given every record as it ends, None now and then.
-    told : is given a stage as it begins, and the records of it that were there before.
+    done : starts that ended before. ran : receives every record as it ends, None now and then.
+    told : receives a stage as it begins, and its earlier records.
     """
     fit, executor = setup.project.fit, executor_of(setup.project)
     full, coarse = (
@@ -139,7 +135,7 @@ def every_start(
         if (fitted := _fit_of(group, full)) is not None:
             told(fitted)
     open_groups = [g for g in groups if _fit_of(g, full) is None]
-    prepare = functools.partial(_going_on, setup, open_groups)
+    prepare = functools.partial(_continuation, setup, open_groups)
 
     def lost(number: int, why: str) -> StartRecord:
         coarse = open_groups[number][-1]
@@ -168,8 +164,8 @@ def _coarse_problem(setup: FitSetup) -> FitProblem:
     return problem
 
 
-def _going_on(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
-    """Fits a group on the full mesh: from its first start's optimum, or the next where that fails.
+def _continuation(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
+    """Return the task that fits a group on the full mesh, from its first good optimum.
 
     A start without an optimum on the coarse mesh begins where it was drawn.
     """
@@ -188,13 +184,13 @@ def _going_on(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
 
 
 def _fit_of(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> StartRecord | None:
-    """The fit on the full mesh that a group has."""
+    """Return the fit of a group on the full mesh."""
     own = (full[record.number] for record in group if record.number in full)
     return next((record for record in own if record.objective is not None), None)
 
 
 def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> Iterator[StartRecord]:
-    """Every start of a group, with its fit on the full mesh: its own, or that of the group."""
+    """Yield each start of a group with its fit on the full mesh: its own, or the group's."""
     fit = _fit_of(group, full)
     for coarse in group:
         own = full.get(coarse.number)
@@ -203,24 +199,15 @@ def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> It
             continue
         assert fit is not None  # where none has a fit, each was tried
         yield replace(
-            fit,
-            number=coarse.number,
-            seed=coarse.seed,
-            status=f"as start {fit.number}",
-            analyses=coarse.analyses,
-            wall_s=coarse.wall_s,
-            external_runs=coarse.external_runs,
-            cached_runs=coarse.cached_runs,
-            failure="",
-            coarse_objective=coarse.objective,
-            coarse_analyses=coarse.analyses,
-            same_as=fit.number,
-        )
+            coarse, objective=fit.objective, status=f"as start {fit.number}",
+            unknowns=fit.unknowns, coefficients=fit.coefficients, reached=fit.reached,
+            mesh=fit.mesh, failure="", coarse_objective=coarse.objective,
+            coarse_analyses=coarse.analyses, same_as=fit.number,
+        )  # fmt: skip
 
 
 FitEvent = EvaluationRecord | StartRecord | Stage
-#: Is told of every analysis and every start as it ends, of a stage of several as it begins, and of
-#: time passing (None).
+#: Receives analyses and starts as they end, stages as they begin, and None as time passes.
 Progress = Callable[[FitEvent | None], None]
 
 
@@ -246,30 +233,22 @@ def fit(
 
     Parameters
     ----------
-    tests : names of tests, or a kind of test; every test that can be fitted unless given.
-    starts, seed, method, jobs : instead of the project's own settings; jobs are processes, all
-        cores unless the project says otherwise.
-    scheduler : address of a Dask scheduler, whose workers run the starts instead of this machine.
-    starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", by what the fit in the
-        folder `earlier` evaluated.
-    trust : names of doubts about the data that stop nothing, beside those of the project.
-    out : folder in which every analysis and start is written as it ends, so that an interrupted
-        fit can be gone on with (`resume`); nothing is written without it.
-    overwrite : replace what the folder holds.
-    progress : is told of every record; None now and then while nothing ends. An interrupt
-        (Ctrl-C) leaves the folder ready for `resume`.
-    command_line : of the command that asks, for the record; None where Python does.
-
-    Returns
-    -------
-    The result: card, moduli and residuals as tables, `report(folder)` for the page.
+    tests : names of tests, or a kind of test; unless given all that can be fitted.
+    starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
+    scheduler : address of a Dask scheduler, whose workers run the starts.
+    starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", from the evaluations in
+        the folder `earlier`.
+    trust : names of doubts about the data to ignore, beside those of the project.
+    out : folder in which analyses and starts are written as they end, for `resume`, also after
+        Ctrl-C; without it nothing is written. overwrite : replace its content.
+    progress : receives every record, None now and then. command_line : for the record.
 
     Raises
     ------
-    InputError : in the project or its data, or nothing to go on with. OutputError : the folder is
-        used or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is
-        not there, it failed in every start, or the best fit does not run again or gives another
-        objective: then the page in `out` says so, and there is no result.
+    InputError : in the project or its data, or nothing to resume. OutputError : the folder is used
+        or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is not
+        there, failed in every start, or the best fit does not run again or gives another objective:
+        then the page in `out` says so, and there is no result.
     """
     begun = time.perf_counter()
     trusted = [*project.fit.trust, *trust]
@@ -322,7 +301,7 @@ def _record(setup: FitSetup, problem: FitProblem, command_line: Sequence[str] | 
 
 
 def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:
-    """The best of the starts, run again; raises NoFeasibleStart, SolverFailure."""
+    """Run the best of the starts again; raises NoFeasibleStart, SolverFailure."""
     if any(r.objective is not None for r in records):
         return best_fit(problem, records, project.fit.tolerance)
     failed = next((r for r in records if r.failure), None)
@@ -338,7 +317,7 @@ def _records(
     done: Sequence[StartRecord],
     progress: Progress,
 ) -> list[StartRecord]:
-    """Every start: those that are finished already, and the others side by side."""
+    """Return finished starts and run the others side by side."""
 
     def ran(record: EvaluationRecord | StartRecord | None) -> None:
         if record is not None and files is not None:
@@ -357,4 +336,138 @@ def _records(
 
 
 def _nobody(record: Any) -> None:
-    """Nobody wants to know."""
+    """Ignore a record."""
+
+
+def stored_fit(
+    project: Project,
+    tests: Sequence[str],
+    place: Path | None,
+    *,
+    resume: bool,
+    overwrite: bool,
+    progress: Callable[[Any], None],
+    command_line: Sequence[str] | None,
+) -> Fit:
+    """Fit one of a series and write its page into the folder `place`, if any.
+
+    resume : continue what the folder holds, if anything. Raises the errors of `fit`.
+    """
+    found = fit(
+        project,
+        tests,
+        out=place,
+        resume=resume and place is not None and Store(place).used,
+        overwrite=overwrite,
+        progress=progress,
+        command_line=command_line,
+    )
+    if place is not None:
+        found.report(place)
+    return found
+
+
+def expected_of(setup: FitSetup) -> Expected:
+    """Return the moduli at rest within the bounds of the law, MPa."""
+    bounds, law = setup.bounds, setup.law
+    if bounds.largest is not None:
+        return Expected({n: (bounds.least[n], bounds.largest[n]) for n in COMPONENTS})
+    assert bounds.lower is not None and bounds.upper is not None
+    free = list(law.form.free)
+    ends = []
+    for entries in (bounds.lower, bounds.upper):
+        beta = np.zeros(len(law.form.labels))
+        beta[free] = entries
+        ends.append({name: float(law.with_beta(beta).modulus(name, 0.0)) for name in COMPONENTS})
+    low, high = ends
+    least = {name: max(low[name], bounds.least[name]) for name in COMPONENTS}
+    return Expected({n: (least[n], max(high[n], least[n])) for n in COMPONENTS})
+
+
+def judge(setup: FitSetup) -> tuple[Judgement, ...]:
+    """Return the doubts of each test; raises InputError if the project trusts an unknown one."""
+    trust = setup.project.fit.trust
+    known = sorted({name for kind in kinds().values() for name in getattr(kind, "doubts", ())})
+    for name in trust:
+        if name not in known:
+            problem = f"there is no doubt {name!r}; there are: {', '.join(known)}"
+            raise InputError(setup.project.path, "fit.trust", problem)
+    expected = expected_of(setup)
+    return tuple(
+        judged(one.test.name, look(expected), trust)
+        for one in setup.tests
+        if (look := getattr(one, "doubts", None)) is not None
+    )
+
+
+NOTHING = "nothing doubtful"
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """A look at the data of tests, with their doubts."""
+
+    setup: FitSetup
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Return True if a fit would begin."""
+        return not any(judgement.errors for judgement in self.judgements)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Return everything in plain values, as check.json holds it."""
+        tests = {
+            j.test: [
+                {
+                    "name": d.name,
+                    "severity": "error" if d.sure else "warning",
+                    "trusted": d.name in j.trusted,
+                    "text": d.text,
+                }
+                for d in j.doubts
+            ]
+            for j in self.judgements
+        }
+        return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Return (test, severity, doubt, text), a row a doubt, one for a test without."""
+        rows = []
+        for judgement in self.judgements:
+            for doubt in judgement.doubts:
+                severity = "error" if doubt.sure else "warning"
+                if doubt.name in judgement.trusted:
+                    severity = f"trusted {severity}"
+                rows.append((judgement.test, severity, doubt.name, doubt.text))
+            if not judgement.doubts:
+                rows.append((judgement.test, "fine", "", NOTHING))
+        return rows
+
+    def lines(self) -> list[str]:
+        """Return the lines for a terminal."""
+        return [
+            f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
+            for test, severity, name, text in self.rows()
+        ]
+
+    def report(self, folder: Path | str) -> Path:
+        """Write check.json, figures and report.html; return the page's path."""
+        return write_report(self, folder)
+
+
+def check(
+    project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = ()
+) -> Check:
+    """Look at the data of tests, by default of all that can be fitted.
+
+    trust : names of doubts to ignore, beside those of the project.
+
+    Raises
+    ------
+    InputError : unreadable data, an unknown doubt. SolverFailure : a known solution does not run.
+    """
+    project = project.with_fit(trust=[*project.fit.trust, *trust])
+    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
+    return Check(setup, judge(setup))

@@ -1,4 +1,4 @@
-"""The output folder of a fit or of a series of predictions: whose it is, and going on with it."""
+"""The output folder of a run: its store, kept runs and analyses, tables, resuming."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from ..solvers.run_cache import RunCache
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Of a checksum, what tells two apart for a reader.
+#: Digits of a checksum that are shown.
 DIGITS = 12
-#: Beyond, numbers of two lists are not named one by one, and texts are cut.
+#: Differences of lists that are listed one by one; length of texts.
 FEW, LONG = 3, 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
 NOT_SAID = "not given"
 
-#: Everything that results depend on, in plain values: `version` of bubblefit; `solver`, its name
-#: and what it says of itself; `settings`, as the project file says them; `tests`, the settings of
-#: each by name; `files`, name and sha256 of the data files of each test, in order.
+#: All that results depend on, in plain values: `version` of bubblefit; `solver`, name and
+#: identity; `settings` of the project file; `tests`, settings by name; `files`, name and sha256 of
+#: the data files of each test.
 Facts = Mapping[str, Any]
 
 
 def differences(before: Facts, now: Facts) -> list[str]:
-    """What differs between the facts of two runs, one thing each: key, old value, new value."""
+    """Return the differences of two runs, one each: key, old value, new value."""
     words = list(_values("version of bubblefit", before.get("version"), now.get("version")))
     words += _solvers(before.get("solver", {}), now.get("solver", {}))
     words += _tables("", before.get("settings", {}), now.get("settings", {}))
@@ -104,23 +104,19 @@ def _files(
 
 
 RUN, RESULT = "run.json", "result.json"
-#: What results came from, and the project as it was run.
+#: Origin of the results, and the project as run.
 PROVENANCE, AS_RUN = "provenance.json", "as-run.toml"
-#: What only a complete result has, beside it: a page and a card of an earlier one must not stand
-#: beside a later one that failed.
+#: Files of a complete result only: earlier ones must not stand beside a later failure.
 OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
-#: What run.json must hold of a folder that an older version wrote: it can be replaced only.
-PARTS = "parts"
-#: What of them can be told in words.
-FACTS = "facts"
+#: Keys of run.json: digests of what the results depend on, and the same in plain values.
+PARTS, FACTS = "parts", "facts"
 
 
 class Store:
-    """A folder that holds one fit, or one series of predictions.
+    """A folder of one fit, or of one series of predictions.
 
-    run.json says whose it is; result.json is written last and taken away first, so that where it
-    is, everything is complete. What is written in between (`records`, names below the folder) is
-    known to whoever writes it.
+    run.json holds its origin; result.json is written last and removed first, so that with it
+    everything is complete.
     """
 
     def __init__(self, path: Path) -> None:
@@ -128,7 +124,7 @@ class Store:
 
     @property
     def used(self) -> bool:
-        """Whether the folder holds anything of a fit or of predictions."""
+        """Return True if the folder holds anything of a fit or of predictions."""
         return (self.path / RUN).exists() or (self.path / RESULT).exists()
 
     def begin(
@@ -139,21 +135,19 @@ class Store:
         records: Sequence[str] = (),
         facts: Facts | None = None,
     ) -> bool:
-        """Make the folder ready; whether there is something to go on with.
+        """Make the folder ready; return `resume`.
 
         Parameters
         ----------
-        parts : what has to be the same for going on, each part (project, data, solver, version) as
-            a digest by its name; empty where every record carries a digest of its own.
-        records : files below the folder that go when the folder is not gone on with.
-        facts : behind the digests, in plain values: a difference is told by them.
+        parts : digests of what must be the same to resume, by name (project, data, solver,
+            version); empty if every record carries a digest.
+        records : files below the folder to remove unless resumed.
+        facts : behind the digests, to describe a difference.
 
         Raises
         ------
-        OutputError : the folder cannot be written, or is used and neither `resume` nor `overwrite`
-            is given.
-        InputError : `resume`, but there is nothing to go on with, it is something else (named), or
-            it is not readable.
+        OutputError : the folder cannot be written, or is used without `resume` or `overwrite`.
+        InputError : nothing to resume, something else (named), or not readable.
         """
         if self.used and not (resume or overwrite):
             raise OutputError(
@@ -176,32 +170,17 @@ class Store:
         return resume
 
     def forget(self) -> None:
-        """Make a folder whose results are to be replaced one that holds nothing to go on with.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Remove result.json and run.json: nothing is left to resume; raises OutputError."""
         with output_errors(self.path):
             for name in (RESULT, RUN):
                 (self.path / name).unlink(missing_ok=True)
 
     def write(self, name: str, text: str) -> None:
-        """Write a file whole or not at all.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Write a file whole or not at all; raises OutputError."""
         write_text(self.path / name, text)
 
     def finish(self, result: Mapping[str, Any]) -> None:
-        """Write result.json, after everything else.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Write result.json, after everything else; raises OutputError."""
         self.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
 
     def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
@@ -214,13 +193,10 @@ class Store:
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             raise InputError(path, "", "is missing or damaged; use --overwrite") from None
         if other:
-            # Without words: of an older version, or what differs is in nothing that can be told.
-            what = "; ".join(words) or f"another {' and '.join(sorted(other))}"
-            problem = (
-                f"these results are of something else: {what}"
-                if words
-                else (f"this folder's results are of {what}")
-            )
+            # Without words: of an older version, or of a difference without facts.
+            problem = f"this folder's results are of another {' and '.join(sorted(other))}"
+            if words:
+                problem = f"these results are of something else: {'; '.join(words)}"
             raise InputError(path, PARTS, f"{problem}; go on with the same, or use --overwrite")
 
 
@@ -228,14 +204,11 @@ CSV, PARQUET = ".csv", ".parquet"
 
 
 def write_table(table: pd.DataFrame, path: Path | str) -> Path:
-    """Write a table into the format that the file's name ends in.
-
-    Numbers of a CSV have nine digits; those of a Parquet file are as they are.
+    """Write a table as .csv (nine digits) or .parquet (exact), by the ending of the file's name.
 
     Raises
     ------
-    InputError : neither .csv nor .parquet, or Parquet without pyarrow. OutputError : the file
-        cannot be written.
+    InputError : another ending, or Parquet without pyarrow. OutputError.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -256,33 +229,23 @@ RUNS = "runs"
 
 
 class RunRecords:
-    """The runs in an output folder, each under a mark of everything that it depends on."""
+    """The runs in an output folder, each under a mark of all that it depends on."""
 
     def __init__(self, path: Path) -> None:
         self.store = Store(path)
 
     def begin(self, resume: bool, overwrite: bool) -> None:
-        """Make the folder ready; without `resume` no run is left in it.
-
-        Raises
-        ------
-        OutputError, InputError : as `Store.begin`.
-        """
+        """Make the folder ready, without `resume` empty of runs; raises as `Store.begin`."""
         folder = self.store.path / RUNS
         # A name with a dot before it is a file whose writing was cut off.
-        cut = [path for path in folder.glob(".*.npz")]
+        cut = list(folder.glob(".*.npz"))
         held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz") if path not in cut]
         self.store.begin({}, resume, overwrite, held)
         for path in cut:
             path.unlink(missing_ok=True)
 
     def write(self, mark: str, record: RunRecord) -> None:
-        """Write a run, whole or not at all; one that failed is tried again next time.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Write a run unless it failed: that is tried again next time; raises OutputError."""
         if record.failure:
             return
         words = {
@@ -301,7 +264,7 @@ class RunRecords:
             np.savez_compressed(path, **arrays)
 
     def read(self, mark: str) -> RunRecord | None:
-        """The run under this mark; None where there is none, or a damaged one."""
+        """Return the run under this mark; None if there is none, or a damaged one."""
         # KeyError, TypeError: not one of ours. The rest: cut off, or not an archive at all.
         with suppress(OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
             with np.load(self._file(mark), allow_pickle=False) as content:
@@ -328,14 +291,10 @@ FOLDER = "analyses"
 
 
 class KeptAnalyses(RunCache):
-    """Those of a study that writes into `folder`, each under a key of all that it depends on.
+    """The analyses of a study that writes into `folder`, each under a key of all it depends on.
 
-    Of another project or card none is taken. Nothing is touched before the first analysis; then,
-    without `resume`, what is there goes.
-
-    Raises
-    ------
-    InputError : `resume`, but there is nothing to go on with.
+    Before the first analysis, unless `resume`, earlier ones are removed. Raises InputError if there
+    is nothing to resume.
     """
 
     def __init__(self, folder: Path, resume: bool) -> None:
@@ -346,7 +305,7 @@ class KeptAnalyses(RunCache):
         self._resume, self._begun = resume, False
 
     def read(self, key: str) -> History | None:
-        """As of `RunCache`; raises OutputError where what is there cannot be removed."""
+        """Read as `RunCache`; raises OutputError if earlier analyses cannot be removed."""
         if not self._begun:
             self._begun = True
             remove_unfinished(self.folder.parent)
@@ -356,6 +315,6 @@ class KeptAnalyses(RunCache):
         return super().read(key)
 
     def not_kept(self, error: OSError) -> None:
-        """Raises OutputError: the study's own tables would not be written either."""
+        """Raise OutputError: the study's own tables would not be written either."""
         with output_errors(self.folder):
             raise error

@@ -1,14 +1,13 @@
-"""Which test next? What each test that could be made would say of the moduli."""
+"""Rank tests that could be made next by the predicted uncertainty of the moduli."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, SolverFailure
 from ..experiments.kinds import (
@@ -19,7 +18,6 @@ from ..experiments.kinds import (
     Plannable,
     Planning,
     Precision,
-    PreparedTest,
     Weighting,
     beyond,
     by_strain,
@@ -27,8 +25,7 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import kinds
-from ..inference.linear import Array as Array_of_linear
-from ..inference.linear import LawQuery, information, information_of, summary
+from ..inference.linear import Array, LawQuery, information, information_of, summary
 from ..inference.noise import Noise
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
@@ -38,22 +35,22 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, percent, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
-from .presenters import write_report
+from .presenters import Presented
 from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
-
-#: A modulus less certain than this (1 sigma, relative) is as good as unknown.
+#: 1 sigma, relative, from which a modulus is called unknown.
 UNKNOWN = 1.0
-#: Shares of the strains asked for at which moduli are listed.
+#: Shares of the largest strains at which moduli are listed.
 SHARES = (0.0, 0.5, 1.0)
-#: What a rank is by: the least certain of the three moduli, or one of them.
+#: Called with the analyses done, all analyses, and what is running.
+Progress = Callable[[int, int, str], None]
+#: Rank by the least certain of the three moduli.
 WORST = "worst"
-#: The line of a plan that is no candidate.
+#: Name of the row of the present tests.
 NOW = "now"
 ASSUMED = (
     "Assumed: the law at the card, and its form, are right; values err independently of each other "
@@ -64,19 +61,16 @@ ASSUMED = (
 
 
 def words(sigma: float) -> str:
-    """A relative uncertainty as percent, as long as it says anything."""
+    """Return a relative uncertainty as percent, or "unknown"."""
     return percent(sigma) if sigma < UNKNOWN else "unknown"
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
-    """What would be known of the moduli.
+class Prospect:
+    """The predicted uncertainty of the moduli with one more test.
 
-    Parameters
-    ----------
-    name : of the candidate, NOW for the present tests alone. kind : of the test, "" for those.
-    specimens : how many. noise : of its values, in words. sigma : by modulus, 1-sigma relative
-    uncertainty (n,) along its strain.
+    name, kind : of the test; NOW and "" for the present tests alone. noise : of its values, in
+    words. sigma : by modulus, 1-sigma relative uncertainty (n,) along its strain.
     """
 
     name: str
@@ -87,29 +81,34 @@ class Planned:
 
     @property
     def title(self) -> str:
-        """With how many specimens."""
+        """The name with the number of specimens."""
         return self.name if self.specimens == 1 else f"{self.name}, {self.specimens} specimens"
 
     @property
     def summary(self) -> dict[str, float]:
-        """One figure a modulus: root of the mean square along its strain."""
+        """Root mean square of sigma along the strain, by modulus."""
         return summary(self.sigma)
 
     def value(self, rank: str) -> float:
-        """What is ranked by: the smaller the better."""
+        """Return the number that tests are ranked by: the smaller the better."""
         return max(self.summary.values()) if rank == WORST else self.summary[rank]
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The test in tables and JSON."""
+        return {"test": self.name, "kind": self.kind, "specimens": self.specimens,
+                "noise": self.noise}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Presented):
     """The tests that could be made next, best first.
 
     Parameters
     ----------
-    card : what it is named. tests : the present ones. ends : (3,) strains (eps1, eps2, gamma12) up
-    to which moduli are asked for. rank : WORST, or a modulus. now : of the present tests.
-    candidates : ranked. following : name of the best test after the first, and what would then be
-    known; None where there is none.
+    card : its name. tests : the present ones. ends : (3,) largest strains (eps1, eps2, gamma12) of
+    the moduli. rank : WORST, or a modulus. now : of the present tests alone. candidates : ranked.
+    following : the best test after the first, None where there is none.
     """
 
     title: str
@@ -118,48 +117,45 @@ class Plan:
     tests: Sequence[str]
     ends: Array
     rank: str
-    now: Planned
-    candidates: Sequence[Planned]
-    following: Planned | None = None
+    now: Prospect
+    candidates: Sequence[Prospect]
+    following: Prospect | None = None
     notes: Sequence[Note] = ()
 
     @property
     def criterion(self) -> str:
-        """What the candidates are ranked by, in words."""
+        """The quantity that candidates are ranked by, in words."""
         of = "the least certain modulus" if self.rank == WORST else self.rank
         return f"1 sigma of {of}, root of the mean square along its strain"
 
     @property
     def strains(self) -> dict[str, Array]:
-        """(3,) by modulus: where moduli are listed."""
+        """Strains (3,) by modulus at which moduli are listed."""
         return {n: np.array(SHARES) * float(self.ends[c]) for n, c in COMPONENTS.items()}
 
-    def at(self, planned: Planned) -> dict[str, list[float]]:
-        """1-sigma relative uncertainty by modulus at the listed strains."""
+    def at(self, test: Prospect) -> dict[str, list[float]]:
+        """Return 1-sigma relative uncertainties by modulus at the listed strains."""
         found = {}
         for name, strain in self.strains.items():
-            along = np.linspace(0.0, strain[-1], len(planned.sigma[name]))
-            found[name] = np.interp(strain, along, planned.sigma[name]).tolist()
+            along = np.linspace(0.0, strain[-1], len(test.sigma[name]))
+            found[name] = np.interp(strain, along, test.sigma[name]).tolist()
         return found
 
     def table(self) -> pd.DataFrame:
-        """Columns rank, test, kind, specimens, noise, then by modulus sigma_E1, sigma_E1_at_0 ...
+        """Return columns rank, test, kind, specimens, noise, sigma_E1, sigma_E1_at_0 ...
 
-        The first row, of rank 0, is what is known now. Relative: 0.01 is 1 %.
+        The first row, of rank 0, is of the present tests. Relative: 0.01 is 1 %.
         """
         import pandas as pd
 
         table = []
-        for place, planned in enumerate((self.now, *self.candidates)):
+        for place, test in enumerate((self.now, *self.candidates)):
             row: dict[str, object] = {
                 "rank": place,
-                "test": planned.name,
-                "kind": planned.kind,
-                "specimens": planned.specimens,
-                "noise": planned.noise,
+                **test.row,
             }
-            row |= {f"sigma_{name}": value for name, value in planned.summary.items()}
-            for name, values in self.at(planned).items():
+            row |= {f"sigma_{name}": value for name, value in test.summary.items()}
+            for name, values in self.at(test).items():
                 strains = self.strains[name]
                 row |= {
                     f"sigma_{name}_at_{strain:.4g}": value
@@ -170,7 +166,7 @@ class Plan:
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         return {
             "command": "plan",
             "title": self.title,
@@ -181,51 +177,39 @@ class Plan:
             "strains": {name: at.tolist() for name, at in self.strains.items()},
             "up_to_strain": by_strain(self.ends),
             "now": self._numbers(self.now),
-            "candidates": [self._numbers(planned) for planned in self.candidates],
+            "candidates": [self._numbers(test) for test in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
             "assumed": ASSUMED,
             "notes": rows(self.notes),
         }
 
-    def _numbers(self, planned: Planned) -> dict[str, Any]:
+    def _numbers(self, test: Prospect) -> dict[str, Any]:
         return {
-            "test": planned.name,
-            "kind": planned.kind,
-            "specimens": planned.specimens,
-            "noise": planned.noise,
-            "sigma": planned.summary,
-            "sigma_at": self.at(planned),
-            "unknown": [name for name, value in planned.summary.items() if value >= UNKNOWN],
+            **test.row,
+            "sigma": test.summary,
+            "sigma_at": self.at(test),
+            "unknown": [name for name, value in test.summary.items() if value >= UNKNOWN],
         }
 
     def lines(self) -> list[str]:
-        """A table for the terminal, and what it rests on."""
+        """Return a table for the terminal, and its assumptions."""
         every = (self.now, *self.candidates)
-        wide = max(len(planned.title) for planned in every) + 2
+        wide = max(len(test.title) for test in every) + 2
         head = "".join(f"{name:>10}" for name in COMPONENTS)
-        told = [
+        lines = [
             f"1 sigma of the moduli up to strain {', '.join(f'{e:.3g}' for e in self.ends)} (warp, "
             f"fill, shear), with one more test beside {', '.join(self.tests) or 'none'}",
             f"{'':4}{'test':<{wide}}{head}   noise",
         ]
-        for place, planned in enumerate(every):
+        for place, test in enumerate(every):
             mark = f"{place:>2}. " if place else "    "
-            numbers = "".join(f"{words(planned.summary[name]):>10}" for name in COMPONENTS)
-            told.append(f"{mark}{planned.title:<{wide}}{numbers}   {planned.noise}".rstrip())
-        told.append(f"ranked by {self.criterion}")
+            numbers = "".join(f"{words(test.summary[name]):>10}" for name in COMPONENTS)
+            lines.append(f"{mark}{test.title:<{wide}}{numbers}   {test.noise}".rstrip())
+        lines.append(f"ranked by {self.criterion}")
         if self.following is not None:
             numbers = ", ".join(f"{n} {words(s)}" for n, s in self.following.summary.items())
-            told.append(f"after the first, {self.following.title} would give {numbers}")
-        return [*told, ASSUMED, *note_lines(self.notes)]
-
-    def write(self, folder: Path | str) -> None:
-        """Write plan.csv, plan.png, report.html, notes.csv and, last, result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        write_report(self, folder)
+            lines.append(f"after the first, {self.following.title} would give {numbers}")
+        return [*lines, ASSUMED, *note_lines(self.notes)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,13 +222,13 @@ class Present:
     precision: Mapping[str, Precision]
 
     @property
-    def reached(self) -> Array_of_linear:
-        """(3,) largest strains."""
+    def reached(self) -> Array:
+        """Largest strains, (3,)."""
         return np.max([strains_of(history) for history in self.point.histories], axis=0)
 
     @property
-    def information(self) -> Array_of_linear:
-        """(n, n) of all comparisons."""
+    def information(self) -> Array:
+        """Fisher information of all comparisons, (n, n)."""
         unknowns, point = self.problem.unknowns, self.point
         assert point.jacobian is not None
         whole = np.zeros((unknowns.size, unknowns.size))
@@ -252,18 +236,16 @@ class Present:
             rows, own = self.problem.rows(k), unknowns.nuisance_places(comparison.name)
             slopes = point.jacobian[rows] * self.problem.scale[rows, None]
             slopes = np.hstack([slopes[:, : unknowns.size], slopes[:, own]])
-            told = self.precision[comparison.name]
-            sigma = told.noise * np.sqrt(told.alike)
+            own_noise = self.precision[comparison.name]
+            sigma = own_noise.noise * np.sqrt(own_noise.alike)
             whole += information(slopes, sigma, comparison.nuisance)
         return whole
 
 
 def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
-    """Run the tests with a card, what is no law (offsets, the sheet's surface) fitted to them.
+    """Run the tests with a card, and fit offsets and the sheet's surface to them.
 
-    Raises
-    ------
-    SolverFailure : they cannot be run with it.
+    Raises SolverFailure: they cannot be run with it.
     """
     law = _law(setup, card)
     make = setup.make_leading
@@ -288,14 +270,10 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
 
 
 def _law(setup: FitSetup, card: MaterialCard) -> HypoelasticLaw:
-    """The card's law over the strains of the project's, where both are of one form."""
+    """Return the card's law over the strains of the project's, where both are of one form."""
     if card.law.form != setup.law.form:
         return card.law
     return replace(setup.law, beta=card.law.beta, nu12=card.law.nu12)
-
-
-#: Told how many of how many analyses are done, and of what.
-Progress = Callable[[int, int, str], None]
 
 
 def plan(
@@ -309,21 +287,20 @@ def plan(
     noise: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """What each test that could be made next would say of the moduli, best first.
+    """Rank the tests that could be made next by the uncertainty of the moduli with each.
 
-    From the derivatives at a law: the information of the present tests (with their misfit or
-    noise, whichever is larger, neighbours that err as one counted as one) and that of the candidate
-    are added. Nothing is fitted but what is no law (offsets, the sheet's surface).
+    The information of the present tests (misfit or noise, whichever is larger; neighbours that err
+    as one counted as one) and that of the candidate, from the derivatives at a law, are added.
+    Nothing is fitted but offsets and the sheet's surface.
 
     Parameters
     ----------
     card : the present optimum, as itself, its file or its name; the one that the project's fit
         left in its usual folder unless given.
     tests : the present ones, by name or kind; every test that can be fitted unless given.
-    strain : ends (warp, fill, shear) up to which moduli are asked for; the card's valid range
-        unless given.
+    strain : largest (warp, fill, shear) of the moduli; the card's valid range unless given.
     rank : "worst" for the least certain modulus, or "E1", "E2", "G12".
-    specimens : of every candidate; as the kind usually tests unless given.
+    specimens : of every candidate; the usual number of its kind unless given.
     noise : of measured values of a kind (mm, N), instead of that of the project's own tests.
 
     Raises
@@ -347,35 +324,28 @@ def plan(
                   _ends(project, material, present, strain))  # fmt: skip
     before = present.information
     make = setup.make_leading
-    offered = {
-        name: kind.candidates(
-            Planning(
-                _place(setup),
-                _of_kind(setup, name),
-                present.precision,
-                present.law,
-                make,
-                (noise or {}).get(name),
-            ),
-        )
-        for name, kind in known.items()
-    }
-    total = sum(map(len, offered.values()))
-    found: list[tuple[Planned, Array_of_linear]] = []
+    place = Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
+    offered: list[tuple[str, Candidate]] = []
+    for name, kind in known.items():
+        own = [test for test in setup.tests if test.test.kind == name]
+        given = (noise or {}).get(name)
+        planning = Planning(place, own, present.precision, present.law, make, given)
+        offered += [(name, candidate) for candidate in kind.candidates(planning)]
+    found: list[tuple[Prospect, Array]] = []
     notes = thickness_notes(project, material)
-    for done, (kind, candidate) in enumerate(_each(offered)):
+    for done, (name, candidate) in enumerate(offered):
         if progress is not None:
-            progress(done, total, candidate.name)
+            progress(done, len(offered), candidate.name)
         count = candidate.specimens if specimens is None else specimens
         try:
-            more, words, told = _added(candidate, present, make)
+            more, words, added = _added(candidate, present, make)
         except (SolverFailure, InputError) as error:
             said = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
             notes.append(Note(NoteKind.FAILED, said, candidate.name))
             continue
-        notes += told
+        notes += added
         sigma = asked.sigma(before + count * more)
-        found.append((Planned(candidate.name, kind, count, words, sigma), count * more))
+        found.append((Prospect(candidate.name, name, count, words, sigma), count * more))
     if not found:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
     found.sort(key=lambda pair: pair[0].value(rank))
@@ -386,8 +356,8 @@ def plan(
         [test.name for test in chosen],
         asked.ends,
         rank,
-        Planned(NOW, "", 1, "", asked.sigma(before)),
-        [planned for planned, _ in found],
+        Prospect(NOW, "", 1, "", asked.sigma(before)),
+        [test for test, _ in found],
         _following(asked, before, found, rank),
         notes,
     )
@@ -395,7 +365,7 @@ def plan(
 
 def _ends(
     project: Project, card: MaterialCard, present: Present, given: Sequence[float] | None
-) -> Array_of_linear:
+) -> Array:
     if given is not None:
         ends = np.array(given, dtype=float)
         if ends.shape != (3,) or not (ends > 0).all():
@@ -407,25 +377,10 @@ def _ends(
                     present.reached)  # fmt: skip
 
 
-def _place(setup: FitSetup) -> Place:
-    project = setup.project
-    return Place(project.path, "plan", project.fabric, project.scales, None, need_data=False)
-
-
-def _of_kind(setup: FitSetup, kind: str) -> list[PreparedTest]:
-    return [test for test in setup.tests if test.test.kind == kind]
-
-
-def _each(offered: Mapping[str, Sequence[Candidate]]) -> Iterator[tuple[str, Candidate]]:
-    for kind, several in offered.items():
-        for candidate in several:
-            yield kind, candidate
-
-
 def _added(
     candidate: Candidate, present: Present, make: MakeSolver
-) -> tuple[Array_of_linear, str, list[Note]]:
-    """What a candidate says of the law, its noise in words, and what to know of it."""
+) -> tuple[Array, str, list[Note]]:
+    """Return the information of a candidate, its noise in words, and notes on it."""
     unknowns, law, notes = present.problem.unknowns, present.law, []
     whole = np.zeros((unknowns.size, unknowns.size))
     said = []
@@ -445,11 +400,11 @@ def _added(
 
 def _following(
     asked: LawQuery,
-    before: Array_of_linear,
-    found: Sequence[tuple[Planned, Array_of_linear]],
+    before: Array,
+    found: Sequence[tuple[Prospect, Array]],
     rank: str,
-) -> Planned | None:
-    """The best test after the first; it may be the same again."""
+) -> Prospect | None:
+    """Return the best test after the first, which may be the same again."""
     first = before + found[0][1]
-    every = [replace(planned, sigma=asked.sigma(first + more)) for planned, more in found]
-    return min(every, key=lambda planned: planned.value(rank), default=None)
+    every = [replace(test, sigma=asked.sigma(first + more)) for test, more in found]
+    return min(every, key=lambda test: test.value(rank), default=None)

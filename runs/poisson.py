@@ -1,4 +1,4 @@
-"""How much the response of a test depends on nu12, with the moduli as they are."""
+"""Vary Poisson's ratio nu12 in the analyses of a project, with the moduli as they are."""
 
 from __future__ import annotations
 
@@ -17,31 +17,21 @@ from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
-from .series import (
-    Part,
-    Series,
-    card_of,
-    card_words,
-    parts_of,
-    studied_tests,
-    thickness_notes,
-    write_study,
-)
+from .presenters import Presented
+from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+#: The range of coated fabrics, in equal steps.
+NU12 = (0.05, 0.15, 0.25, 0.35, 0.45)
 
 
 @dataclass(frozen=True, eq=False)
 class Ratios:
-    """A response at several nu12.
-
-    values, to_base, to_mean : (n,) the response itself, relative to that at the base nu12, and
-    relative to the mean of all n.
-    """
+    """A response at several nu12, (n,) each: itself, over that at the base nu12, over the mean."""
 
     nu12: Array
     values: Array
@@ -67,7 +57,7 @@ def by_response(
     responses: Sequence[Mapping[str, float] | None],
     base: Mapping[str, float],
 ) -> dict[str, Ratios]:
-    """Ratios of every response that the run at the base nu12 has.
+    """Return the ratios of every response of the run at the base nu12.
 
     responses : of each nu12, by name; None where the run failed, without those it did not reach.
     """
@@ -77,16 +67,11 @@ def by_response(
     }
 
 
-#: The range of coated fabrics, in equal steps.
-NU12 = (0.05, 0.15, 0.25, 0.35, 0.45)
-
-
 @dataclass(frozen=True, eq=False)
 class PartRatios:
     """One part of a test.
 
-    response : what the responses are. failed : why a run failed, by nu12. notes : what to know of
-    the runs.
+    response : name of the kind of responses. failed : why a run failed, by nu12.
     """
 
     response: str
@@ -96,8 +81,8 @@ class PartRatios:
 
 
 @dataclass(frozen=True, eq=False)
-class Nu12Study:
-    """What a study of nu12 gave, by part of a test. base : the card's own nu12."""
+class Nu12Study(Presented):
+    """The result of a study of nu12, by part of a test. base : the card's own nu12."""
 
     project: Path
     card: str
@@ -108,12 +93,12 @@ class Nu12Study:
 
     @property
     def response(self) -> str:
-        """What the responses are, of all parts."""
+        """Names of the kinds of responses, of all parts."""
         return " or ".join(dict.fromkeys(part.response for part in self.parts.values()))
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         return {
             "command": "study nu12",
             "project": str(self.project),
@@ -121,32 +106,38 @@ class Nu12Study:
             "solver": self.solver,
             "base_nu12": self.base,
             "response": self.response,
-            "models": {name: _numbers(part) for name, part in self.parts.items()},
+            "models": {
+                name: {
+                    "responses": {
+                        response: {
+                            "nu12": r.nu12.tolist(),
+                            "value": _known(r.values),
+                            "to_base": _known(r.to_base),
+                            "to_mean": _known(r.to_mean),
+                        }
+                        for response, r in part.responses.items()
+                    },
+                    "failed": dict(part.failed),
+                }
+                for name, part in self.parts.items()
+            },
             "notes": rows(self.notes),
         }
 
     def table(self) -> pd.DataFrame:
-        """Columns model, response, nu12, value, to_base, to_mean."""
+        """Return columns model, response, nu12, value, to_base, to_mean."""
         import pandas as pd
 
         frames = [
-            pd.DataFrame(
-                {
-                    "model": name,
-                    "response": response,
-                    "nu12": r.nu12,
-                    "value": r.values,
-                    "to_base": r.to_base,
-                    "to_mean": r.to_mean,
-                }
-            )
+            pd.DataFrame({"model": name, "response": response, "nu12": r.nu12, "value": r.values,
+                          "to_base": r.to_base, "to_mean": r.to_mean})
             for name, part in self.parts.items()
             for response, r in part.responses.items()
-        ]
+        ]  # fmt: skip
         return pd.concat(frames, ignore_index=True)
 
     def lines(self) -> list[str]:
-        """The same for a terminal."""
+        """Return the result in words, for the terminal."""
         words = [f"{self.response}, relative to that at nu12 = {self.base:g}"]
         named = {
             f"{n}, {k}": r for n, part in self.parts.items() for k, r in part.responses.items()
@@ -162,37 +153,9 @@ class Nu12Study:
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader of the responses should know, of every run of its own."""
+        """Notes of every run, then those of the whole study."""
         of_parts = [n.about(name) for name, part in self.parts.items() for n in part.notes]
         return [*of_parts, *self.warnings]
-
-    def write(self, folder: Path | str) -> None:
-        """Write nu12.csv, nu12.png, notes.csv and result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        from ..reports.studies import nu12_charts
-        from ..reports.vega import save
-
-        panels = {
-            name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
-            for name, part in self.parts.items()
-        }
-        title = f"{self.project.name}: what nu12 changes"
-        charts = nu12_charts(panels, self.base, self.response, title)
-        write_study(
-            Path(folder),
-            "nu12",
-            self.table(),
-            lambda path: save(path, charts),
-            self.result,
-            self.notes,
-            title,
-            self.lines(),
-            [charts],
-        )
 
 
 def vary_nu12(
@@ -207,8 +170,7 @@ def vary_nu12(
 
     Parameters
     ----------
-    card : itself, its file, or its name in the project. values : of nu12. tests : names or kinds,
-    all unless given. progress : is told how far the study is. kept : as of `refine`.
+    values : of nu12. card, tests, progress, kept : as for `refine`.
 
     Raises
     ------
@@ -233,47 +195,31 @@ def vary_nu12(
 
 
 def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
-    def run(nu12: float) -> History:
-        return series.run(part, replace(series.card.law, nu12=nu12))
+    law = series.card.law
 
-    base = run(series.card.law.nu12)
-    notes, failed = [n.about(_at(series.card.law.nu12)) for n in series.notes(base)], {}
+    def run(nu12: float) -> History:
+        return series.run(part, replace(law, nu12=nu12))
+
+    base = run(law.nu12)
+    notes, failed = [note.about(f"nu12 = {law.nu12:g}") for note in series.notes(base)], {}
     responses: list[Mapping[str, float] | None] = []
     for value in values:
+        at = f"nu12 = {value:g}"
         try:
             history = run(value)
         except SolverFailure as failure:
             responses.append(None)
             failed[f"{value:g}"] = failure.reason
-            notes.append(Note(NoteKind.FAILED, failure.reason, _at(value)))
+            notes.append(Note(NoteKind.FAILED, failure.reason, at))
             if len(failed) == len(values):
                 raise
             continue
         responses.append(part.studied.responses(part.model, history))
-        notes += [note.about(_at(value)) for note in series.notes(history)]
+        notes += [note.about(at) for note in series.notes(history)]
     own = part.studied.responses(part.model, base)
     return PartRatios(part.studied.response, by_response(values, responses, own), failed, notes)
 
 
-def _numbers(part: PartRatios) -> dict[str, Any]:
-    return {
-        "responses": {
-            response: {
-                "nu12": r.nu12.tolist(),
-                "value": _known(r.values),
-                "to_base": _known(r.to_base),
-                "to_mean": _known(r.to_mean),
-            }
-            for response, r in part.responses.items()
-        },
-        "failed": dict(part.failed),
-    }
-
-
-def _at(nu12: float) -> str:
-    return f"nu12 = {nu12:g}"
-
-
 def _known(values: Array) -> list[float | None]:
-    """Numbers for JSON, which has no NaN."""
+    """Return numbers for JSON, which has no NaN."""
     return [float(v) if np.isfinite(v) else None for v in values]

@@ -1,4 +1,4 @@
-"""Run tests that are not fitted with material cards, side by side, and go on where it was left."""
+"""Run tests that are not fitted with material cards, side by side, and resume them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 def predicted_kind(name: str) -> Predicted:
-    """What a kind of test offers whose tests are predicted."""
+    """Return the interface of a kind of test that is predicted."""
     kind = kind_named(name).predicted
     assert kind is not None
     return kind
@@ -53,11 +53,7 @@ def predicted_kind(name: str) -> Predicted:
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """Every chosen test with every chosen card.
-
-    each : the runs, test by test, card by card; they keep this order in every table.
-    wall_s : seconds that all of it took. record : what it came from, None where nobody asks.
-    """
+    """The runs of tests with cards, in this order in every table."""
 
     project: Project
     each: tuple[PredictedRun, ...]
@@ -66,7 +62,7 @@ class Predictions:
 
     @cached_property
     def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
-        """What the runs of each kind of test say, and their numbers among all runs."""
+        """Return the outcome of each kind of test, and the numbers of its runs."""
         numbers: dict[str, list[int]] = {}
         for i, run in enumerate(self.each):
             numbers.setdefault(run.test.kind, []).append(i)
@@ -78,71 +74,66 @@ class Predictions:
 
     @property
     def result(self) -> dict[str, Any]:
-        """Everything in plain values, as result.json has it."""
+        """Return everything in plain values, as result.json holds it."""
         tests: dict[str, Any] = {}
         for outcome, numbers in self.outcomes.values():
             for i in numbers:
                 test = self.each[i].test
                 tests[test.name] = {"kind": test.kind, **outcome.test_numbers(test)}
         return {
-            "command": "predict",
-            "title": self.project.title,
-            "solver": self.project.fit.solver,
-            "tests": tests,
+            "command": "predict", "title": self.project.title,
+            "solver": self.project.fit.solver, "tests": tests,
             "cards": list(dict.fromkeys(run.card for run in self.each)),
             "walls": [
                 {"name": end.name, "meaning": end.meaning, "predicted": end.predicted}
                 for end in self.band
             ],
             "runs": [self._numbers(i) for i in range(len(self.each))],
-            "notes": note_rows(self.notes),
-            "worst_relative_error": self.worst,
-            "cached_runs": self.cached,
-            "wall_s": self.wall_s,
-            "versions": versions(),
+            "notes": note_rows(self.notes), "worst_relative_error": self.worst,
+            "cached_runs": self.cached, "wall_s": self.wall_s, "versions": versions(),
             **({} if self.record is None else {"provenance": PROVENANCE}),
-        }
+        }  # fmt: skip
 
     @property
     def notes(self) -> list[Note]:
-        """What a reader of each run should know, of "TEST with CARD", or "TEST with CARD, WALL"."""
+        """Return the notes of "TEST with CARD" or "TEST with CARD, WALL"."""
         return [as_note(note).about(run.title) for run in self.each for note in run.notes]
 
     @property
     def band(self) -> list[BandEnd]:
-        """The ends of the solver's band, first what is predicted; empty where there is none."""
+        """Return the ends of the solver's band, the predicted one first; empty without one."""
         return band_of(self.each)
 
     @property
     def worst(self) -> float | None:
-        """Largest RMS error over the largest value measured; None where nothing is compared.
+        """Return the largest RMS error over the largest measured value; None if none is compared.
 
-        Of what is predicted: the other end of a band is no prediction.
+        The other end of a band is no prediction.
         """
         errors = [self.error(i) for i, run in enumerate(self.each) if run.predicted]
         return max((e for e in errors if e is not None), default=None)
 
     def ended(self, number: int) -> str:
-        """How a run ended: "finished", how far it came, or why it failed."""
+        """Return how a run ended: "finished", how far it came, or why it failed."""
         outcome, own = self._own(number)
         return outcome.ended(own)
 
     def error(self, number: int) -> float | None:
-        """RMS of model less measured over the largest value measured, of a run."""
+        """Return the RMS error of a run over the largest measured value."""
         outcome, own = self._own(number)
         return outcome.error(own)
 
     def failed(self) -> list[int]:
-        """Numbers of the runs that failed."""
+        """Return the numbers of the runs that failed."""
         return [i for i, run in enumerate(self.each) if run.record.failure]
 
     @property
     def cached(self) -> int:
-        """How many of the runs were made earlier by another program, and not again."""
+        """Return the number of runs from the cache of another program's."""
         return sum(run.record.from_cache for run in self.each)
 
     def silent(self) -> list[int]:
-        """Numbers of the runs of measured tests that gave nothing to compare."""
+        """Return the numbers of the runs of measured tests that gave nothing to compare."""
         measured = [
             i
             for i, run in enumerate(self.each)
@@ -151,18 +142,16 @@ class Predictions:
         return [i for i in measured if self.error(i) is None]
 
     def runs(self) -> pd.DataFrame:
-        """A row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
+        """Return a row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
         import pandas as pd
 
         rows = []
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             tail = {
-                "ended": self.ended(i),
-                "marks": "; ".join(marks(run.notes)),
-                "notes": "; ".join(run.notes),
-                "seconds": run.record.seconds,
-            }
+                "ended": self.ended(i), "marks": "; ".join(marks(run.notes)),
+                "notes": "; ".join(run.notes), "seconds": run.record.seconds,
+            }  # fmt: skip
             head = {"test": run.test.name, "card": run.card, "wall": run.wall}
             rows.append({**head, **outcome.columns(own), **tail})
         columns = list(dict.fromkeys(name for row in rows for name in row))
@@ -170,35 +159,29 @@ class Predictions:
         return pd.DataFrame(rows, columns=[*last, *tail])
 
     def curves(self) -> pd.DataFrame:
-        """Every run frame by frame, with its test, card and wall."""
+        """Return every run frame by frame, with its test, card and wall."""
         import pandas as pd
 
         curves = []
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
             curve = outcome.curve(own)
-            curve.insert(0, "wall", run.wall)
-            curve.insert(0, "card", run.card)
-            curve.insert(0, "test", run.test.name)
+            for name, value in ("wall", run.wall), ("card", run.card), ("test", run.test.name):
+                curve.insert(0, name, value)
             curves.append(curve)
         return pd.concat(curves, ignore_index=True)
 
     def lines(self) -> list[str]:
-        """For the terminal: a table of each kind of test, then the notes."""
+        """Return for the terminal a table of each kind of test, then the notes."""
         lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
         return [*lines, *note_lines(self.notes)]
 
     def report(self, folder: Path | str) -> Path:
-        """Write tables, figures, files, report.html and last result.json; the page's path.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write tables, figures, report.html and last result.json; return the page's path."""
         return write_report(self, folder)
 
     def _own(self, number: int) -> tuple[PredictedOutcome, int]:
-        """The outcome that a run belongs to, and its number there."""
+        """Return the outcome that a run belongs to, and its number there."""
         outcome, numbers = self.outcomes[self.each[number].test.kind]
         return outcome, numbers.index(number)
 
@@ -206,14 +189,10 @@ class Predictions:
         run = self.each[number]
         outcome, own = self._own(number)
         head: dict[str, Any] = {
-            "test": run.test.name,
-            "card": run.card,
-            "wall": run.wall,
-            "predicted": run.predicted,
-            "ended": self.ended(number),
-            "marks": marks(run.notes),
-            "seconds": run.record.seconds,
-        }
+            "test": run.test.name, "card": run.card, "wall": run.wall,
+            "predicted": run.predicted, "ended": self.ended(number),
+            "marks": marks(run.notes), "seconds": run.record.seconds,
+        }  # fmt: skip
         if run.record.failure:
             return head
         tail = {"iterations": run.record.iterations, "warnings": list(run.notes)}
@@ -222,10 +201,7 @@ class Predictions:
 
 @dataclass(frozen=True)
 class RunEvent:
-    """A run that ended: `done` of `total`; None: they are about to begin.
-
-    again : it was in the folder, from an earlier time.
-    """
+    """The end of a run, `done` of `total`; without one they begin. again : kept from before."""
 
     run: PredictedRun | None
     done: int
@@ -233,7 +209,7 @@ class RunEvent:
     again: bool = False
 
 
-#: Is told of every run as it ends, and of time passing (None).
+#: Receives every run as it ends, and None as time passes.
 Progress = Callable[[RunEvent | None], None]
 
 
@@ -253,42 +229,35 @@ def predict(
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
-    Where the solver's answer is a band, both its ends are run (`PredictedRun.end`). What is
-    predicted is also run with laws around the card's, where the card says how sure it is, so that
-    its spread is known (`PredictedRun.around`).
+    Both ends of a solver's band are run (`PredictedRun.end`). Predictions are also run with laws
+    around a card's that has a certainty, for their spread (`PredictedRun.around`).
 
     Parameters
     ----------
-    tests : names of tests, or a kind of test; every test that is not fitted unless given.
-    cards : by name; or names of the project's cards and files of others. The project's unless
-        given; where it has none, the one that its fit left in the usual folder.
-    samples : laws drawn from the certainty of each card; unless given, steps along its few least
-        certain directions are run instead, but not by another program. 0: the spread is not asked
-        for.
-    jobs : processes; as the project says unless given, else all cores.
-    scheduler : address of a Dask scheduler, whose workers do the runs instead of this machine.
-    out : folder in which every run is written as it ends, so that it is not run twice (`resume`);
-        nothing is written without it.
-    overwrite : replace what the folder holds.
-    progress : is told of every run that ended; None now and then while none does. An interrupt
-        (Ctrl-C) leaves the folder ready for `resume`.
-    command_line : of the command that asks, for the record; None where Python does.
-
-    Returns
-    -------
-    The runs as tables, and `report(folder)` for the page.
+    tests : names of tests, or a kind of test; unless given all that are not fitted.
+    cards : by name; or names of the project's cards and files of others; unless given the
+        project's, else the one that its fit left in the usual folder.
+    samples : laws drawn from the certainty of each card; 0 for no spread; unless given, steps along
+        its few least certain directions are run, but not by another program.
+    jobs : processes; by default the project's, else all cores. scheduler : address of a Dask
+        scheduler, whose workers do the runs.
+    out : folder in which runs are written as they end, for `resume`, also after Ctrl-C; without it
+        nothing is written. overwrite : replace its content.
+    progress : receives every run that ended, None now and then. command_line : for the record.
 
     Raises
     ------
-    InputError : a test or card that there is not, a test that makes no model with a card's
-        thickness, or nothing to go on with. OutputError : the folder is used or cannot be written.
-    SolverFailure : the solver is not there, or no run ended well.
+    InputError : no such test or card, a test without a model of a card's thickness, or nothing to
+        resume. OutputError : the folder is used or cannot be written. SolverFailure : the solver is
+        not there, or no run ended well.
     """
     begun = time.perf_counter()
     project = project.with_scheduler(scheduler)
     executor_of(project).check()
     chosen = predicted_tests(project, tests)
-    solver = _usable(project)
+    name = project.fit.solver
+    options = project.options_of(name)
+    solver = usable_solver(name, options, project.path, cache=project.run_cache)
     pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
     record = _record(project, chosen, card_sources(project, cards), solver, command_line)
     records = None
@@ -333,11 +302,11 @@ def _record(
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
-    """The tests that `predict` runs: by name or by kind, all unless named.
+    """Return the tests that `predict` runs: by name or by kind, all unless named.
 
     Raises
     ------
-    InputError : a name that is none; none of them is of a kind that is predicted.
+    InputError : no such name; none is of a kind that is predicted.
     """
     chosen = project.chosen(tests, fitted=False)
     able = [test for test in chosen if kind_named(test.kind).predicted is not None]
@@ -348,13 +317,13 @@ def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) 
 
 
 def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
-    """Of the tests that `predict` would run, those with something measured to compare with."""
+    """Return the tests of `predicted_tests` that are measured."""
     chosen = predicted_tests(project, tests)
     return [test for test in chosen if predicted_kind(test.kind).measured(test)]
 
 
 def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
-    """One test with one card; a run that does not end well is a record of its failure."""
+    """Run one test with one card; a failure is a record too."""
     check_carries(solver, card.law)
     begun = time.perf_counter()
     try:
@@ -365,7 +334,7 @@ def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) ->
 
 
 def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
-    """A mark of everything that a run's result depends on, by content."""
+    """Return a mark of all that a run's result depends on, by content."""
     material = (law.pieces, law.coupling, law.thickness_change)
     return digest_of(kind.depends_on(model), material, solver.identity)
 
@@ -373,7 +342,7 @@ def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) ->
 def _pairs(
     project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
-    """Test by test, card by card, end by end of the solver's band, nothing run yet."""
+    """Return runs to be made: test by test, card by card, end by end of the solver's band."""
     pairs = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
@@ -393,7 +362,7 @@ def _pairs(
 def _around(
     project: Project, pairs: Sequence[PredictedRun], samples: int | None
 ) -> list[tuple[int, PredictedRun]]:
-    """Runs with other laws, each with the number of the prediction around which it lies."""
+    """Return runs with other laws, each with the number of its prediction."""
     others = []
     for number, pair in enumerate(pairs):
         if not pair.predicted:
@@ -409,7 +378,7 @@ def _around(
 
 
 def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[PredictedRun]:
-    """The predictions, each with the records of the runs around it; `numbers` of the last runs."""
+    """Return predictions with the records of the runs around; `numbers` of the last runs."""
     count = len(ended) - len(numbers)
     runs = list(ended[:count])
     for number in dict.fromkeys(numbers):
@@ -422,16 +391,9 @@ def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[
 
 
 def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
-    """The ends of the band that the solver gives for a model; one None where it gives none."""
+    """Return the ends of the solver's band for a model; one None without a band."""
     band = solver.band(model) if isinstance(solver, BandedSolver) else ()
     return tuple(band) or (None,)
-
-
-def _usable(project: Project) -> Solver:
-    """The project's solver; what is wrong with it shows here, in one line."""
-    name = project.fit.solver
-    options = project.options_of(name)
-    return usable_solver(name, options, project.path, cache=project.run_cache)
 
 
 def _run(
@@ -441,7 +403,7 @@ def _run(
     jobs: int | None,
     progress: Progress,
 ) -> list[PredictedRun]:
-    """Every pair with its record: those that the folder holds, and the others side by side."""
+    """Return every pair with its record: from the folder, or run side by side."""
     kinds = [predicted_kind(pair.test.kind) for pair in pairs]
     solver_of = _solvers(project)
     marks = [
@@ -452,9 +414,8 @@ def _run(
 
     def end(number: int, record: RunRecord, again: bool) -> None:
         pair = pairs[number]
-        card = pair.material
-        thick = other_thickness(card, project.fabric.thickness)
-        notes = [*notes_of_record(record, card), *thick]
+        thick = other_thickness(pair.material, project.fabric.thickness)
+        notes = [*notes_of_record(record, pair.material), *thick]
         ended[number] = replace(pair, record=record, notes=notes)
         log_run(pair.title, record, again)
         progress(RunEvent(ended[number], len(ended), len(pairs), again))
@@ -495,7 +456,7 @@ def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
 
 
 def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
-    """The project's solver for each end of its band, made once."""
+    """Return what makes the project's solver for an end of its band, once each."""
     name = project.fit.solver
     options = project.options_of(name)
     made: dict[str, Solver] = {}
@@ -511,4 +472,4 @@ def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
 
 
 def _nobody(event: RunEvent | None) -> None:
-    """Nobody wants to know."""
+    """Ignore an event."""

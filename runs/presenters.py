@@ -1,7 +1,6 @@
-"""Find the presenter of a result: what writes its folder and its page.
+"""Find the presenter of a result, which writes its folder and its page.
 
-Presenters look at results from above, so that no result imports them. They are found by place, as
-kinds of test, forms and readers are: one line a type of result.
+Presenters look at results from above, so that no result imports them: one line a type of result.
 """
 
 from __future__ import annotations
@@ -16,13 +15,17 @@ from ..errors import NoFeasibleStart, OutputError, SolverFailure
 
 #: Module of `reports` and its function, by the type of the result.
 PRESENTERS = {
-    "Bootstrap": ("bootstrap_page", "write_bootstrap"),
-    "Check": ("check_page", "write_check"),
-    "LawComparison": ("law_page", "write_comparison"),
+    "Bootstrap": ("study_pages", "write_bootstrap"),
+    "Check": ("run_pages", "write_check"),
     "Fit": ("fit_page", "write_fit"),
-    "Plan": ("plan_page", "write_plan"),
-    "Predictions": ("prediction_page", "write_predictions"),
-    "Profiles": ("profile_page", "write_profiles"),
+    "LawComparison": ("study_pages", "write_comparison"),
+    "Nu12Study": ("study_pages", "write_nu12"),
+    "Plan": ("study_pages", "write_plan"),
+    "Predictions": ("run_pages", "write_predictions"),
+    "Profiles": ("study_pages", "write_profiles"),
+    "Refinement": ("study_pages", "write_refinement"),
+    "Validation": ("study_pages", "write_validation"),
+    "WeightStudy": ("study_pages", "write_weights"),
 }
 
 
@@ -39,21 +42,20 @@ def write_report(result: Any, folder: Path | str) -> Path:
     return page
 
 
+class Presented:
+    """A result that its presenter writes."""
+
+    def write(self, folder: Path | str) -> None:
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
+
+
 @contextmanager
 def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
-    """Write report.html of the folder where what is done within fails, and go on failing.
+    """Write report.html of a failure within the block, which is raised again.
 
-    Parameters
-    ----------
-    folder : None: nothing is written. title : of the project.
-
-    Returns
-    -------
-    Further lines for the page, to be filled.
-
-    Raises
-    ------
-    What is raised within.
+    Yields further lines of the page, to be filled. title : of the project. Without a folder nothing
+    is written.
     """
     more: list[str] = []
     try:

@@ -1,4 +1,4 @@
-"""Profile likelihood of moduli: how far the data let each be from its best, on either side."""
+"""Compute profile-likelihood intervals of moduli."""
 
 from __future__ import annotations
 
@@ -26,18 +26,24 @@ from ..materials.forms.base import COMPONENTS
 from ..notes import Note, NoteKind, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
+from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .presenters import write_report
-from .refound import Card, Refound, refound
+from .presenters import Presented
 from .setup import FitSetup
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Of the distances of the ends from the best: beyond, they are said to be asymmetric.
+#: Ratio of the distances of the ends from the best beyond which an interval is asymmetric.
 ASYMMETRIC = 1.3
-#: Of -2 log L, below the best: another optimum is better.
+#: -2 log L below the best from which another optimum is better.
 BETTER = -0.5
+#: Called with the sides done, all sides, and the one that takes its next step.
+Progress = Callable[[int, int, str], None]
+#: Share of the strain reached at which a modulus is profiled unless strains are given.
+SHARE = 0.5
+#: Downwards and upwards.
+SIGNS = (-1.0, 1.0)
 METHOD = (
     "The modulus is held at values ever farther from its best and everything else is fitted anew, "
     "within the bounds of the fit; -2 log L is what the fit's own weighted sum of squares grows "
@@ -49,11 +55,10 @@ METHOD = (
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Of one modulus at one strain, MPa.
+    """The profile of one modulus at one strain, MPa.
 
-    best : of the fit. sigma : one standard deviation of the fit. band : its band by the noise,
-    within the bounds. below, above : the profile to either side. allowed : the least and the
-    largest value that the bounds of the fit allow.
+    best, sigma : of the fit. band : its band by the noise, within the bounds. below, above : the
+    profile to either side. allowed : range within the bounds of the fit.
     """
 
     modulus: str
@@ -67,22 +72,22 @@ class Profile:
 
     @property
     def name(self) -> str:
-        """The modulus and where."""
+        """The modulus and its strain in words."""
         return f"{self.modulus} at strain {self.strain:.4g}"
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
-        """Where the threshold is passed; None where it is not."""
+        """Ends of the interval; None where the threshold is not passed."""
         return self.below.end, self.above.end
 
     @property
     def analyses(self) -> int:
-        """Of both sides."""
+        """Number of analyses of both sides."""
         return self.below.analyses + self.above.analyses
 
     @property
     def asymmetry(self) -> float | None:
-        """Distance of the upper end over that of the lower one; None where one is not there."""
+        """Distance of the upper end over that of the lower one; None where one is missing."""
         low, high = self.ends
         if low is None or high is None or not low < self.best < high:
             return None
@@ -96,7 +101,7 @@ class Profile:
 
     @property
     def words(self) -> str:
-        """In a line."""
+        """The interval in a line."""
         low, high = (
             _end(end, side, limit)
             for end, side, limit in zip(
@@ -118,8 +123,8 @@ class Profile:
 
     @property
     def notes(self) -> list[Note]:
-        """Where the data contradict no value on a side, or another optimum is better."""
-        told = []
+        """Notes on sides without an end, or on a better optimum."""
+        notes = []
         for word, side in (("below", self.below), ("above", self.above)):
             if side.why:
                 ratio = round(side.ratios[-1], 3) + 0.0
@@ -127,15 +132,15 @@ class Profile:
                     f"not closed {word}: {_why(side)}; -2 log L is {ratio:.2g} of "
                     f"{THRESHOLD:.3g} there"
                 )
-                told.append(Note(NoteKind.NOT_CLOSED, words, self.name))
+                notes.append(Note(NoteKind.NOT_CLOSED, words, self.name))
         if min(*self.below.ratios, *self.above.ratios) < BETTER:
             words = "another optimum fits the data better than the card's: fit with more starts"
-            told.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
-        return told
+            notes.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
+        return notes
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """For result.json."""
+        """The content of result.json."""
         values, ratios = self.curve
         return {
             "modulus": self.modulus,
@@ -176,13 +181,8 @@ def _end(end: float | None, side: Side, limit: float) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Profiles:
-    """What the data say of moduli, each for itself.
-
-    Parameters
-    ----------
-    card : what it is named. tests : that are fitted. analyses : in all, the optimum's among them.
-    """
+class Profiles(Presented):
+    """Profiles of moduli. card : its name. analyses : in all, those of the optimum included."""
 
     title: str
     project: Path
@@ -193,29 +193,21 @@ class Profiles:
     notes: Sequence[Note] = ()
 
     def table(self) -> pd.DataFrame:
-        """A row for every value that was held: modulus, strain, MPa, minus_2_log_L,
-        by_sigma (what it would be by the fit's 1 sigma, if nothing were curved)."""
+        """Return a row a value held; by_sigma : -2 log L by the 1 sigma of the fit."""
         import pandas as pd
 
         found = []
         for one in self.each:
             values, ratios = (np.array(v) for v in one.curve)
-            found.append(
-                pd.DataFrame(
-                    {
-                        "modulus": one.modulus,
-                        "strain": one.strain,
-                        "MPa": values,
-                        "minus_2_log_L": ratios,
-                        "by_sigma": ((values - one.best) / one.sigma) ** 2,
-                    }
-                )
-            )
+            found.append(pd.DataFrame({
+                "modulus": one.modulus, "strain": one.strain, "MPa": values,
+                "minus_2_log_L": ratios, "by_sigma": ((values - one.best) / one.sigma) ** 2,
+            }))  # fmt: skip
         return pd.concat(found, ignore_index=True)
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         return {
             "command": "profile",
             "title": self.title,
@@ -231,26 +223,9 @@ class Profiles:
         }
 
     def lines(self) -> list[str]:
-        """For the terminal."""
-        told = [f"{one.name}: {one.words}" for one in self.each]
-        return [*told, f"{self.analyses} analyses", *note_lines(self.notes)]
-
-    def write(self, folder: Path | str) -> None:
-        """Write profile.csv, profile.png, report.html, notes.csv and, last, result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        write_report(self, folder)
-
-
-#: Told how many of how many sides are done, and of the one that takes its next step.
-Progress = Callable[[int, int, str], None]
-#: Share of the strain reached at which a modulus is profiled unless strains are given.
-SHARE = 0.5
-#: Downwards and upwards.
-SIGNS = (-1.0, 1.0)
+        """Return the result in words, for the terminal."""
+        lines = [f"{one.name}: {one.words}" for one in self.each]
+        return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
 
 
 def profile(
@@ -261,16 +236,15 @@ def profile(
     *,
     progress: Progress | None = None,
 ) -> Profiles:
-    """Hold moduli away from their best and fit the others anew, until the data contradict.
+    """Hold moduli away from their best and refit everything else, until the data contradict.
 
-    Begins at the optimum of the fit that left the card; every refit begins at its neighbour and
-    takes a few analyses.
+    Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
 
     Parameters
     ----------
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
         where a modulus has no strains. card : the one that the project's fit left in its usual
-        folder unless given. tests : as for `fit`. progress : is told of every step.
+        folder unless given. tests : as for `fit`.
 
     Raises
     ------
@@ -278,7 +252,7 @@ def profile(
     SolverFailure : the tests cannot be run with the card.
     """
     asked = _asked(moduli)
-    found = refound(project, card, tests)
+    found = find_optimum(project, card, tests)
     places = _places(found, asked)
     numbers = list(range(len(SIGNS) * len(places)))
     prepare = functools.partial(_task, found, places)
@@ -323,7 +297,7 @@ def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float
     return asked or {name: [] for name in COMPONENTS}
 
 
-def _places(found: Refound, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
+def _places(found: Optimum, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
     places = []
     for name, strains in asked.items():
         component = COMPONENTS[name]
@@ -336,7 +310,7 @@ def _places(found: Refound, asked: Mapping[str, Sequence[float]]) -> list[tuple[
     return places
 
 
-def _task(found: Refound, places: Sequence[tuple[str, float]]) -> Task:
+def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
     # Of the setup, which every process has anew: solvers are no one else's.
     setup: FitSetup = found.setup
     problem = setup.problem()
@@ -357,7 +331,7 @@ def _task(found: Refound, places: Sequence[tuple[str, float]]) -> Task:
     return side
 
 
-def _profile(found: Refound, name: str, strain: float, below: Side, above: Side) -> Profile:
+def _profile(found: Optimum, name: str, strain: float, below: Side, above: Side) -> Profile:
     unknowns = found.problem.unknowns
     row = modulus_row(unknowns, name, strain)
     band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]

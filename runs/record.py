@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..experiments.kinds import files_of
 from ..files import __version__, checksum, write_text
@@ -20,27 +20,21 @@ from ..solvers.base import Solver
 from .folder import AS_RUN, PROVENANCE
 from .setup import UNCOUNTED, FitSetup
 
-if TYPE_CHECKING:
-    pass
-
 PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
 
 
 def versions() -> dict[str, str]:
-    """Of what computes, by name."""
+    """Return the versions of bubblefit, Python and `PACKAGES` by name."""
     of = {name: importlib.metadata.version(name) for name in PACKAGES}
     return {"bubblefit": __version__, "python": platform.python_version(), **of}
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What a folder's results came from.
+    """The origin of a folder's results.
 
-    Parameters
-    ----------
-    project : its file, in full. text : of that file, None of a project without one. settings : as
-        `written.settings_of` has them. data : a row a file, see `data_rows`. runs : when, by which
-        command, on which machine, with which versions; those that were gone on with come first.
+    project : path of its file. text : of that file. settings : of `settings_of`. data : of
+    `data_rows`. runs : of `this_run`, those that were resumed first.
     """
 
     project: Path
@@ -51,16 +45,14 @@ class Record:
     runs: Sequence[Mapping[str, Any]]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values: what provenance.json holds."""
+        """Return plain values, as provenance.json holds them."""
         text = self.text
-        digest = None if text is None else hashlib.sha256(text.encode()).hexdigest()
-        as_run = None if self.settings is None else project_text(self.settings)
         return {
             "project": {
                 "file": os.path.abspath(self.project),
-                "sha256": digest,
+                "sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
                 "text": text,
-                "as_run": as_run,
+                "as_run": None if self.settings is None else project_text(self.settings),
             },
             "data": [dict(row) for row in self.data],
             "solver": dict(self.solver),
@@ -68,7 +60,7 @@ class Record:
         }
 
     def after(self, folder: Path) -> Record:
-        """The record after the runs that the folder's own has; as it is where that is damaged."""
+        """Return the record after the runs of the folder's own, unless that is damaged."""
         try:
             runs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["runs"]
             before = [dict(run) for run in runs]
@@ -77,12 +69,7 @@ class Record:
         return replace(self, runs=[*before, *self.runs])
 
     def write(self, folder: Path) -> None:
-        """Write provenance.json, and the project as it is run as a file that can be run again.
-
-        Raises
-        ------
-        OutputError : they cannot be written.
-        """
+        """Write provenance.json, and the project as run; raises OutputError."""
         content = self.to_json()
         if self.settings is not None:
             write_text(folder / AS_RUN, content["project"]["as_run"])
@@ -90,17 +77,17 @@ class Record:
 
     @property
     def files(self) -> list[tuple[str, str]]:
-        """What it writes, and what that is."""
+        """Return its files and their descriptions."""
         project = [] if self.settings is None else [(AS_RUN, "the project as run, to run again")]
         return [(PROVENANCE, "what these results came from"), *project]
 
 
 def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
-    """Every measured file of tests by name, in order: checksum, what was read, rows and why not.
+    """Return checksum, format, columns, units and rows of each measured file of tests.
 
     Raises
     ------
-    InputError : a file is not there any more.
+    InputError : a file is gone.
     """
     return [
         {
@@ -121,7 +108,7 @@ def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
 
 
 def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
-    """Now, here, with these versions; command_line : None where Python called."""
+    """Return date, machine and versions of now; command_line : None if called from Python."""
     return {
         "command_line": None if command_line is None else list(command_line),
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -135,15 +122,12 @@ def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
     }
 
 
-#: What a test is called and where its files lie changes nothing.
+#: Settings of a test that change no result.
 NAMES = ("name", "folder")
 
 
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Everything that a fit's starts depend on; see `differences.Facts`.
-
-    data : the data files, as `record.data_rows` has them.
-    """
+    """Return all that a fit's starts depend on, as `folder.Facts`; data : of `data_rows`."""
     names = [test.test.name for test in setup.tests]
     files = {
         name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
@@ -158,7 +142,7 @@ def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]])
 
 
 def solver_facts(name: str, identity: str) -> dict[str, str]:
-    """A solver's identity taken apart: "ccx 2.20; element=S8R" is its version and its element."""
+    """Return a solver's identity in parts: version and element of "ccx 2.20; element=S8R"."""
     itself, *settings = identity.split("; ")
     pairs = [setting.partition("=")[::2] for setting in settings]
     return {"name": name, "version": itself, **dict(pairs)}

@@ -1,4 +1,9 @@
-"""Is the mesh, or are the increments, fine enough? Runs on finer and finer ones."""
+"""Run tests on finer and finer meshes, or with more and more increments, and compare the results.
+
+A discretisation of size h gives f(h) = f(0) + C h^p + smaller terms, once h is small enough. Three
+values determine p, C and f(0), whatever the ratios of their sizes (P. J. Roache's generalised
+Richardson extrapolation). Each result has a remark where the values contradict that assumption.
+"""
 
 from __future__ import annotations
 
@@ -22,278 +27,30 @@ from ..notes import Note, NoteKind, as_note, rows
 from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
-from .series import (
-    Part,
-    Series,
-    card_of,
-    card_words,
-    parts_of,
-    studied_tests,
-    thickness_notes,
-    write_study,
-)
+from .presenters import Presented
+from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..reports.studies import ConvergencePanel
-
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
-
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """One refinement of a part.
-
-    factor : how much finer than the project's own. size : of what is refined, edge length (mm) or
-    step (share of the whole load).
-    """
-
-    part: Part
-    factor: float
-    size: float
-
-    @property
-    def elements(self) -> int:
-        """Quads of the mesh."""
-        return len(self.part.model.mesh.quads)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelRun:
-    """What a level gave.
-
-    values : quantities of interest by name, None where the run failed; curve : (x, y) of the
-    response, where levels are compared along one; seconds : wall clock; failure : why there are
-    no values; notes : what a reader of the values should know.
-    """
-
-    level: Level
-    seconds: float
-    iterations: int = 0
-    values: Mapping[str, float] | None = None
-    curve: Curve | None = None
-    failure: str = ""
-    notes: tuple[Note, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """What a study of refinement gave: runs by part, coarse to fine.
-
-    noise : relative accuracy of the solver's displacements and loads. warnings : on all
-    of it, beside those of its runs.
-    """
-
-    project: Path
-    card: str
-    solver: str
-    what: Refined
-    runs: Mapping[str, Sequence[LevelRun]]
-    noise: float
-    warnings: tuple[Note, ...] = ()
-
-    @property
-    def result(self) -> dict[str, Any]:
-        """What result.json says: cost and values of each level, orders and limits."""
-
-        return numbers(self)
-
-    def table(self) -> pd.DataFrame:
-        """A row a part, level and quantity, with how far it is off the finest level's."""
-
-        return table(self)
-
-    def lines(self) -> list[str]:
-        """The same for a terminal."""
-
-        return [*lines(self.result), *note_lines(self.notes)]
-
-    @property
-    def notes(self) -> list[Note]:
-        """What a reader of the values should know, of every level's own run."""
-        notes = []
-        for name, runs in self.runs.items():
-            for run in runs:
-                size = f"{run.level.elements} quads"
-                if self.what == "increments":
-                    size = f"{run.level.part.increments} increments"
-                failed = [Note(NoteKind.FAILED, run.failure)] if run.failure else []
-                notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
-        return [*notes, *self.warnings]
-
-    def write(self, folder: Path | str) -> None:
-        """Write convergence.csv, convergence.png, notes.csv and result.json.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
-        from ..reports.studies import convergence_charts
-        from ..reports.vega import save
-
-        drawn, title = panels(self), f"{self.project.name}: finer and finer {self.what}"
-        charts = convergence_charts(drawn, self.what, title)
-        write_study(
-            Path(folder),
-            "convergence",
-            self.table(),
-            lambda path: save(path, charts),
-            self.result,
-            self.notes,
-            title,
-            self.lines(),
-            [charts],
-        )
-
-
-def refine(
-    project: Project,
-    card: MaterialCard | Path | str,
-    tests: str | Sequence[str] | None = None,
-    what: Refined = "elements",
-    levels: int = 4,
-    factor: int = 2,
-    coarser: int | None = None,
-    progress: Progress | None = None,
-    kept: RunCache | None = None,
-) -> Refinement:
-    """Run tests with a card on finer and finer meshes, or with more and more increments.
-
-    Parameters
-    ----------
-    card : itself, its file, or its name in the project. tests : names or kinds, all unless given.
-    what : "elements" or "increments" is refined. levels : how many there are.
-    factor : edges, or increments, are divided by it from one level to the next.
-    coarser : levels coarser than the project's own; 1 of elements and 0 of increments unless given.
-    progress : is told how far the study is.
-    kept : where each analysis is kept as it ends, so that an interrupted study can be gone on with.
-
-    Raises
-    ------
-    InputError : a level that cannot be had, or is the same as another.
-    SolverFailure : nothing can be compared, because fewer than two levels ended well anywhere.
-    """
-    below = (1 if what == "elements" else 0) if coarser is None else coarser
-    if below >= levels:
-        raise InputError(None, "--coarser", f"expected fewer than the {levels} levels, got {below}")
-    material = card_of(project, card)
-    series = Series(project, material, progress, kept)
-    factors = [float(factor) ** (k - below) for k in range(levels)]
-    chosen = studied_tests(project, tests)
-    # All before the first run: a level that cannot be meshed is a mistake in the options.
-    planned = [_levels(project, chosen, material.thickness, what, f) for f in factors]
-    names = list(planned[0])
-    for name in names:
-        _distinct(project, [p[name].size for p in planned])
-    series.total = levels * len(names)
-    runs = {name: _runs(series, [p[name] for p in planned]) for name in names}
-    if all(len(ended(several)) < 2 for several in runs.values()):
-        reason = next(r.failure for several in runs.values() for r in several if r.failure)
-        raise SolverFailure(f"fewer than two levels ended well: {reason}", series.solver.name)
-    return Refinement(
-        project.path,
-        card_words(card),
-        series.solver.name,
-        what,
-        runs,
-        # Result files of other programs have 6 digits.
-        1e-5 if series.solver.external else 1e-7,
-        tuple(thickness_notes(project, material)),
-    )
-
-
-def ended(runs: Sequence[LevelRun]) -> list[LevelRun]:
-    """Levels that have values, coarse to fine."""
-    return [run for run in runs if run.values is not None]
-
-
-def run_level(series: Series, level: Level) -> LevelRun:
-    """Run one level; an analysis that does not end well is a level without values."""
-    part, begun = level.part, time.perf_counter()
-    try:
-        history = series.run(part, series.card.law)
-    except SolverFailure as failure:
-        return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
-    # Without the keeping, and of a run that was kept earlier what it took then.
-    seconds = time.perf_counter() - begun if history.seconds is None else history.seconds
-    studied = part.studied
-    values = studied.quantities(part.model, history)
-    along = None if studied.curve is None else studied.curve(part.model, history)
-    notes = tuple(series.notes(history))
-    return LevelRun(level, seconds, history.iterations, values, along, notes=notes)
-
-
-def edge_length(mesh: Mesh) -> float:
-    """Edge (mm) of a square of the mean area of the quads, from their plane reference state."""
-    a, b, c, d = (mesh.points[mesh.quads[:, i]] for i in range(4))
-    area = 0.5 * np.linalg.norm(np.cross(c - a, d - b), axis=1)
-    return float(np.sqrt(area.mean()))
-
-
-def rms_between(coarse: Curve, fine: Curve) -> float:
-    """Root mean square of the difference of two curves (x, y), at the places of the coarse one.
-
-    The fine one is interpolated linearly where it has no point there; both start at the origin.
-    Where it stopped early they are compared up to there.
-    """
-    (x, y), (fx, fy) = coarse, fine
-    both = x <= fx[-1] * (1 + 1e-9)
-    x, y = x[both], y[both]
-    there = np.interp(x, np.append(0.0, fx), np.append(0.0, fy))
-    return float(np.sqrt(np.mean((y - there) ** 2)))
-
-
-def _levels(
-    project: Project, tests: Sequence[Any], thickness: float, what: Refined, factor: float
-) -> dict[str, Level]:
-    return {
-        name: Level(
-            part,
-            factor,
-            edge_length(part.model.mesh) if what == "elements" else 1.0 / part.increments,
-        )
-        for name, part in parts_of(project, tests, thickness, what, factor).items()
-    }
-
-
-def _runs(series: Series, levels: Sequence[Level]) -> list[LevelRun]:
-    if not series.solver.external:
-        # In-process solvers compile on first use: once, untimed.
-        with suppress(SolverFailure):
-            series.solver.run(levels[0].part.model, series.card.law)
-    return [run_level(series, level) for level in levels]
-
-
-def _distinct(project: Project, sizes: Sequence[float]) -> None:
-    for coarse, fine in pairwise(sizes):
-        if not fine < coarse * (1 - 1e-9):
-            problem = "two levels come out the same: nothing is left to coarsen; use fewer"
-            raise InputError(project.path, "--coarser", problem)
-
-
-# Observed order of convergence and Richardson's limit, from values on a few refinements.
-#
-# A discretisation of size h gives f(h) = f(0) + C h^p + smaller terms, once h is small enough.
-# Three values determine p, C and f(0), whatever the ratios of their sizes (P. J. Roache's
-# generalised Richardson extrapolation). The result is worth what the assumption is worth, so each
-# comes with a remark where the values contradict it.
 
 #: Orders looked for; a smooth problem on common elements has 1 to 4.
 LOWEST, HIGHEST = 0.05, 12.0
 #: Two successive orders further apart than this are not one order yet.
 STEADY = 0.5
+RMS = "RMS of the load to the next finer level, N"
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """What a sequence of refinements says about the exact value.
+    """Order and limit of a sequence of refinements.
 
-    order : observed on the three finest levels, None where there is none to see. limit : the value
-    at size zero by Richardson's extrapolation. previous : the order observed one level coarser.
-    remark : what a reader should know, empty where nothing speaks against the limit.
+    order : observed on the three finest levels, None where there is none. limit : the value at size
+    zero by Richardson's extrapolation. previous : the order observed one level coarser. remark : ""
+    where nothing speaks against the limit.
     """
 
     order: float | None = None
@@ -302,14 +59,12 @@ class Convergence:
     remark: str = ""
 
     def error(self, value: float) -> float | None:
-        """How far `value` is from the limit, relative to it; None where there is no limit."""
-        if self.limit is None or self.limit == 0:
-            return None
-        return value / self.limit - 1.0
+        """Return the deviation of `value` from the limit, relative; None where there is none."""
+        return None if not self.limit else value / self.limit - 1.0
 
 
 def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
-    """Order p with which two successive changes fall.
+    """Return the order p with which two successive changes fall.
 
     Parameters
     ----------
@@ -340,27 +95,20 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
 
 
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
-    """Value at size zero from the two finest levels of known order.
+    """Return the value at size zero from the two finest levels (2,), coarse and fine.
 
-    Parameters
-    ----------
-    sizes, values : (2,) coarse and fine.
-
-    Raises
-    ------
-    ValueError : sizes that do not decrease.
+    Raises ValueError: sizes that do not decrease.
     """
     h, f = _sizes(sizes, 2), np.asarray(values, dtype=float)
     return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
 
 
 def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 0.0) -> Convergence:
-    """Order and limit of a sequence of refinements.
+    """Return order and limit of a sequence of refinements.
 
     Parameters
     ----------
-    sizes : (levels,) coarse to fine, decreasing; any unit.
-    values : (levels,) of one quantity.
+    sizes, values : (levels,) coarse to fine; sizes decrease, in any unit.
     noise : relative change that is not the refinement's: the accuracy of solver and files.
 
     Raises
@@ -379,7 +127,7 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
         return Convergence(remark=_no_order(changes[-2:]))
     limit = richardson(h[-2:], f[-2:], order)
     if abs(limit - f[-1]) > abs(f[-1] - f[-3]):
-        # An order below a half where sizes are halved: the limit would be anybody's guess.
+        # An order below a half where sizes are halved: the limit is not determined.
         words = f"changes that fall so slowly (order {order:.2g}) show no limit: refine further"
         return Convergence(remark=words)
     previous = None
@@ -410,176 +158,150 @@ def _sizes(sizes: ArrayLike, count: int) -> Array:
     return h
 
 
-RMS = "RMS of the load to the next finer level, N"
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One refinement of a part.
+
+    factor : how much finer than the project's own. size : edge length (mm) or step (share of the
+    whole load), as refined.
+    """
+
+    part: Part
+    factor: float
+    size: float
+
+    @property
+    def elements(self) -> int:
+        """Number of quads of the mesh."""
+        return len(self.part.model.mesh.quads)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The columns of a level in tables and JSON."""
+        return {
+            "factor": self.factor,
+            "elements": self.elements,
+            "increments": self.part.increments,
+            "size": self.size,
+        }
 
 
-def numbers(study: Refinement) -> dict[str, Any]:
-    """What result.json says."""
-    return {
-        "command": "study mesh",
-        "project": str(study.project),
-        "card": study.card,
-        "solver": study.solver,
-        "refined": study.what,
-        "models": {name: _part(runs, study.noise) for name, runs in study.runs.items()},
-        "notes": rows(study.notes),
-    }
+@dataclass(frozen=True, eq=False)
+class LevelRun:
+    """The run of a level.
+
+    values : quantities of interest by name, None where the run failed, with the reason in
+    `failure`. curve : (x, y) of the response, where levels are compared along one. seconds : wall
+    clock.
+    """
+
+    level: Level
+    seconds: float
+    iterations: int = 0
+    values: Mapping[str, float] | None = None
+    curve: Curve | None = None
+    failure: str = ""
+    notes: tuple[Note, ...] = ()
 
 
-def table(study: Refinement) -> pd.DataFrame:
-    """convergence.csv: one row a part, level and quantity."""
-    import pandas as pd
+@dataclass(frozen=True, eq=False)
+class Refinement(Presented):
+    """The result of a study of refinement: runs by part, coarse to fine.
 
-    rows: list[dict[str, object]] = []
-    for name, runs in study.runs.items():
-        good = ended(runs)
-        finest = _values(good[-1]) if good else {}
-        changes = rms_changes(runs)
-        for run in runs:
-            level = run.level
-            start = {
-                "model": name,
-                "refined": study.what,
-                "factor": level.factor,
-                "elements": level.elements,
-                "increments": level.part.increments,
-                "size": level.size,
-                "seconds": run.seconds,
-                "iterations": run.iterations,
-            }
-            for quantity, value in _values(run).items():
-                off = value - finest.get(quantity, np.nan)
-                percent = 100 * off / finest.get(quantity, np.nan)
-                rows.append({**start, "quantity": quantity, "value": value, "off_finest": off,
-                             "off_finest_percent": percent})  # fmt: skip
-            if run in good and good.index(run) < len(changes):
-                rows.append({**start, "quantity": RMS, "value": changes[good.index(run)]})
-            if run.failure:
-                rows.append({**start, "quantity": f"failed: {run.failure}"})
-    return pd.DataFrame(rows)
+    noise : relative accuracy of the solver's displacements and loads. warnings : about the whole
+    study, beside those of its runs.
+    """
 
+    project: Path
+    card: str
+    solver: str
+    what: Refined
+    runs: Mapping[str, Sequence[LevelRun]]
+    noise: float
+    warnings: tuple[Note, ...] = ()
 
-def panels(study: Refinement) -> list[ConvergencePanel]:
-    """What the figure shows: relative changes from each level to the next finer one."""
-    from ..reports.studies import ConvergencePanel
+    @property
+    def result(self) -> dict[str, Any]:
+        """The content of result.json: cost and values of each level, orders and limits."""
+        return {
+            "command": "study mesh",
+            "project": str(self.project),
+            "card": self.card,
+            "solver": self.solver,
+            "refined": self.what,
+            "models": {name: _part(runs, self.noise) for name, runs in self.runs.items()},
+            "notes": rows(self.notes),
+        }
 
-    drawn = []
-    for name, runs in study.runs.items():
-        good = ended(runs)
-        changes: dict[str, list[float]] = {}
-        for quantity, last in (_values(good[-1]) if good else {}).items():
-            seen = np.array([_values(run).get(quantity, np.nan) for run in good])
-            changes[quantity] = (100 * np.abs(np.diff(seen) / last)).tolist()
-        rms = rms_changes(runs)
-        if rms:
-            largest = _largest(good)
-            changes["RMS along the load curve"] = [100 * r / largest for r in rms]
-        drawn.append(
-            ConvergencePanel(
-                name,
-                [run.level.size for run in good],
-                changes,
-                [run.level.elements * run.level.part.increments for run in good],
-                [run.seconds for run in good],
-            )
-        )
-    return drawn
+    def table(self) -> pd.DataFrame:
+        """Return a row a part, level and quantity, with its deviation from the finest level."""
+        import pandas as pd
 
+        rows: list[dict[str, object]] = []
+        for name, runs in self.runs.items():
+            good = ended(runs)
+            finest = (good[-1].values if good else None) or {}
+            changes = rms_changes(runs)
+            for run in runs:
+                start = {
+                    "model": name,
+                    "refined": self.what,
+                    **run.level.row,
+                    "seconds": run.seconds,
+                    "iterations": run.iterations,
+                }
+                for quantity, value in (run.values or {}).items():
+                    off = value - finest.get(quantity, np.nan)
+                    percent = 100 * off / finest.get(quantity, np.nan)
+                    rows.append({**start, "quantity": quantity, "value": value, "off_finest": off,
+                                 "off_finest_percent": percent})  # fmt: skip
+                if run in good and good.index(run) < len(changes):
+                    rows.append({**start, "quantity": RMS, "value": changes[good.index(run)]})
+                if run.failure:
+                    rows.append({**start, "quantity": f"failed: {run.failure}"})
+        return pd.DataFrame(rows)
 
-def rms_changes(runs: Sequence[LevelRun]) -> list[float]:
-    """RMS between the curves of each level that ended well and the next finer one."""
-    curves = [run.curve for run in ended(runs) if run.curve is not None]
-    return [rms_between(a, b) for a, b in pairwise(curves)]
+    def lines(self) -> list[str]:
+        """Return the result in words, for the terminal."""
+        words: list[str] = []
+        for name, model in self.result["models"].items():
+            head = list(model["quantities"])[-2:] or [""]
+            words.append(f"{name}: {self.what} refined")
+            columns = f"{'quads':>9} {'steps':>6} {'seconds':>8}   "
+            words.append(columns + "   ".join(head).rstrip())
+            for level in model["levels"]:
+                text = f"{level['elements']:9d} {level['increments']:6d} {level['seconds']:8.2f}   "
+                own = "   (the project's own)" if level["factor"] == 1 else ""
+                if level["values"] is None:
+                    words.append(f"{text}failed: {level['failed']}{own}")
+                    continue
+                numbers = [
+                    f"{'-' if (v := level['values'].get(h)) is None else f'{v:.7g}':<{len(h)}}"
+                    for h in head if h
+                ]  # fmt: skip
+                words.append((text + "   ".join(numbers) + own).rstrip())
+            words += [_quantity_words(*item) for item in model["quantities"].items()]
+            if (rms := model.get("rms_N")) is not None:
+                changes = ", ".join(f"{c:.3g}" for c in rms["to_next_finer"])
+                order = "" if rms["order"] is None else f", order {rms['order']:.2f}"
+                words.append(f"  RMS of the load to the next finer level: {changes} N{order}")
+        return [*words, *note_lines(self.notes)]
 
-
-def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
-    good = ended(runs)
-    said: dict[str, Any] = {
-        "levels": [_level(run) for run in runs],
-        "quantities": {},
-    }
-    if len(good) < 2:
-        return said
-    said["quantities"] = {
-        name: _quantity(name, finest, good, noise) for name, finest in _values(good[-1]).items()
-    }
-    changes = rms_changes(runs)
-    if changes:
-        sizes, largest = [run.level.size for run in good], _largest(good)
-        clear = min(changes[-2:]) > noise * largest
-        order = observed_order(sizes[-3:], changes[-2:]) if len(changes) > 1 and clear else None
-        said["rms_N"] = {"to_next_finer": changes, "largest_load": largest, "order": order}
-    return said
-
-
-def _level(run: LevelRun) -> dict[str, Any]:
-    said = {
-        "factor": run.level.factor,
-        "elements": run.level.elements,
-        "increments": run.level.part.increments,
-        "size": run.level.size,
-        "seconds": run.seconds,
-        "iterations": run.iterations,
-        "values": None if run.values is None else dict(run.values),
-    }
-    return {**said, "failed": run.failure} if run.failure else said
+    @property
+    def notes(self) -> list[Note]:
+        """Notes of every level's run, then those of the whole study."""
+        notes = []
+        for name, runs in self.runs.items():
+            for run in runs:
+                size = f"{run.level.elements} quads"
+                if self.what == "increments":
+                    size = f"{run.level.part.increments} increments"
+                failed = [Note(NoteKind.FAILED, run.failure)] if run.failure else []
+                notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
+        return [*notes, *self.warnings]
 
 
-def _quantity(name: str, finest: float, good: Sequence[LevelRun], noise: float) -> dict[str, Any]:
-    # A run that stopped early has no loads from there on.
-    having = [run for run in good if name in _values(run)]
-    seen = [_values(run)[name] for run in having]
-    observed = convergence([run.level.size for run in having], seen, noise)
-    best = finest if observed.limit is None else observed.limit
-    own = next((run for run in having if run.level.factor == 1), None)
-    return {
-        "finest": finest,
-        "order": observed.order,
-        "order_one_coarser": observed.previous,
-        "limit": observed.limit,
-        "remark": observed.remark,
-        "own_error": None if own is None else _values(own)[name] / best - 1.0,
-        "own_error_against": "finest" if observed.limit is None else "limit",
-    }
-
-
-def _values(run: LevelRun) -> Mapping[str, float]:
-    return run.values or {}
-
-
-def _largest(good: Sequence[LevelRun]) -> float:
-    """Largest load of the finest level's curve."""
-    curve = good[-1].curve
-    assert curve is not None
-    return float(np.abs(curve[1]).max())
-
-
-def lines(result: Mapping[str, Any]) -> list[str]:
-    """From the numbers of `Refinement.result`."""
-    words: list[str] = []
-    for name, model in result["models"].items():
-        head = list(model["quantities"])[-2:] or [""]
-        words.append(f"{name}: {result['refined']} refined")
-        words.append(f"{'quads':>9} {'steps':>6} {'seconds':>8}   " + "   ".join(head).rstrip())
-        for level in model["levels"]:
-            start = f"{level['elements']:9d} {level['increments']:6d} {level['seconds']:8.2f}   "
-            own = "   (the project's own)" if level["factor"] == 1 else ""
-            if level["values"] is None:
-                words.append(start + f"failed: {level['failed']}{own}")
-                continue
-            numbers = [_number(level["values"].get(h), len(h)) for h in head if h]
-            words.append((start + "   ".join(numbers) + own).rstrip())
-        words += [_quantity_refinement_words(*item) for item in model["quantities"].items()]
-        if "rms_N" in model:
-            words.append(_rms(model["rms_N"]))
-    return words
-
-
-def _number(value: float | None, width: int) -> str:
-    return f"{'-':<{width}}" if value is None else f"{value:<{width}.7g}"
-
-
-def _quantity_refinement_words(name: str, found: Mapping[str, Any]) -> str:
+def _quantity_words(name: str, found: Mapping[str, Any]) -> str:
     words = f"  {name}: {found['finest']:.7g} on the finest"
     if found["order"] is not None:
         words += f", order {found['order']:.2f}, limit {found['limit']:.7g}"
@@ -589,7 +311,168 @@ def _quantity_refinement_words(name: str, found: Mapping[str, Any]) -> str:
     return words + (f" ({found['remark']})" if found["remark"] else "")
 
 
-def _rms(found: Mapping[str, Any]) -> str:
-    changes = ", ".join(f"{c:.3g}" for c in found["to_next_finer"])
-    order = "" if found["order"] is None else f", order {found['order']:.2f}"
-    return f"  RMS of the load to the next finer level: {changes} N{order}"
+def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
+    good = ended(runs)
+    levels = []
+    for run in runs:
+        levels.append({
+            **run.level.row, "seconds": run.seconds, "iterations": run.iterations,
+            "values": None if run.values is None else dict(run.values),
+            **({"failed": run.failure} if run.failure else {}),
+        })  # fmt: skip
+    result: dict[str, Any] = {"levels": levels, "quantities": {}}
+    if len(good) < 2:
+        return result
+    finest = good[-1].values or {}
+    result["quantities"] = {name: _quantity(name, v, good, noise) for name, v in finest.items()}
+    if changes := rms_changes(runs):
+        sizes, largest = [run.level.size for run in good], largest_load(good)
+        clear = min(changes[-2:]) > noise * largest
+        order = observed_order(sizes[-3:], changes[-2:]) if len(changes) > 1 and clear else None
+        result["rms_N"] = {"to_next_finer": changes, "largest_load": largest, "order": order}
+    return result
+
+
+def _quantity(name: str, finest: float, good: Sequence[LevelRun], noise: float) -> dict[str, Any]:
+    # A run that stopped early has no loads from there on.
+    known = {run.level: run.values[name] for run in good if name in (run.values or {})}  # type: ignore[index]
+    observed = convergence([level.size for level in known], list(known.values()), noise)
+    best = finest if observed.limit is None else observed.limit
+    own = next((value for level, value in known.items() if level.factor == 1), None)
+    return {
+        "finest": finest,
+        "order": observed.order,
+        "order_one_coarser": observed.previous,
+        "limit": observed.limit,
+        "remark": observed.remark,
+        "own_error": None if own is None else own / best - 1.0,
+        "own_error_against": "finest" if observed.limit is None else "limit",
+    }
+
+
+def ended(runs: Sequence[LevelRun]) -> list[LevelRun]:
+    """Return the levels that have values, coarse to fine."""
+    return [run for run in runs if run.values is not None]
+
+
+def largest_load(good: Sequence[LevelRun]) -> float:
+    """Return the largest load of the finest level's curve."""
+    curve = good[-1].curve
+    assert curve is not None
+    return float(np.abs(curve[1]).max())
+
+
+def rms_changes(runs: Sequence[LevelRun]) -> list[float]:
+    """Return the RMS between the curves of each level that ended well and the next finer one."""
+    curves = [run.curve for run in ended(runs) if run.curve is not None]
+    return [rms_between(a, b) for a, b in pairwise(curves)]
+
+
+def rms_between(coarse: Curve, fine: Curve) -> float:
+    """Return the root mean square of the difference of two curves (x, y), where the coarse one is.
+
+    The fine one is interpolated linearly where it has no point there; both start at the origin.
+    Where it stopped early they are compared up to there.
+    """
+    (x, y), (fx, fy) = coarse, fine
+    both = x <= fx[-1] * (1 + 1e-9)
+    x, y = x[both], y[both]
+    there = np.interp(x, np.append(0.0, fx), np.append(0.0, fy))
+    return float(np.sqrt(np.mean((y - there) ** 2)))
+
+
+def edge_length(mesh: Mesh) -> float:
+    """Return the edge (mm) of a square of the mean area of the quads, in the plane at rest."""
+    a, b, c, d = (mesh.points[mesh.quads[:, i]] for i in range(4))
+    area = 0.5 * np.linalg.norm(np.cross(c - a, d - b), axis=1)
+    return float(np.sqrt(area.mean()))
+
+
+def refine(
+    project: Project,
+    card: MaterialCard | Path | str,
+    tests: str | Sequence[str] | None = None,
+    what: Refined = "elements",
+    levels: int = 4,
+    factor: int = 2,
+    coarser: int | None = None,
+    progress: Progress | None = None,
+    kept: RunCache | None = None,
+) -> Refinement:
+    """Run tests with a card on finer and finer meshes, or with more and more increments.
+
+    Parameters
+    ----------
+    card : itself, its file, or its name in the project. tests : names or kinds, all unless given.
+    levels : number of refinements of `what`. factor : edges, or increments, are divided by it from
+    one level to the next. coarser : levels coarser than the project's own; 1 of elements and 0 of
+    increments unless given. progress : called with every `Step`. kept : cache of the analyses that
+    ended, from which an interrupted study resumes.
+
+    Raises
+    ------
+    InputError : a level that cannot be meshed, or equals another.
+    SolverFailure : nothing can be compared, because fewer than two levels ended well anywhere.
+    """
+    below = (1 if what == "elements" else 0) if coarser is None else coarser
+    if below >= levels:
+        raise InputError(None, "--coarser", f"expected fewer than the {levels} levels, got {below}")
+    material = card_of(project, card)
+    series = Series(project, material, progress, kept)
+    chosen = studied_tests(project, tests)
+    # All before the first run: a level that cannot be meshed is a mistake in the options.
+    every = [
+        {
+            name: Level(
+                part,
+                own,
+                edge_length(part.model.mesh) if what == "elements" else 1.0 / part.increments,
+            )
+            for name, part in parts_of(project, chosen, material.thickness, what, own).items()
+        }
+        for own in (float(factor) ** (k - below) for k in range(levels))
+    ]
+    for name in every[0]:
+        for coarse, fine in pairwise(own[name].size for own in every):
+            if not fine < coarse * (1 - 1e-9):
+                problem = "two levels come out the same: nothing is left to coarsen; use fewer"
+                raise InputError(project.path, "--coarser", problem)
+    series.total = levels * len(every[0])
+    runs = {name: _runs(series, [own[name] for own in every]) for name in every[0]}
+    if all(len(ended(several)) < 2 for several in runs.values()):
+        reason = next(r.failure for several in runs.values() for r in several if r.failure)
+        raise SolverFailure(f"fewer than two levels ended well: {reason}", series.solver.name)
+    return Refinement(
+        project.path,
+        card_words(card),
+        series.solver.name,
+        what,
+        runs,
+        # Result files of other programs have 6 digits.
+        1e-5 if series.solver.external else 1e-7,
+        tuple(thickness_notes(project, material)),
+    )
+
+
+def _runs(series: Series, levels: Sequence[Level]) -> list[LevelRun]:
+    if not series.solver.external:
+        # In-process solvers compile on first use: once, untimed.
+        with suppress(SolverFailure):
+            series.solver.run(levels[0].part.model, series.card.law)
+    return [run_level(series, level) for level in levels]
+
+
+def run_level(series: Series, level: Level) -> LevelRun:
+    """Run one level; an analysis that does not end well is a level without values."""
+    part, begun = level.part, time.perf_counter()
+    try:
+        history = series.run(part, series.card.law)
+    except SolverFailure as failure:
+        return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
+    # Without the keeping, and of a run that was kept earlier what it took then.
+    seconds = time.perf_counter() - begun if history.seconds is None else history.seconds
+    studied = part.studied
+    values = studied.quantities(part.model, history)
+    along = None if studied.curve is None else studied.curve(part.model, history)
+    notes = tuple(series.notes(history))
+    return LevelRun(level, seconds, history.iterations, values, along, notes=notes)

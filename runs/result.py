@@ -1,4 +1,4 @@
-"""The result of a fit: card, tables, numbers, and the page."""
+"""The result of a fit: card, tables, numbers of result.json, notes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from ..materials.law import HypoelasticLaw
 from ..notes import Note, NoteKind, as_note, rows
 from ..project.project import Project
 from .best import TAKEN_OUT, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE
+from .folder import PROVENANCE, write_table
 from .presenters import write_report
 from .record import Record, versions
 from .setup import CoarseToFine, FitSetup
@@ -46,26 +46,22 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Laws of the best starts that are drawn together.
+#: Number of best starts of which the laws are drawn together.
 BEST = 5
-#: What `Fit.write_table` writes.
+#: Tables of `Fit.write_table`.
 TABLES = ("residuals", "moduli", "coefficients", "starts")
-#: What every row of the residuals ends with.
+#: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
-#: Strains at which `Fit.moduli` lists the moduli.
+#: Number of strains of each modulus in `Fit.moduli`.
 PLACES = 61
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a fit found.
+    """The result of a fit.
 
-    Parameters
-    ----------
-    setup : project, law without coefficients, tests with their data.
-    best : the best of the starts, run once more from the unloaded state. wall_s : seconds.
-    record : what it came from, None where nobody asks.
-    judgements : what was doubtful in the data.
+    best : the best of the starts, run once more from the unloaded state. record : of project, data
+    and command. judgements : doubts about the data.
     """
 
     setup: FitSetup
@@ -77,28 +73,28 @@ class Fit:
 
     @property
     def project(self) -> Project:
-        """The project as it was fitted, options of the call included."""
+        """Return the project as it was fitted, options of the call included."""
         return self.setup.project
 
     @property
     def objective(self) -> float:
-        """What is left of the objective (`FitSetup.objective_is`) at the best fit."""
+        """Return the objective (`FitSetup.objective_is`) of the best fit."""
         return self.best.objective
 
     @property
     def law(self) -> HypoelasticLaw:
-        """The best law, over the whole strain range that it was fitted with."""
+        """Return the best law, over the whole strain range of the fit."""
         return self.best.law
 
     @property
     def command(self) -> str:
-        """The kind of the tests where there is one, else "fit": for result.json and the card."""
+        """Return the kind of the tests where they have one, else "fit"."""
         kinds = {t.test.kind for t in self.setup.tests}
         return kinds.pop() if len(kinds) == 1 else "fit"
 
     @cached_property
     def card(self) -> MaterialCard:
-        """The material card; valid for the strains that the tests reached."""
+        """Return the material card, valid for the strains that the tests reached."""
         quality = ", ".join(
             f"{name}: {f.quality}" if len(self.findings) > 1 else f.quality
             for name, f in self.findings.items()
@@ -115,7 +111,7 @@ class Fit:
 
     @property
     def thickness(self) -> float:
-        """mm before the test: the fabric's, or as it was fitted."""
+        """Return the thickness before the test (mm): the fabric's, or as fitted."""
         places = {n.name: k for k, n in enumerate(self.problem.unknowns.nuisance.shared)}
         if "thickness" not in places:
             return self.project.fabric.thickness
@@ -124,23 +120,23 @@ class Fit:
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """What the data say of every unknown beside the moduli; empty where it is not known."""
+        """Return what the data say of each unknown beside the moduli; empty if not known."""
         known = self._known
         return () if known is None else verdicts(known, self.best.valid)
 
     @property
     def _known(self) -> Posterior | None:
-        """Of the law that is reported."""
+        """Return the posterior of the reported law."""
         return None if self.best.certainty is None else self.best.certainty.reported
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
-        """Every test in the light of the fit, by name."""
+        """Return the fitted tests by name."""
         return {t.test.name: self._fitted(t) for t in self.setup.tests}
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
-        """What the fit means for every test, by name."""
+        """Return the findings of each test by name."""
         return {
             t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
             for t in self.setup.tests
@@ -148,52 +144,48 @@ class Fit:
 
     @cached_property
     def result(self) -> dict[str, Any]:
-        """Everything in plain values: what result.json holds."""
-
+        """Return everything in plain values, as result.json holds it."""
         return result_of(self)
 
     @cached_property
     def misfits(self) -> dict[str, Misfit]:
-        """What is left of every comparison beside the noise of its data, by name."""
+        """Return residual and noise of each comparison by name."""
         return misfits(self.problem, self.best.point.residual)
 
     @cached_property
     def noise_tests(self) -> dict[str, NoiseTest]:
-        """The same beside what chance leaves of noise, of comparisons whose noise is given."""
+        """Return tests of the residual against the noise, of comparisons whose noise is given."""
         return noise_tests(self.problem, self.best.point.residual)
 
     @cached_property
     def notes(self) -> list[Note]:
-        """What a reader must know before using the numbers: as everywhere that the fit is told."""
-
+        """Return what a reader must know before using the numbers."""
         return notes_of_fit(self, pinned_numbers(self))
 
     @cached_property
     def pinned(self) -> dict[str, dict[str, Array]]:
-        """(n,) 1 sigma of each modulus along its strains, from each test alone and from all."""
-
+        """Return 1 sigma (n,) of each modulus along its strains, by test and from all."""
         return pinned(self)
 
     @cached_property
     def coarse_to_fine(self) -> CoarseToFine | None:
-        """What ran on which mesh; None where every start ran on its own."""
+        """Return what ran on which mesh; None if all starts ran on the full one."""
         return CoarseToFine.of(self.setup, self.best.records)
 
     @property
     def stages(self) -> str:
-        """The same in a line; empty where nobody asked for it."""
+        """Return `coarse_to_fine` as a line; empty unless asked for."""
         if self.coarse_to_fine is not None:
             return self.coarse_to_fine.words
         asked = self.project.fit.coarse_to_fine
         return "no test has a coarser mesh: every start ran on the full one" if asked else ""
 
     def moduli(self) -> pd.DataFrame:
-        """E1, E2 and G12 (MPa) along their strains, with one standard deviation.
+        """Return E1, E2 and G12 along their strains with band and standard deviation.
 
-        Columns modulus, strain, MPa, the ends of its band, lower_MPa and upper_MPa (95 %, noise and
-        mesh together), sigma_relative, and what it is made of: noise_relative, mesh_relative (by
-        how much the modulus would be another on ever finer meshes than on that of the fit). NaN
-        where it is not known; sigma is that of the noise alone where the mesh's part is not known.
+        Columns modulus, strain, MPa, lower_MPa and upper_MPa (95 %, noise and mesh together),
+        sigma_relative and its parts noise_relative and mesh_relative (change of the modulus on ever
+        finer meshes). NaN where not known; sigma is of the noise alone if the mesh's is not known.
         """
         import pandas as pd
 
@@ -208,37 +200,24 @@ class Fit:
                     lower, upper = (np.interp(strain, at, end) for end in sure.band[name])
                 if sure.mesh is not None:
                     mesh = np.interp(strain, at, sure.mesh[name])
-            rows.append(
-                pd.DataFrame(
-                    {
-                        "modulus": name,
-                        "strain": strain,
-                        "MPa": self.law.modulus(name, strain),
-                        "lower_MPa": lower,
-                        "upper_MPa": upper,
-                        "sigma_relative": sigma,
-                        "noise_relative": noise,
-                        "mesh_relative": mesh,
-                    }
-                )
-            )
+            columns = {
+                "modulus": name, "strain": strain, "MPa": self.law.modulus(name, strain),
+                "lower_MPa": lower, "upper_MPa": upper, "sigma_relative": sigma,
+                "noise_relative": noise, "mesh_relative": mesh,
+            }  # fmt: skip
+            rows.append(pd.DataFrame(columns))
         return pd.concat(rows, ignore_index=True)
 
     def coefficients(self) -> pd.DataFrame:
-        """Every unknown: value, one standard deviation, bounds, correlations with the others.
-
-        Columns unknown, unit, value, sigma, lower_bound, upper_bound, and one by the name of each
-        unknown.
-        """
-
+        """Return a row an unknown: value, sigma, bounds, correlation with each other one."""
         return coefficients_of(self)
 
     def residuals(self) -> pd.DataFrame:
-        """Every matched value of every test, a row each.
+        """Return a row a matched value of every test.
 
-        Columns test, part, where it is (of a bubble frame, pressure_kPa, x_mm, y_mm; of a strip
-        elongation_mm; of a biaxial test the loads), quantity, measured, modelled, difference
-        (modelled less measured) and the unit of these three.
+        Columns test, part, place (of a bubble frame, pressure_kPa, x_mm, y_mm; of a strip
+        elongation_mm; of a biaxial test the loads), then `COMPARED`: difference is modelled less
+        measured.
         """
         import pandas as pd
 
@@ -252,72 +231,49 @@ class Fit:
         return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
 
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
-        """Write one of the tables as .csv or .parquet, by the ending of the file's name.
-
-        Parameters
-        ----------
-        table : "residuals", "moduli", "coefficients" or "starts". Parquet needs pyarrow: pip
-            install 'bubblefit[parquet]'.
+        """Write one of `TABLES` as .csv or .parquet, by the ending of the file's name.
 
         Raises
         ------
-        InputError : another table or ending, or pyarrow is not there. OutputError : the file cannot
-            be written.
+        InputError : another table or ending, or Parquet without pyarrow. OutputError.
         """
-        from .folder import write_table
-
         if table not in TABLES:
             raise InputError(None, "table", f"{table!r} is not one of: {', '.join(TABLES)}")
         return write_table(getattr(self, table)(), path)
 
     def starts(self) -> pd.DataFrame:
-        """How every start ended: start, objective, status, analyses, external_runs,
-        cached_runs, seconds.
+        """Return a row a start: objective, status, analyses, runs, seconds.
 
-        Of starts that ran coarse to fine also coarse_objective and coarse_analyses, on the coarse
-        mesh, and same_as, the start that had the same optimum there and alone went on.
+        Of starts that ran coarse to fine also objective and analyses on the coarse mesh, and
+        same_as, the start with the same optimum there that alone was continued.
         """
         import pandas as pd
 
-        return pd.DataFrame(
-            [
-                {
-                    "start": r.number,
-                    "objective": np.nan if r.objective is None else r.objective,
-                    "status": r.status,
-                    "analyses": r.analyses,
-                    "external_runs": r.external_runs,
-                    "cached_runs": r.cached_runs,
-                    "seconds": r.wall_s,
-                    **({} if self.coarse_to_fine is None else coarse_columns(r)),
-                }
-                for r in self.best.records
-            ]
-        )
+        rows = [
+            {
+                "start": r.number, "objective": np.nan if r.objective is None else r.objective,
+                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
+                "cached_runs": r.cached_runs, "seconds": r.wall_s,
+                **({} if self.coarse_to_fine is None else coarse_columns(r)),
+            }
+            for r in self.best.records
+        ]  # fmt: skip
+        return pd.DataFrame(rows)
 
     @property
     def laws(self) -> list[HypoelasticLaw]:
-        """The laws of the best starts that have a fit of their own, best first."""
+        """Return the laws of the best starts that have a fit of their own, best first."""
         unknowns = self.problem.unknowns
         own = [r for r in self.best.ranked[1:] if r.same_as is None]
         others = [np.array(r.unknowns) for r in own[: BEST - 1]]
         return [self.law, *(unknowns.law(self.law, y) for y in others)]
 
     def report(self, folder: Path | str) -> Path:
-        """Write the card, tables, figures, report.html and, last, result.json into a folder.
-
-        Returns
-        -------
-        The page.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written.
-        """
+        """Write card, tables, figures, report.html and last result.json; return the page's path."""
         return write_report(self, folder)
 
     def output(self, folder: Path, test: str) -> Output:
-        """Where a test writes: with its name before every file's where there are several."""
+        """Return where a test writes: files carry its name if there are several tests."""
         return Output.of(folder, test, len(self.setup.tests) > 1)
 
     def _fitted(self, prepared: PreparedTest) -> FittedTest:
@@ -338,19 +294,18 @@ class Fit:
         )
 
 
-#: Logarithmic strains at which moduli are told, and the end of the valid strains beside them.
+#: Logarithmic strains of `answers`, beside the end of the valid ones.
 STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
-#: Of the end: a strain nearer to it is left out, the end stands for it.
+#: Share of the end beyond which a strain is left out.
 NEAR = 0.95
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One modulus at one strain.
+    """One modulus at one logarithmic strain.
 
-    strain : logarithmic. value : MPa; per_width : the same times the thickness before the test,
-    kN/m. sigma : one standard deviation over the value; band : MPa, between which it lies with 95 %
-    certainty; None where they are not known. end : whether the modulus is fitted no further.
+    value : MPa. per_width : kN/m. sigma : relative. band : MPa, 95 %; None if not known.
+    end : the modulus is fitted no further.
     """
 
     modulus: str
@@ -363,17 +318,17 @@ class Answer:
 
 
 def answers(fit: Fit) -> list[Answer]:
-    """E1, E2 and G12 at a few strains up to the end of those that they are fitted for."""
-    told = []
+    """Return E1, E2 and G12 at a few strains up to the end of the valid ones."""
+    found = []
     for name, component in COMPONENTS.items():
         end = float(fit.best.valid[component])
         strains = [*(strain for strain in STRAINS if strain < NEAR * end), end]
-        told += [answer_at(fit, name, strain, strain == end) for strain in strains]
-    return told
+        found += [answer_at(fit, name, strain, strain == end) for strain in strains]
+    return found
 
 
 def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
-    """One modulus (E1, E2 or G12) at one strain."""
+    """Return one modulus (E1, E2 or G12) at one strain."""
     value, sure = float(fit.law.modulus(name, strain)), fit.best.certainty
     per_width = value * fit.thickness
     if sure is None:
@@ -389,16 +344,15 @@ def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
     return Answer(name, strain, value, per_width, at(sure.total[name]), band, end)
 
 
-#: The columns before those of the correlations.
+#: Columns before the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 
 
 def coefficients_of(fit: Fit) -> pd.DataFrame:
-    """Coefficients of the law in the project's unit, then the nuisance.
+    """Return coefficients of the law in the project's unit, then the nuisance, a row each.
 
-    Columns unknown, unit, value, sigma (one standard deviation by noise, bounds left aside),
-    lower_bound, upper_bound, and of each unknown, under its name, the correlation with it. NaN
-    where it is not known.
+    `COLUMNS` (sigma by noise, bounds left aside), then the correlation with each unknown under its
+    name. NaN where not known.
     """
     import pandas as pd
 
@@ -422,47 +376,31 @@ def coefficients_of(fit: Fit) -> pd.DataFrame:
     return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
 
 
-#: Beyond, a test says nothing about a modulus (1 sigma, relative).
+#: Relative 1 sigma beyond which a test says nothing about a modulus.
 NOTHING = 1.0
-
-
-#: What all tests together are called among the tests.
+#: Name of all tests together among the tests.
 TOGETHER = "all together"
 
 
 def result_of(fit: Fit) -> dict[str, Any]:
-    """Everything that a fit found, in plain values.
-
-    With one test its numbers also stand at the top, beside those of the fit.
-    """
+    """Return the result in plain values; numbers of a single test also stand at the top."""
     project, best, law = fit.project, fit.best, fit.law
     records, sure = best.records, best.certainty
     result: dict[str, Any] = {
-        "command": fit.command,
-        "title": project.title,
-        "solver": project.fit.solver,
-        "method": project.fit.method,
-        "objective": fit.objective,
-        "objective_is": fit.setup.objective_is,
-        "moduli": law.form.name,
+        "command": fit.command, "title": project.title, "solver": project.fit.solver,
+        "method": project.fit.method, "objective": fit.objective,
+        "objective_is": fit.setup.objective_is, "moduli": law.form.name,
         "beta": {
-            "unit": project.scales.modulus_unit,
-            "labels": list(law.form.labels),
+            "unit": project.scales.modulus_unit, "labels": list(law.form.labels),
             "values": (law.beta / project.scales.modulus).tolist(),
         },
         **law.form.to_card(),
-        "nu12": law.nu12,
-        "strain_reached": by_strain(best.reached),
-        "valid_strain": by_strain(best.valid),
-        "seed": project.fit.seed,
+        "nu12": law.nu12, "strain_reached": by_strain(best.reached),
+        "valid_strain": by_strain(best.valid), "seed": project.fit.seed,
         "starts": [
             {
-                "start": r.number,
-                "seed": list(r.seed),
-                "objective": r.objective,
-                "status": r.status,
-                "analyses": r.analyses,
-                "external_runs": r.external_runs,
+                "start": r.number, "seed": list(r.seed), "objective": r.objective,
+                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
                 "cached_runs": r.cached_runs,
                 **({} if fit.coarse_to_fine is None else coarse_columns(r)),
             }
@@ -472,11 +410,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "analyses": sum(r.analyses for r in records),
         "external_runs": sum(r.external_runs for r in records),
         "cached_runs": sum(r.cached_runs for r in records),
-        "warnings": [],
-        "notes": [],
-        "wall_s": fit.wall_s,
-        "versions": versions(),
-    }
+        "warnings": [], "notes": [], "wall_s": fit.wall_s, "versions": versions(),
+    }  # fmt: skip
     result["misfit"] = {
         name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
         for name, m in fit.misfits.items()
@@ -514,10 +449,7 @@ def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | No
 
 
 def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
-    """1 sigma of each modulus from each test alone and from all; empty where it is not known.
-
-    From all together as they are weighted in the fit: the very uncertainty that it reports.
-    """
+    """Return 1 sigma of each modulus from each test alone and from all; empty if not known."""
     point, sure = fit.best.differentiated, fit.best.certainty
     if point is None or sure is None or sure.rows is None or len(fit.setup.tests) < 2:
         return {}
@@ -533,22 +465,18 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
 
 
 def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
-    """The same along the strains: least, median and largest."""
+    """Return least, median and largest of `Fit.pinned` along the strains."""
     return {
         source: {
-            name: {
-                "least": float(s.min()),
-                "median": float(np.median(s)),
-                "largest": float(s.max()),
-            }
-            for name, s in sigmas.items()
+            n: {"least": float(s.min()), "median": float(np.median(s)), "largest": float(s.max())}
+            for n, s in sigmas.items()
         }
         for source, sigmas in fit.pinned.items()
     }
 
 
 def _together(fit: Fit) -> dict[str, Any]:
-    """What a fit of several tests says beside what each test says."""
+    """Return what a fit of several tests adds to the numbers of each."""
     every = fit.problem.blocks.norms(fit.best.point.residual)
     block = np.concatenate(
         [np.full(len(c.objective.sizes), k) for k, c in enumerate(fit.problem.comparisons)]
@@ -567,10 +495,7 @@ def _together(fit: Fit) -> dict[str, Any]:
 
 
 def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:
-    """What a reader must know before using the numbers: one place for page, terminal and json.
-
-    pins : 1 sigma of each modulus ("least", "median", "largest") by test.
-    """
+    """Return the notes for page, terminal and json; pins : of `pinned_numbers`."""
     best, several = fit.best, len(fit.problem.comparisons) > 1
     notes = list(best.certainty.undetermined) if best.certainty is not None else []
     notes += notes_of_verdicts(fit.verdicts)

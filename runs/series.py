@@ -1,4 +1,4 @@
-"""What every study is: one card on the tests of a project, one analysis after the other."""
+"""Run one card on the tests of a project, one analysis after the other, and keep records of it."""
 
 from __future__ import annotations
 
@@ -9,100 +9,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import pandas as pd
-
 from ..errors import InputError
 from ..experiments.kinds import Refined, Studied, Test, notes_of, other_thickness
 from ..experiments.registry import kinds
-from ..files import replacing, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import NOTES, NOTES_ARE, Note, write_notes
+from ..notes import Note
 from ..project.cards import FITTED, usual_folder
 from ..project.project import Project, chosen_cards
-from ..reports.charts import Charts
-from ..reports.content import Listing, Picture, Report, Section, Table
-from ..reports.fit_page import citation
-from ..reports.html import write_report
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-from .folder import RESULT, Store
+from .folder import Store
 from .simulation import Analyses, Progress
-
-#: Of every study's page, after what is its own.
-FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
-
-
-def write_folder(
-    folder: Path,
-    tables: Mapping[str, pd.DataFrame],
-    figures: Mapping[str, Callable[[Path], object]],
-    notes: Sequence[Note],
-    page: Report,
-    result: Mapping[str, Any],
-    digits: int | None = None,
-) -> Path:
-    """Write everything; the page's path.
-
-    Parameters
-    ----------
-    tables : by the names of their files. figures : what draws each, by the name of its file.
-    digits : significant ones of the tables' numbers, all unless given.
-
-    Raises
-    ------
-    OutputError : a file cannot be written.
-    """
-    if (folder / RESULT).exists():  # what is half written has none
-        (folder / RESULT).unlink()
-    form = None if digits is None else f"%.{digits}g"
-    for name, table in tables.items():
-        with replacing(folder / name) as path:
-            table.to_csv(path, index=False, float_format=form, lineterminator="\n")
-    for name, draw in figures.items():
-        draw(folder / name)
-    write_notes(folder, notes)
-    written = write_report(folder, page)
-    write_text(folder / RESULT, json.dumps(result, indent=1) + "\n")
-    return written
-
-
-def study_page(
-    title: str,
-    said: Sequence[str],
-    table: pd.DataFrame,
-    table_file: str,
-    notes: Sequence[Note],
-    figure: str | None = None,
-    charts: Sequence[Charts] = (),
-) -> Report:
-    """The page. said : the lines of the terminal. figure : a picture in the folder, which stands in
-    the page unless charts do.
-    """
-    from pandas.api.types import is_numeric_dtype
-
-    words = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
-    shown = Table("The numbers", list(table.columns), table.to_numpy(object).tolist(), text=words)
-    return Report(
-        title=title,
-        warnings=[note.line for note in notes],
-        sections=[
-            Section("What it comes to", [Listing("\n".join(said))] if said else []),
-            Section("Figure", charts or ([Picture(figure, title)] if figure else [])),
-            Section("The numbers", [shown]),
-            Section("How to cite", citation()),
-        ],
-        files=[
-            (table_file, "the table"),
-            *([(figure, "picture of the charts")] if figure else []),
-            *FILES,
-        ],
-    )
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One model of a test, and what its kind looks at. name : unique among those of a study."""
+    """One model of a test with the quantities of its kind; its name is unique in a study."""
 
     name: str
     model: Any
@@ -110,17 +33,14 @@ class Part:
 
     @property
     def increments(self) -> int:
-        """Of the load, over the whole analysis."""
+        """Number of load increments of the whole analysis."""
         return len(self.studied.steps(self.model))
 
 
 class Series:
-    """Analyses with one card: those of a study.
+    """The analyses of a study, all with one card.
 
-    Parameters
-    ----------
-    project : whose tests are run. card : with which material. progress : is told how far they are.
-        `total` : how many analyses there will be, for the progress. kept : as of `Analyses`.
+    progress, kept : as for `Analyses`, whose `total` counts the analyses to come.
 
     Raises
     ------
@@ -138,7 +58,7 @@ class Series:
 
     @property
     def total(self) -> int:
-        """How many analyses there will be."""
+        """Number of all analyses, for the progress."""
         return self._analyses.total
 
     @total.setter
@@ -147,24 +67,22 @@ class Series:
 
     @property
     def solver(self) -> Solver:
-        """What runs them."""
+        """The solver that runs them."""
         return self._analyses.solver
 
     def run(self, part: Part, law: HypoelasticLaw) -> History:
-        """The next analysis; raises SolverFailure."""
+        """Run the next analysis; raises SolverFailure."""
         return self._analyses.run(part.name, part.model, law, part.increments)
 
     def notes(self, history: History) -> list[Note]:
-        """What a reader of a run's values should know."""
+        """Return the notes on the values of a run."""
         return notes_of(history, self.card)
 
 
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
-    """The tests of a project that a study can run: those named, of a kind named, or all.
+    """Return the tests of a project that a study can run: those named, of a kind named, or all.
 
-    Raises
-    ------
-    InputError : a name that is none; no test that can be studied.
+    Raises InputError: no such test; none that can be studied.
     """
     known = kinds()
     able = [t for t in project.chosen(tests or None) if known[t.kind].studied is not None]
@@ -180,11 +98,9 @@ def parts_of(
     what: Refined = "elements",
     factor: float = 1.0,
 ) -> dict[str, Part]:
-    """Every model of the tests, with the thickness (mm) of a card; one refinement of it.
+    """Return every model of the tests by name, refined, with the thickness (mm) of a card.
 
-    Raises
-    ------
-    InputError : a mesh or increments that cannot be had.
+    Raises InputError: a mesh or increments that cannot be made.
     """
     parts: dict[str, Part] = {}
     for test in tests:
@@ -204,18 +120,16 @@ def parts_of(
 
 
 def part_name(test: Test, part: str, parts: int, tests: int) -> str:
-    """What a part is called: as its test where it is the only one, with it among several tests."""
+    """Return a part's name: that of its test where it is the only one, with it among several."""
     if parts == 1:
         return test.name
     return part if tests == 1 else f"{test.name}: {part}"
 
 
 def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
-    """A card as it is given: itself, its file, or its name in the project.
+    """Return a card that is given as itself, its file, or its name in the project.
 
-    Raises
-    ------
-    InputError : there is none, or it is no card.
+    Raises InputError: there is none, or the file is no card.
     """
     if isinstance(card, MaterialCard):
         return card
@@ -224,11 +138,9 @@ def card_of(project: Project, card: MaterialCard | Path | str) -> MaterialCard:
 
 
 def fitted_card(project: Project) -> Path:
-    """The card that the project's fit left in its usual folder.
+    """Return the path of the card that the project's fit left in its usual folder.
 
-    Raises
-    ------
-    InputError : there is none.
+    Raises InputError: there is none.
     """
     path = usual_folder(project.path) / FITTED
     if not path.is_file():
@@ -238,37 +150,13 @@ def fitted_card(project: Project) -> Path:
 
 
 def card_words(card: MaterialCard | Path | str) -> str:
-    """How a result names the card that it was given."""
+    """Return the name of a card in results."""
     return card.name if isinstance(card, MaterialCard) else str(card)
 
 
 def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
-    """The card's thickness where it is not the fabric's: the card's counts."""
+    """Return a note where the card's thickness, which counts, is not the fabric's."""
     return other_thickness(card, project.fabric.thickness)
-
-
-def write_study(
-    folder: Path,
-    name: str,
-    table: pd.DataFrame,
-    draw: Callable[[Path], Any],
-    result: Mapping[str, Any],
-    notes: Sequence[Note],
-    title: str = "",
-    said: Sequence[str] = (),
-    charts: Sequence[Charts] = (),
-) -> None:
-    """Write the table NAME.csv, the figure NAME.png, notes.csv, the page and, last, result.json.
-
-    title : of the page; said : the lines of the terminal. charts : what the figure shows.
-
-    Raises
-    ------
-    OutputError : the folder cannot be written.
-    """
-    file, figure = f"{name}.csv", f"{name}.png"
-    page = study_page(title or name, said, table, file, notes, figure, charts)
-    write_folder(folder, {file: table}, {figure: draw}, notes, page, result)
 
 
 T = TypeVar("T")
@@ -282,10 +170,9 @@ def begin_study(
     fits: Iterable[str],
     records: Sequence[str] = (),
 ) -> None:
-    """Make the folder of a study ready, of whose fits each has a folder of its own in it.
+    """Prepare the folder of a study that holds a folder for each of its fits.
 
-    Where all is replaced, nothing of earlier fits is left that an interrupted study would go on
-    with.
+    `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
 
     Raises
     ------
@@ -297,12 +184,12 @@ def begin_study(
 
 
 def mark_of(parts: Mapping[str, Any]) -> str:
-    """Of everything that a record depends on."""
+    """Return a digest of everything that a record depends on."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
 def read_marked(path: Path, mark: str, read: Callable[[dict[str, Any]], T]) -> T | None:
-    """What `read` makes of a record; None where it is of something else, or no record at all."""
+    """Read a record with `read`; None where it has another mark, or there is none."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         return read(content) if content["of"] == mark else None
@@ -311,5 +198,5 @@ def read_marked(path: Path, mark: str, read: Callable[[dict[str, Any]], T]) -> T
 
 
 def write_marked(folder: Path, file: str, mark: str, content: Mapping[str, Any]) -> None:
-    """Write a record into a folder that is there; raises OutputError."""
+    """Write a record into an existing folder; raises OutputError."""
     Store(folder).write(file, json.dumps({"of": mark, **content}, indent=1) + "\n")

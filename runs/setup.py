@@ -1,4 +1,4 @@
-"""From a project and its tests to a fit: what is prepared once, and what every process builds."""
+"""Prepare a fit from a project and its tests: law, bounds, unknowns, starts, problem, meshes."""
 
 from __future__ import annotations
 
@@ -49,19 +49,16 @@ from .starts import HEADER, HISTORY, StartRecord
 MARGIN_E, MARGIN_G = 5.0, 0.5
 #: End of the strain range of moduli that do not depend on strain: nothing is held there.
 UNBOUNDED_RANGE = 1.0
-#: Shares of the strain range between the regions of a law, where no test tells.
+#: Shares of the strain range between the regions of a law, unless tests give them.
 THIRDS = (1 / 3, 2 / 3)
 
 
 def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
-    """The law that a fit starts from: everything but its coefficients, which are zero.
-
-    reaches : what the data of each test say of the law.
+    """Return the law of a fit with coefficients of zero; reaches : of the data of each test.
 
     Raises
     ------
-    InputError : no such form, a setting that it does not know, no strain range that follows from
-        the tests.
+    InputError : no such form, an unknown setting, no strain range that follows from the tests.
     """
     section, path = project.law, project.path
     ends = _strain_range(project, reaches)
@@ -70,19 +67,14 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     except InputError as error:
         field = f"law.{error.field}" if error.field else "law.form"
         raise InputError(path, field, error.problem) from None
-    return HypoelasticLaw(
-        np.zeros(form.size),
-        section.nu12,
-        np.array(ends),
-        project.fabric.thickness_change,
-        form,
-    )
+    change = project.fabric.thickness_change
+    return HypoelasticLaw(np.zeros(form.size), section.nu12, np.array(ends), change, form)
 
 
 def _form_settings(
     project: Project, reaches: Sequence[Reach], ends: Sequence[float]
 ) -> dict[str, Any]:
-    """What [law] says to its form; breaks from the tests' data where it needs and has none."""
+    """Return the settings of the form; breaks from the tests' data if it needs and has none."""
     settings = dict(project.law.model_extra or {})
     if "breaks" in settings or "breaks" not in form_settings(project.law.form):
         return settings
@@ -114,7 +106,7 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
 
 
 def bounds_of(project: Project, form: Form) -> LawBounds:
-    """Between what the moduli, or their coefficients, are looked for; MPa.
+    """Return the bounds of the moduli or of their coefficients, MPa.
 
     Raises
     ------
@@ -147,7 +139,7 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
 
 
 def _of_one_kind(project: Project, section: BoundsSection) -> bool:
-    """Whether the moduli are bounded, not their coefficients."""
+    """Return True if the moduli are bounded, not their coefficients."""
     ranges = {name: getattr(section, name) for name in ("E1", "E2", "G12")}
     listed = {name: getattr(section, name) for name in ("lower", "upper")}
     of_moduli = any(v is not None for v in ranges.values())
@@ -184,21 +176,21 @@ def _listed(project: Project, form: Form, name: str) -> list[float]:
     return values
 
 
-#: Bounds unless the file says otherwise; those of the thickness in shares of the fabric's.
+#: Default bounds; those of the thickness in shares of the fabric's.
 NU12, THICKNESS = (0.0, 0.6), (0.5, 1.5)
-#: Below it a law can be positive definite.
+#: End of the nu12 of positive definite laws.
 MOST_NU12 = 1.0
-#: Also of an incompressible one: its load is moduli times thickness times what strain makes of it.
+#: Also if incompressible: its load is moduli times thickness times a function of strain.
 PRODUCT = "a membrane under load knows moduli times thickness only"
 
 
 def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
-    """Of [fit.unknowns]; a fit starts from what [law] and [fabric] say.
+    """Return the unknowns of [fit.unknowns]; a fit starts from the values of [law] and [fabric].
 
     Raises
     ------
-    InputError : bounds out of order, beyond what can be, or not around the value to start from; a
-        thickness without a prior, which no data could tell from the moduli.
+    InputError : bounds out of order, impossible, or not around the value to start from; a thickness
+        without a prior, which no data could tell from the moduli.
     """
     asked, shared = project.fit.unknowns, []
     if asked.nu12 is not None:
@@ -254,10 +246,9 @@ def _bounds(
 def with_shared(
     comparisons: Iterable[Comparison], shared: Iterable[Nuisance]
 ) -> tuple[Comparison, ...]:
-    """The comparisons with what they share before what is their own.
+    """Return the comparisons with the shared unknowns before their own.
 
-    The misfit that a prior allows is that of the data where it is one standard deviation away: it
-    weighs what one value does of a block whose norm is that of its noise.
+    A prior weighs as one value of a block whose norm is that of its noise.
     """
     several, unknowns = tuple(comparisons), tuple(shared)
     if not unknowns:
@@ -274,8 +265,7 @@ def _weight(comparison: Comparison) -> float:
     return float(noise / np.sqrt(np.mean(objective.sizes)))
 
 
-#: What has to be the same: where moduli mean the same, and are between the same bounds. Data, seed
-#: and solver may be others.
+#: Parts that an earlier fit must share, unlike data, seed and solver.
 SAME = ("law", "tests")
 KEY = "fit.earlier (or --earlier)"
 
@@ -283,16 +273,10 @@ KEY = "fit.earlier (or --earlier)"
 def proposals(
     folder: Path, parts: dict[str, str], columns: list[str], scale: float
 ) -> ProposedStarts:
-    """What the evaluations in the folder of an earlier fit propose.
+    """Return starts proposed by the evaluations in the folder of an earlier fit.
 
-    Parameters
-    ----------
-    parts : digests of this fit, by what they are of. columns : names of the coefficients in a
-    history. scale : MPa per unit of it.
-
-    Raises
-    ------
-    InputError : no such folder, a fit of another model, no evaluation; no scikit-learn.
+    parts : `fingerprints` of this fit. columns : of the coefficients in a history. scale : MPa per
+    unit of it. Raises InputError for no such folder, a fit of another model, no evaluation.
     """
     try:
         before = dict(json.loads((folder / RUN).read_text(encoding="utf-8"))[PARTS])
@@ -321,23 +305,19 @@ def proposals(
     return ProposedStarts(coefficients[good], objectives[good])
 
 
-#: Leads the fit where the solver that counts gives no derivatives.
+#: Solver that leads the fit if the project's gives no derivatives.
 SURROGATE = "membrane"
 #: Where a project names its solver.
 SOLVER_KEY = "fit.solver"
-#: Of [fit], what changes no start: how many there are, and who runs them beside each other; the
-#: solver is told by what it says of itself.
+#: Keys of [fit] that change no start; the solver counts by its identity.
 UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlier")
 
 
 @dataclass(frozen=True, eq=False)
 class FitSetup:
-    """A fit ready to run, without anything of a solver: what worker processes are given.
+    """A fit ready to run, without a solver, for worker processes.
 
-    Parameters
-    ----------
-    law : everything but the coefficients. tests : with their data. counts : by name of a test, how
-    many times the weight that the project gives it. starts : where they begin.
+    law : without coefficients. counts : factors of the tests' weights by name.
     """
 
     project: Project
@@ -349,20 +329,20 @@ class FitSetup:
 
     @property
     def weightings(self) -> tuple[Weighting, ...]:
-        """One a test: alone it has its own objective, among others its relative errors count."""
+        """Return one a test: alone it has its own objective, among others relative errors count."""
         several = len(self.tests) > 1
         weights = [t.test.weight * self.counts.get(t.test.name, 1.0) for t in self.tests]
         return tuple(Weighting(several, weight if several else 1.0) for weight in weights)
 
     @property
     def objective_is(self) -> str:
-        """What the fit minimises, in words."""
+        """Return the objective in words."""
         if len(self.tests) > 1:
             return "weighted sum of the tests' mean relative RMS errors"
         return self.tests[0].objective_is
 
     def problem(self, masks: Masks | None = None) -> FitProblem:
-        """The fit, built anew; `masks`: which measured points it matches, by comparison."""
+        """Return the fit, built anew; masks : measured points that it matches, by comparison."""
         comparisons = [
             comparison
             for test, weighting in zip(self.tests, self.weightings, strict=True)
@@ -374,8 +354,7 @@ class FitSetup:
         return problem
 
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
-        """The fit of comparisons of its tests, whatever the models: the law's unknowns and theirs,
-        and what leads where the solver that counts gives no derivatives."""
+        """Return the fit of comparisons of its tests, led by `SURROGATE` without derivatives."""
         comparisons = with_shared(comparisons, shared_unknowns(self.project))
         law, ends = self.law, self.law.strain_range.tolist()
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
@@ -385,28 +364,28 @@ class FitSetup:
         return problem
 
     def make_solver(self, name: str | None = None) -> Solver:
-        """A new solver as the project names it, or another by name, with the project's settings."""
+        """Return `make_solver` of the project."""
         return make_solver(self.project, name)
 
     def make_leading(self, name: str | None = None) -> Solver:
-        """As `make_solver` where that one gives derivatives, else what leads it."""
+        """Return `make_solver` if that gives derivatives, else the solver that leads it."""
         solver = self.make_solver(name)
         return solver if isinstance(solver, DifferentiatingSolver) else self.make_solver(SURROGATE)
 
     def own(self, test: PreparedTest) -> tuple[Comparison, ...]:
-        """The comparisons of one test with its own objective."""
+        """Return the comparisons of one test with its own objective."""
         return test.comparisons(self.make_solver, Weighting())
 
     @property
     def options(self) -> FitOptions:
-        """How each start is fitted."""
+        """Return how each start is fitted."""
         fit = self.project.fit
         most = fit.max_analyses or method_named(fit.method).max_analyses
         return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, most)
 
 
 def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
-    """Read or compute the data of the tests, and check everything that a fit needs.
+    """Read or compute the data of the tests, and check all that a fit needs.
 
     Raises
     ------
@@ -431,7 +410,7 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
 
 
 def _starts(setup: FitSetup) -> Starts:
-    """Where the project says that starts begin."""
+    """Return where starts begin."""
     project, fit = setup.project, setup.project.fit
     if fit.earlier is not None and fit.starts_from != "proposed":
         said = 'means something with starts_from = "proposed" only'
@@ -448,18 +427,13 @@ def _starts(setup: FitSetup) -> Starts:
 
 
 def make_solver(project: Project, name: str | None = None) -> Solver:
-    """A new solver: the project's own, or another by name, with the project's settings of it.
-
-    Raises
-    ------
-    InputError : there is none of that name.
-    """
+    """Return a new solver, the project's or another by name, with the project's settings of it."""
     named = name or project.fit.solver
     return solver_named(named, project.run_cache, **project.options_of(named))
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
-    """Digests of everything that a start's result depends on, by what they are of."""
+    """Return digests of all that a start's result depends on, by part."""
     fit = setup.project.fit
     proposed = setup.starts if isinstance(setup.starts, ProposedStarts) else None
     own = {} if proposed is None else {
@@ -475,16 +449,12 @@ def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     }
 
 
-#: Edges of quads of the full mesh are those of the coarse one times it.
+#: Edge of the full mesh over that of the coarse one.
 COARSER = 0.5
 
 
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
-    """The fit on coarse meshes, run by the project's solver, or by what leads it.
-
-    Tests whose kind knows no coarser mesh, or whose mesh is coarse already, stay as they are; None
-    where all do.
-    """
+    """Return the fit on coarse meshes, run by the solver that leads; None if no test has any."""
     make = setup.make_leading
     pairs = list(zip(setup.tests, setup.weightings, strict=True))
     coarse = [_coarse(test, make, weighting) for test, weighting in pairs]
@@ -509,11 +479,10 @@ def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Compar
 
 @dataclass(frozen=True)
 class CoarseToFine:
-    """What ran on which mesh.
+    """The starts and analyses on each mesh.
 
-    quads : by comparison, of the coarse and of the full mesh; those without a mesh are not among
-    them. starts : on the coarse mesh. distinct : of their optima, fitted on the full mesh.
-    coarse_analyses, full_analyses : of all starts together.
+    quads : of the coarse and the full mesh by comparison, if meshed. starts : on the coarse mesh.
+    distinct : optima fitted on the full mesh.
     """
 
     quads: dict[str, tuple[int, int]]
@@ -524,14 +493,13 @@ class CoarseToFine:
 
     @classmethod
     def of(cls, setup: FitSetup, records: Sequence[StartRecord]) -> CoarseToFine | None:
-        """Of a fit that ended with these records; None where every start ran on its own mesh."""
+        """Return that of a fit with these records; None if all starts ran on the full mesh."""
         coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
         if coarse is None:
             return None
-        pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
         quads = {
             own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
-            for other, own in pairs
+            for other, own in zip(coarse.comparisons, setup.problem().comparisons, strict=True)
             if hasattr(own.model, "mesh")
         }
         before = sum(record.coarse_analyses for record in records)
@@ -541,7 +509,7 @@ class CoarseToFine:
 
     @property
     def words(self) -> str:
-        """In a line, for page and terminal."""
+        """Return a line for page and terminal."""
         meshes = ", ".join(
             f"{name} {coarse} of {full} quads" for name, (coarse, full) in self.quads.items()
         )
@@ -551,9 +519,6 @@ class CoarseToFine:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        quads = {
-            name: dict(zip(("coarse", "full"), own, strict=True))
-            for name, own in self.quads.items()
-        }
+        """Return plain values."""
+        quads = {name: {"coarse": own[0], "full": own[1]} for name, own in self.quads.items()}
         return {**asdict(self), "quads": quads}

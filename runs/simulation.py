@@ -1,4 +1,4 @@
-"""Forward analyses: what cards do in the tests of a project, or one card in one test."""
+"""Forward analyses: cards in the tests of a project, or one card in one test."""
 
 from __future__ import annotations
 
@@ -25,10 +25,7 @@ from .starts import timed
 
 @dataclass(frozen=True)
 class Step:
-    """How far a series of analyses is.
-
-    part : what is run. analysis : which of how many, from 1. done : increments of it so far.
-    """
+    """Progress of a series of analyses; done : increments of the current one, from 1."""
 
     part: str
     analysis: int
@@ -41,17 +38,10 @@ Progress = Callable[[Step], None]
 
 
 class Analyses:
-    """A series of analyses.
+    """A series of analyses by the project's solver; `total` : their number, for the progress.
 
-    Parameters
-    ----------
-    project : whose solver runs them. progress : is told how far they are; `total` is what it is
-        told of how many there will be. kept : where each is kept as it ends, and taken from where
-        it is there; None: nowhere but in the cache of runs.
-
-    Raises
-    ------
-    InputError, SolverFailure : the solver cannot be used.
+    kept : cache of finished analyses beside the cache of runs. Raises InputError or SolverFailure
+    if the solver cannot be used.
     """
 
     def __init__(
@@ -66,11 +56,9 @@ class Analyses:
         self._progress = progress
 
     def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
-        """The next analysis; `part` and `increments` (0: not known) are for the progress.
+        """Run the next analysis, or raise SolverFailure.
 
-        Raises
-        ------
-        SolverFailure : it does not end well.
+        part, increments : for the progress; 0 where not known.
         """
         check_carries(self.solver, law)
         self.count += 1
@@ -96,16 +84,11 @@ class Analyses:
 def simulate(
     test: Test, card: MaterialCard, solver: str = "membrane", **options: Any
 ) -> dict[str, History]:
-    """Run one test with a card, of the card's thickness; histories by part of the test.
-
-    Parameters
-    ----------
-    solver, options : its name, and what it is made with.
+    """Run one test with a card and its thickness; return histories by part of the test.
 
     Raises
     ------
-    InputError : no such solver, or an option it does not know.
-    SolverFailure : an analysis does not end well.
+    InputError : no such solver, or an option it does not know. SolverFailure.
     """
     runs = usable_solver(solver, options, cache=run_cache())
     check_carries(runs, card.law)
@@ -123,13 +106,13 @@ def simulate_cards(
     command: str = "simulate test",
     kept: RunCache | None = None,
 ) -> Simulation:
-    """Run tests with cards, write what their kinds write, notes.csv and result.json.
+    """Run tests with cards; write files of their kinds, notes.csv and result.json.
 
     Parameters
     ----------
-    cards : by name; the thickness of each counts, not the fabric's. folder : where files go.
-    within_range : show curves only to where a card's valid range ends. command : for the result.
-    kept : where each analysis is kept as it ends, for going on with an interrupted series.
+    cards : by name; the thickness of each counts, not the fabric's.
+    within_range : show curves only within a card's valid range.
+    kept : where finished analyses are kept, to resume an interrupted series.
 
     Returns
     -------
@@ -137,7 +120,7 @@ def simulate_cards(
 
     Raises
     ------
-    SolverFailure : nothing at all ended well. InputError, OutputError.
+    SolverFailure : nothing ended well. InputError, OutputError.
     """
     analyses = Analyses(project, progress, kept)
     models = {
@@ -156,13 +139,13 @@ def simulate_cards(
     failures = [outcome for outcome in every if isinstance(outcome, SolverFailure)]
     if len(failures) == len(every):
         raise failures[0]
-    told: dict[str, Simulation] = {}
+    shown: dict[str, Simulation] = {}
     for test in tests:
         of_test = {
             (name, part): run for name in cards for part, run in outcomes[test.name, name].items()
         }
         out = Output.of(folder, test.name, len(tests) > 1)
-        told[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
+        shown[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
     notes = [
         note.about(of) if len(tests) > 1 else note
         for (of, name), parts in outcomes.items()
@@ -178,12 +161,12 @@ def simulate_cards(
         "project": str(project.path),
         "solver": analyses.solver.name,
         "notes": rows(notes),
-        "tests": {name: one.numbers for name, one in told.items()},
-        **(told[tests[0].name].numbers if len(tests) == 1 else {}),
+        "tests": {name: one.numbers for name, one in shown.items()},
+        **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
     }
     write_notes(folder, notes)
     write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")
-    return Simulation(result, _lines(told, notes))
+    return Simulation(result, _lines(shown, notes))
 
 
 def _outcome(
@@ -196,7 +179,7 @@ def _outcome(
 
 
 def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[Note]:
-    """What a reader should know of a card's runs, part by part."""
+    """Return the notes of a card's runs, part by part."""
     notes = []
     for part, run in parts.items():
         if isinstance(run.outcome, SolverFailure):
@@ -207,8 +190,8 @@ def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[
     return notes
 
 
-def _lines(told: Mapping[str, Simulation], notes: Sequence[Note]) -> list[str]:
-    several = len(told) > 1
-    lines = [f"{name}: {line}" if several else line for name, one in told.items()
+def _lines(shown: Mapping[str, Simulation], notes: Sequence[Note]) -> list[str]:
+    several = len(shown) > 1
+    lines = [f"{name}: {line}" if several else line for name, one in shown.items()
              for line in one.lines]  # fmt: skip
     return [*lines, *note_lines(notes)]

@@ -1,4 +1,4 @@
-"""One start of a study: from its number to its optimum, with every evaluation told."""
+"""One start of a fit, from its number to its optimum; its records, running files and log."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from ..inference.problem import FitProblem
 from ..inference.search import feasible_start, fit_from
 from .folder import Store
 
-#: On which mesh something ran: on that of the project, or on the coarse one that leads to it.
+#: Mesh of a record: that of the project, or the coarse one that leads to it.
 MeshName = Literal["full", "coarse"]
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of a fit begins: what is counted in it, and how many there are."""
+    """The begin of a stage of a fit: what is counted in it, and how many."""
 
     what: str
     total: int
@@ -40,7 +40,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class EvaluationRecord:
-    """One analysis by `solver`, a row of history.csv. `objective` is None when it failed."""
+    """One analysis by `solver`, a row of history.csv; objective : None if it failed."""
 
     start: int
     analysis: int
@@ -54,16 +54,14 @@ class EvaluationRecord:
 
 @dataclass(frozen=True)
 class StartRecord:
-    """How one start ended. `unknowns` are the optimiser's; objective None: there is no fit.
+    """The end of one start; unknowns : of the optimiser. objective : None without a fit.
 
-    analyses : in all; external_runs : of them, run by an external solver; cached_runs : of them, by
-    an external solver earlier and taken from the cache of runs. failure : why the solver
-    failed, where that ended it: it is no finished start, and is run again on going on. reached :
-    largest strain (eps1, eps2, gamma12) at the optimum.
+    analyses : in all, of them external_runs by an external solver and cached_runs by one earlier.
+    failure : of the solver, if that ended the start, which is run again on resuming. reached :
+    largest strain (eps1, eps2, gamma12) at the optimum. mesh : of the objective.
 
-    mesh : that the objective is of. Of a start that ran coarse to fine: coarse_objective, what it
-    left on the coarse mesh; coarse_analyses, how many of the analyses ran there; same_as, the start
-    with the same optimum there, which alone was fitted on the full mesh and whose fit this is.
+    Coarse to fine: coarse_objective and coarse_analyses, on the coarse mesh; same_as, the start
+    with the same optimum there, which alone was fitted on the full mesh and has this fit.
     """
 
     number: int
@@ -84,12 +82,12 @@ class StartRecord:
     cached_runs: int = 0
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, exact in JSON."""
+        """Return plain values, exact in JSON."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> StartRecord:
-        """The inverse of `to_json`; KeyError or TypeError when it is not one."""
+        """Return the record of `to_json`; raises KeyError or TypeError if it is none."""
         return cls(
             number=int(values["number"]),
             seed=(int(values["seed"][0]), int(values["seed"][1])),
@@ -118,10 +116,10 @@ def run_start(
     mesh: MeshName = "full",
     coarse: StartRecord | None = None,
 ) -> StartRecord:
-    """Draw feasible start `number` of study `seed` and fit from it; tell every evaluation.
+    """Draw feasible start `number` of `seed` and fit from it; report every evaluation to `tell`.
 
-    mesh : of the problem, for the records. coarse : how the start ended on the coarse mesh: the fit
-    begins at its optimum, if it has one, and its analyses are counted on.
+    coarse : the start's end on the coarse mesh: the fit begins at its optimum, if any, and its
+    analyses are included.
     """
     begun = time.perf_counter()
     problem.reset()
@@ -135,19 +133,12 @@ def run_start(
         nonlocal analyses, runs
         analyses += 1
         runs += problem.solver.external and solver == problem.solver.name
-        coefficients = problem.unknowns.to_coefficients @ y[:size]
-        tell(
-            EvaluationRecord(
-                number,
-                analyses,
-                value,
-                status,
-                tuple(coefficients.tolist()),
-                tuple(np.asarray(y[size:]).tolist()),
-                solver,
-                mesh,
-            )
+        coefficients = tuple((problem.unknowns.to_coefficients @ y[:size]).tolist())
+        nuisance = tuple(np.asarray(y[size:]).tolist())
+        record = EvaluationRecord(
+            number, analyses, value, status, coefficients, nuisance, solver, mesh
         )
+        tell(record)
 
     watched = [p for p in (problem, problem.surrogate) if p is not None]
     for p in watched:
@@ -185,7 +176,7 @@ def run_start(
 
 
 def coarse_columns(record: StartRecord) -> dict[str, Any]:
-    """What a table says of a start that ran coarse to fine."""
+    """Return the columns of a start that ran coarse to fine."""
     names = ("coarse_objective", "coarse_analyses", "same_as")
     return {name: getattr(record, name) for name in names}
 
@@ -195,12 +186,12 @@ def _number(value: Any) -> float | None:
 
 
 def _why(problems: Sequence[FitProblem]) -> str:
-    """Why nothing came of the first that failed: the solver that counts, else what leads it."""
+    """Return the failure of the project's solver, else of the one that leads it."""
     return next((p.failure for p in problems if p.failure), "the first analysis failed")
 
 
 STARTS, HISTORY = "starts.jsonl", "history.csv"
-#: What every history begins with; the mesh is "full", or "coarse" where it leads to the full one.
+#: First columns of every history.
 HEADER = ("start", "analysis", "solver", "mesh", "objective", "status")
 MESH = HEADER.index("mesh")
 
@@ -208,10 +199,7 @@ MESH = HEADER.index("mesh")
 class RunningFiles:
     """The running files of a fit in its store.
 
-    Parameters
-    ----------
-    columns : names of the unknowns' values after the columns that every history has; coefficients
-        are divided by `scale` (MPa per unit of the file) and carry their unit in the name.
+    columns : of the unknowns, after `HEADER`, with the unit in the name. scale : their divisors.
     """
 
     def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:
@@ -220,10 +208,7 @@ class RunningFiles:
         self._starts: FileIO | None = None
 
     def begin(self, resume: bool) -> list[StartRecord]:
-        """Open the files; the starts that are finished already (none unless going on).
-
-        One that the solver's failure ended is not. A start that runs coarse to fine can be finished
-        on either mesh.
+        """Open the files; return the starts, on either mesh, that are finished if resumed.
 
         Raises
         ------
@@ -242,12 +227,7 @@ class RunningFiles:
         return done
 
     def add(self, record: EvaluationRecord | StartRecord) -> None:
-        """Append to history.csv or starts.jsonl and hand it to the system at once.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Append to history.csv or starts.jsonl at once; raises OutputError."""
         assert self._rows is not None and self._starts is not None
         with output_errors(self.store.path):
             if isinstance(record, StartRecord):
@@ -261,10 +241,7 @@ class RunningFiles:
             _append(self._rows, _table([[*said, *numbers]]))
 
     def finish(self) -> None:
-        """Close the files and put history.csv in order of start and analysis.
-
-        Of a start that began again, because its process died, the rows of the last time count.
-        """
+        """Close the files and sort history.csv; of a start that began again the last rows count."""
         self.close()
         rows = self._read()
         last = {(int(row[0]), int(row[1])): row for row in rows[1:]}
@@ -272,19 +249,14 @@ class RunningFiles:
         self.store.write(HISTORY, _table([rows[0], *body]))
 
     def close(self) -> None:
-        """Close the files (harmless when they are not open)."""
+        """Close the files, if open."""
         for stream in (self._rows, self._starts):
             if stream is not None:
                 stream.close()
         self._rows = self._starts = None
 
     def finished(self) -> list[StartRecord]:
-        """The starts that ended, as starts.jsonl has them.
-
-        Raises
-        ------
-        InputError : a line of it is damaged.
-        """
+        """Return the starts of starts.jsonl that did not fail; raises InputError if damaged."""
         path = self.store.path / STARTS
         done: dict[tuple[int, str], StartRecord] = {}
         # A crash can leave bytes that are no text where the last line should be.
@@ -325,7 +297,7 @@ log = logging.getLogger(__name__)
 
 
 def log_record(record: EvaluationRecord | StartRecord | None) -> None:
-    """An analysis, or how a start ended; nothing where only time has passed."""
+    """Log an analysis or the end of a start; nothing for None."""
     if isinstance(record, EvaluationRecord):
         left = "failed" if record.objective is None else f"objective {record.objective:.6g}"
         coarse = ", coarse mesh" if record.mesh == "coarse" else ""
@@ -342,14 +314,14 @@ def log_record(record: EvaluationRecord | StartRecord | None) -> None:
 
 
 def log_run(title: str, record: RunRecord, again: bool) -> None:
-    """A prediction: how it ended, or that the folder held it."""
+    """Log the end of a prediction, or that the folder held it."""
     how = record.failure or (f"stopped early, {record.early}" if record.early else "finished")
     log.info("%s: %s; %.2f s%s", title, how, record.seconds, ", kept from before" * again)
 
 
 @contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Log how long a part of a command took."""
+    """Log the seconds of a part of a command."""
     begun = time.perf_counter()
     yield
     log.info("%s: %.2f s", what, time.perf_counter() - begun)

@@ -1,9 +1,13 @@
-"""Does a fit foretell what it was not given? Tests, or parts of them, left out in turn."""
+"""Cross-validate fits: leave tests, or parts of them, out in turn and judge the fits there.
+
+Every fit without a part begins at random starts of its own. From the optimum of the fit to all of
+the data, a modulus that the rest does not determine would keep the value that the part gave it.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -24,38 +28,42 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import report_of
-from ..files import __version__, replacing
+from ..files import __version__
 from ..inference.comparison import Blocks
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, rows, write_notes
+from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
-from .fit import FitEvent
-from .folder import Store
+from .fit import FitEvent, stored_fit
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
-from .stored_fit import stored_fit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Values of what is no law, by comparison and name, in its units.
+STARTS = 3
+#: The sort of parts that is left out by default: whole tests.
+TESTS = "tests"
+NO_FIT = "no fit without it ended well"
+#: Called with the words of what is fitted, then the records of its starts; None now and then.
+Progress = Callable[[str | FitEvent | None], None]
+#: Values of nuisance unknowns by comparison and name, in their units.
 NuisanceValues = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """How a law does at one test.
+    """The errors of a law at one test.
 
-    test : its name. error : mean relative RMS error, None where an analysis failed. rms : by
-    comparison, in `unit`s. notes : what a reader should know of it. words, numbers : what the test
-    itself says of how good it is, as it does of a fit.
+    error : mean relative RMS error, None where an analysis failed. rms : by comparison, in `units`.
+    words, numbers : the quality in the test's own terms, as of a fit.
     """
 
     test: str
@@ -68,7 +76,7 @@ class HeldOut:
 
 
 def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver) -> HeldOut:
-    """Run a law on a test; what the test leaves open beside the law is fitted to it.
+    """Run a law on a test, and fit the test's nuisance unknowns to it.
 
     law : with the strain range for which it is known.
     """
@@ -95,14 +103,9 @@ def held_out_part(
     nuisance: NuisanceValues,
     name: str,
 ) -> HeldOut:
-    """Run a law on a test and judge it at a part of it alone.
+    """Run a law on a test and judge it at a part alone, with the nuisance values of the rest.
 
-    What the test leaves open beside the law is what the fit to the rest of it has found.
-
-    Parameters
-    ----------
-    part : the points of the part, of every comparison of the test. nuisance : by comparison and
-    name. name : of the test with its part.
+    part : points of the part, of every comparison. name : of the test with its part.
     """
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
     problem, y = problem_at(law, comparisons)
@@ -121,7 +124,7 @@ def held_out_part(
 
 
 def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
-    """Of a test, or a part of it, at which no law was judged."""
+    """Return the errors of a test, or a part of it, without any."""
     return HeldOut(name, None, {}, units, (Note(NoteKind.FAILED, why, name),))
 
 
@@ -132,7 +135,7 @@ def _fitted(
     law: HypoelasticLaw,
     make_solver: MakeSolver,
 ) -> FittedTest:
-    """The test as it is after a fit, in its own objective."""
+    """Return the test as after a fit, in its own objective."""
     reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
     own = prepared.comparisons(make_solver, Weighting())
     values = [problem.unknowns.nuisance_values(c.name, point.unknowns) for c in own]
@@ -159,25 +162,22 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
     return notes
 
 
-TABLE = "validation.csv"
-
-
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """One law at one test.
+    """One law (a form that was fitted, or a card) at one test.
 
-    law : the form that was fitted, or the card. foretold : by the fit to the rest of the data, or
-    by the card. fitted : by the fit to all of them, None for a card.
+    predicted : by the fit to the rest of the data, or by the card. fitted : by the fit to all of
+    them, None for a card.
     """
 
     law: str
-    foretold: HeldOut
+    predicted: HeldOut
     fitted: HeldOut | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Validation:
-    """Laws at what they were not fitted to: whole tests, or parts (frames, ...) as `leave` says."""
+class Validation(Presented):
+    """Laws at data that they were not fitted to: whole tests, or the parts named by `leave`."""
 
     title: str
     judged: tuple[Judged, ...]
@@ -185,43 +185,37 @@ class Validation:
 
     @property
     def means(self) -> dict[str, float]:
-        """By law: mean of the errors foretold; NaN where one is not known."""
-        laws = dict.fromkeys(one.law for one in self.judged)
-        return {law: float(np.mean([*self._of(law)])) for law in laws}
-
-    def _of(self, law: str) -> Iterable[float]:
-        return (_relative(one.foretold) for one in self.judged if one.law == law)
+        """Mean of the errors predicted, by law; NaN where one is not known."""
+        errors: dict[str, list[float]] = {}
+        for one in self.judged:
+            errors.setdefault(one.law, []).append(_relative(one.predicted))
+        return {law: float(np.mean(own)) for law, own in errors.items()}
 
     @property
     def notes(self) -> list[Note]:
-        """Of every law, at every test."""
-        return [note.about(one.law) for one in self.judged for note in one.foretold.notes]
+        """Notes of every law, at every test."""
+        return [note.about(one.law) for one in self.judged for note in one.predicted.notes]
 
     def table(self) -> pd.DataFrame:
-        """A row a law and comparison: law, test, compared, unit, errors."""
+        """Return a row a law and comparison: law, test, compared, unit, errors."""
         import pandas as pd
 
-        return pd.DataFrame(
-            [
-                {
-                    "law": one.law,
-                    "test": one.foretold.test,
-                    "compared": name,
-                    "unit": unit,
-                    "foretold_rms": _rms(one.foretold, name),
-                    "fitted_rms": _rms(one.fitted, name),
-                    "foretold_relative": _relative(one.foretold),
-                    "fitted_relative": _relative(one.fitted),
-                    "foretold_words": one.foretold.words,
-                }
-                for one in self.judged
-                for name, unit in one.foretold.units.items()
-            ]
-        )
+        return pd.DataFrame([
+            {
+                "law": one.law, "test": one.predicted.test, "compared": name, "unit": unit,
+                "foretold_rms": one.predicted.rms.get(name, np.nan),
+                "fitted_rms": np.nan if one.fitted is None else one.fitted.rms.get(name, np.nan),
+                "foretold_relative": _relative(one.predicted),
+                "fitted_relative": _relative(one.fitted),
+                "foretold_words": one.predicted.words,
+            }
+            for one in self.judged
+            for name, unit in one.predicted.units.items()
+        ])  # fmt: skip
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         table = self.table()
         means = {law: None if np.isnan(mean) else mean for law, mean in self.means.items()}
         return {
@@ -239,7 +233,7 @@ class Validation:
         }
 
     def lines(self) -> list[str]:
-        """The table for a terminal, and what it comes to."""
+        """Return a table for the terminal, and the conclusions."""
         table = self.table()
         wide = max([20, *(2 + len(name) for name in table["test"])])
         head = "left out" if self.leave != "tests" else "test left out"
@@ -250,9 +244,9 @@ class Validation:
                 f"{row.fitted_rms:10.4g}  {row.unit}"
             )
         said += [
-            f"{one.law}, {one.foretold.test}: {one.foretold.words}"
+            f"{one.law}, {one.predicted.test}: {one.predicted.words}"
             for one in self.judged
-            if one.foretold.words
+            if one.predicted.words
         ]
         means = {law: mean for law, mean in self.means.items() if not np.isnan(mean)}
         said += [f"{law}: foretold {100 * mean:.3g} % on average" for law, mean in means.items()]
@@ -260,58 +254,30 @@ class Validation:
             said.append(f"foretells best: {min(means, key=means.__getitem__)}")
         return said
 
-    def _shown(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
-        """Names of the tests or parts; by law the errors there, foretold and fitted."""
-        names = list(dict.fromkeys(one.foretold.test for one in self.judged))
+    def errors(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
+        """Return names of tests or parts, and by law the errors there: predicted, fitted."""
+        names = list(dict.fromkeys(one.predicted.test for one in self.judged))
         laws = dict.fromkeys(one.law for one in self.judged)
-        of = {(one.law, one.foretold.test): one for one in self.judged}
+        of = {(one.law, one.predicted.test): one for one in self.judged}
 
-        def errors(law: str, fitted: bool) -> list[float]:
+        def of_law(law: str, fitted: bool) -> list[float]:
             found = [of.get((law, name)) for name in names]
             return [
-                np.nan if one is None else _relative(one.fitted if fitted else one.foretold)
+                np.nan if one is None else _relative(one.fitted if fitted else one.predicted)
                 for one in found
             ]
 
-        after = {law: own for law in laws if np.isfinite(own := errors(law, True)).any()}
-        return names, {law: errors(law, False) for law in laws}, after
-
-    def write(self, folder: Path) -> None:
-        """validation.csv, notes.csv, the page and, last, result.json; raises OutputError."""
-        from ..reports.html import write_report
-        from ..reports.studies import held_out_charts
-        from .series import study_page
-
-        with replacing(folder / TABLE) as path:
-            self.table().to_csv(path, index=False, float_format="%.9g")
-        write_notes(folder, self.notes)
-        title = f"{self.title}: does a fit foretell what it was not given?"
-        charts = held_out_charts(*self._shown(), "Errors at what a fit was not given, and was")
-        said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_report(folder, study_page(*said, charts=[charts]))
-        Store(folder).finish(self.result)
+        after = {law: own for law in laws if np.isfinite(own := of_law(law, True)).any()}
+        return names, {law: of_law(law, False) for law in laws}, after
 
 
 def _relative(one: HeldOut | None) -> float:
     return np.nan if one is None or one.error is None else one.error
 
 
-def _rms(one: HeldOut | None, comparison: str) -> float:
-    return np.nan if one is None else one.rms.get(comparison, np.nan)
-
-
-# Single parts of tests left out of a fit in turn: frames, specimens, directions.
-#
-# Every fit without a part begins at random starts of its own. From the optimum of the fit to all
-# of the data a modulus that the rest does not determine would stay where the part itself had put
-# it, and the part would be foretold by what was taken from it.
-
-NO_FIT = "no fit without it ended well"
-
-
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of a test, by the number of the test in a setup; masks : what is kept without it."""
+    """A part of a test, by its number in a setup; masks : the points kept without the part."""
 
     test: int
     name: str
@@ -319,24 +285,20 @@ class Part:
 
     @property
     def alone(self) -> Masks:
-        """The points of the part itself."""
+        """Points of the part itself."""
         return {name: ~mask for name, mask in self.masks.items()}
 
 
 def sorts_of(tests: Sequence[PreparedTest]) -> list[str]:
-    """The sorts of parts that these tests have."""
+    """Return the sorts of parts that tests have."""
     found = [sort for test in tests if isinstance(test, Divisible) for sort in test.parts]
     return list(dict.fromkeys(found))
 
 
 def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
-    """Every part of a sort, test by test.
+    """Return every part of a sort, test by test; option : named by errors.
 
-    option : that asked for them, for the complaint.
-
-    Raises
-    ------
-    InputError : no test has two or more of them.
+    Raises InputError: no test has two or more of them.
     """
     parts = [
         Part(number, name, masks)
@@ -355,39 +317,20 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
 
 
 def name_of(setup: FitSetup, part: Part) -> str:
-    """What a part is called in tables and notes."""
+    """Return the name of a part in tables and notes."""
     return f"{setup.tests[part.test].test.name}: {part.name}"
 
 
 def judged_with(found: Fit, part: Part) -> HeldOut:
-    """The fit to all of the data, at a part of them."""
+    """Return the errors of the fit to all of the data at a part of them."""
     setup, problem, y = found.setup, found.problem, found.best.point.unknowns
     nuisance = {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
     name, law, test = name_of(setup, part), found.card.law, setup.tests[part.test]
     return held_out_part(test, law, setup.make_solver, part.alone, nuisance, name)
 
 
-def foretold(
-    setup: FitSetup, parts: Sequence[Part], numbers: Sequence[int], starts: int
-) -> Iterator[tuple[int, HeldOut] | None]:
-    """Fit without each part and judge there: its number and how it did; None now and then.
-
-    Parameters
-    ----------
-    numbers : of the parts that are left out. starts : random starts of each fit.
-    """
-    prepare = functools.partial(_task, setup, parts, starts)
-    return executor_of(setup.project).run_tasks(prepare, numbers, "parts")
-
-
-def _task(
-    setup: FitSetup, parts: Sequence[Part], starts: int
-) -> Callable[[int, Callable[[Any], None]], tuple[int, HeldOut]]:
-    return lambda number, tell: (number, without(setup, parts[number], starts))
-
-
 def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
-    """The best of some starts of a fit that is not given the part, judged at the part."""
+    """Fit without a part, from some starts, and return the errors of the best at the part."""
     name, test = name_of(setup, part), setup.tests[part.test]
     units = {c: "" for c in part.masks}
     own, unknowns = fit_of(setup, part.masks, starts)
@@ -407,6 +350,12 @@ def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     return held_out_part(test, law, own.make_solver, part.alone, nuisance, name)
 
 
+def _task(
+    setup: FitSetup, parts: Sequence[Part], starts: int
+) -> Callable[[int, Callable[[Any], None]], tuple[int, HeldOut]]:
+    return lambda number, tell: (number, without(setup, parts[number], starts))
+
+
 def recorded(
     setup: FitSetup,
     parts: Sequence[Part],
@@ -415,41 +364,34 @@ def recorded(
     file: str,
     tell: Callable[[str | None], None],
 ) -> list[HeldOut]:
-    """How the fit without each part does there, as it was written where it was fitted before.
+    """Return the errors at each part of the fit without it, read where the folder has them.
 
-    folder, file : where each part is written as it ends, None where nothing is. tell : hears of
-    each part that ended, and time pass.
+    folder, file : where each part is written as it ends; None for nowhere. tell : called with the
+    words of each part that ended, and with None now and then.
     """
-    mark = _mark(setup, parts, starts)
+    names = [name_of(setup, part) for part in parts]
+    of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
+    mark = mark_of(of)
     ended = {} if folder is None else _written(folder / file, mark)
-    known = {k: ended[name_of(setup, part)] for k, part in enumerate(parts)
-             if name_of(setup, part) in ended}  # fmt: skip
+    known = {k: ended[name] for k, name in enumerate(names) if name in ended}
     missing = [k for k in range(len(parts)) if k not in known]
-    for event in foretold(setup, parts, missing, starts) if missing else ():
+    prepare = functools.partial(_task, setup, parts, starts)
+    events = executor_of(setup.project).run_tasks(prepare, missing, "parts") if missing else ()
+    for event in events:
         if event is not None:
             number, judged = event
             known[number] = judged
             if folder is not None:
-                _write(folder, file, mark, [known[k] for k in sorted(known)])
-        tell(None if event is None else f"without {name_of(setup, parts[event[0]])}")
+                folder.mkdir(parents=True, exist_ok=True)
+                rows = [_plain(known[k]) for k in sorted(known)]
+                write_marked(folder, file, mark, {"parts": rows})
+        tell(None if event is None else f"without {names[event[0]]}")
     return [known[k] for k in range(len(parts))]
 
 
-def _mark(setup: FitSetup, parts: Sequence[Part], starts: int) -> str:
-    """Of everything that the errors depend on."""
-    names = [name_of(setup, part) for part in parts]
-    content = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
-    return mark_of(content)
-
-
-def _write(folder: Path, file: str, mark: str, judged: Sequence[HeldOut]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    write_marked(folder, file, mark, {"parts": [_plain(one) for one in judged]})
-
-
 def _written(path: Path, mark: str) -> dict[str, HeldOut]:
-    """By name of the part; nothing where it is of something else, or no record at all."""
-    judged = read_marked(path, mark, lambda told: [_judged(row) for row in told["parts"]])
+    """Read errors by name of the part; none where the mark is another."""
+    judged = read_marked(path, mark, lambda content: [_judged(row) for row in content["parts"]])
     return {one.test: one for one in judged or ()}
 
 
@@ -462,14 +404,6 @@ def _plain(one: HeldOut) -> dict[str, Any]:
 def _judged(row: Mapping[str, Any]) -> HeldOut:
     notes = tuple(Note(NoteKind(n["kind"]), n["words"], n["of"]) for n in row["notes"])
     return HeldOut(row["part"], row["error"], row["rms"], row["units"], notes)
-
-
-STARTS = 3
-#: What is left out unless something else is asked for: whole tests.
-TESTS = "tests"
-#: Told the words of what is fitted as its turn comes, then the records of its starts; None now
-#: and then.
-Progress = Callable[[str | FitEvent | None], None]
 
 
 def validate(
@@ -487,9 +421,8 @@ def validate(
 ) -> Validation:
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
 
-    Offsets and the sheet's surface of the test left out are no property of the fabric: they are
-    fitted to it, with the law as it is. Of a part of a test (a frame) they are what the rest of
-    the test has found.
+    Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
+    a part of a test (a frame) they are those of the fit to the rest of the test.
 
     Parameters
     ----------
@@ -497,11 +430,11 @@ def validate(
     forms : of the moduli, as for `compare_laws`; the project's own unless given.
     leave : "tests", or a sort of parts that the tests have: "frames" of a bubble, "specimens" or
         "directions" of strips.
-    out : folder with a folder for each fit, in which everything is written as it ends.
+    out : folder with a folder for each fit, written as the fits end.
 
     Raises
     ------
-    InputError : in the project or its data, fewer than two tests or parts, nothing to go on with.
+    InputError : in the project or its data, fewer than two tests or parts, nothing to resume.
     OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
     """
     tell = progress or (lambda event: None)
@@ -518,7 +451,9 @@ def validate(
     folder = None if out is None else Path(out)
     if folder is not None:
         of = {"version": __version__, "forms": ", ".join(projects), "left out": leave}
-        begin_study(folder, of, resume, overwrite, _places(projects, len(chosen)))
+        names = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
+        fits = [f"{plain(form)}-{name}" for form in projects for name in names]
+        begin_study(folder, of, resume, overwrite, fits)
     judged = []
 
     def fitted(own: Project, name: str, names: Sequence[str], place: str) -> Fit:
@@ -537,15 +472,15 @@ def validate(
             if overwrite and folder is not None:
                 (folder / file).unlink(missing_ok=True)
             tell(f"{form}: without each of {len(parts[form])} {leave}")
-            told = recorded(setups[form], parts[form], starts, folder, file, tell)
-            pairs = zip(parts[form], told, strict=True)
+            alone = recorded(setups[form], parts[form], starts, folder, file, tell)
+            pairs = zip(parts[form], alone, strict=True)
             judged += [Judged(form, one, judged_with(together, part)) for part, one in pairs]
             continue
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]
             words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
-            alone = fitted(own, words, others, place)
-            judged.append(Judged(form, _judge(alone, test), _judge(together, test)))
+            found = fitted(own, words, others, place)
+            judged.append(Judged(form, _judge(found, test), _judge(together, test)))
     return Validation(project.title, tuple(judged), leave)
 
 
@@ -554,11 +489,9 @@ def judge_cards(
     cards: Mapping[str, MaterialCard],
     tests: str | Sequence[str] | None = None,
 ) -> Validation:
-    """Cards at the tests of a project, without any fit of the law.
+    """Judge cards at the tests of a project, without any fit of the law.
 
-    Raises
-    ------
-    InputError : in the project or its data, a card of another thickness than the fabric's.
+    Raises InputError: in the project or its data, a card of another thickness than the fabric's.
     """
     for name, card in cards.items():
         if (words := thickness_difference(card, project.fabric.thickness)) is not None:
@@ -571,12 +504,6 @@ def judge_cards(
         for test in setup.tests
     ]
     return Validation(project.title, tuple(judged))
-
-
-def _places(forms: Iterable[str], tests: int) -> list[str]:
-    """Folders of the fits."""
-    names = ["all", *(f"without-{k + 1}" for k in range(tests))]
-    return [f"{plain(form)}-{name}" for form in forms for name in names]
 
 
 def _judge(found: Fit, test: PreparedTest) -> HeldOut:

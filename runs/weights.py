@@ -1,4 +1,4 @@
-"""What the weight between kinds of test does to a fit: one kind counts a quarter to four times."""
+"""Fit with other weights between kinds of test: one kind counts a quarter to four times."""
 
 from __future__ import annotations
 
@@ -10,33 +10,40 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..files import __version__, replacing
+from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, rows, write_notes
+from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from .compare import errors
-from .fit import FitEvent
+from .fit import FitEvent, stored_fit
+from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints
-from .stored_fit import stored_fit
 
 if TYPE_CHECKING:
     import pandas as pd
 
+STARTS = 5
+#: Factors of the weight, in steps of the square root of two.
+COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
 #: Shares of the strain reached at which moduli are followed.
 PLACES = (0.0, 0.5, 1.0)
+FITTED, RUNS = "fit", "weights-runs.json"
+ERROR = "mean relative RMS error of a test"
+#: Called with the words of what is fitted, then the records of its starts; None now and then.
+Progress = Callable[[str | FitEvent | None], None]
 
 
 @dataclass(frozen=True)
 class WeightedFit:
-    """The optimum where the tests of a kind count so many times.
+    """The optimum where the weight of some tests is multiplied by `count`.
 
     relative : mean relative RMS error by test; rms : by comparison, in its unit. moduli : MPa at
     the `PLACES` of the strain that the fit at the project's weights reached. unknowns : the
-    optimiser's. failure : why there is no fit, and nothing else.
+    optimiser's. failure : why there is no fit, "" where there is one.
     """
 
     count: float
@@ -48,17 +55,14 @@ class WeightedFit:
     failure: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, exact in JSON."""
+        """Return plain values, exact in JSON."""
         return asdict(self)
-
-
-RUNS = "weights-runs.json"
 
 
 class WeightsRecord:
     """Fits under a mark of all that they depend on, the optimum they began at among it.
 
-    folder : None where nothing is written. resume : go on with what it holds.
+    folder : None where nothing is written. resume : read what the folder holds.
     """
 
     def __init__(self, folder: Path | None, found: Fit, names: Sequence[str], resume: bool) -> None:
@@ -70,7 +74,7 @@ class WeightsRecord:
             self._runs = read_marked(folder / RUNS, self._mark, _by_count) or {}
 
     def read(self, count: float) -> WeightedFit | None:
-        """The fit at this weight; None where there is none, or it failed."""
+        """Return the fit at this weight; None where there is none, or it failed."""
         row = self._runs.get(count)
         return None if row is None or row["failure"] else WeightedFit(**row)
 
@@ -85,12 +89,8 @@ def _by_count(content: dict[str, Any]) -> dict[float, dict[str, Any]]:
     return {row["count"]: WeightedFit(**row).to_json() for row in content["runs"]}
 
 
-TABLE, FIGURE = "weights.csv", "weights.png"
-ERROR = "mean relative RMS error of a test"
-
-
 @dataclass(frozen=True, eq=False)
-class WeightStudy:
+class WeightStudy(Presented):
     """Fits over the weight of some of the tests.
 
     counted : the kind or name asked for, names : of the tests. found : the fit at the project's
@@ -109,15 +109,15 @@ class WeightStudy:
         return [run for run in self.runs if not run.failure]
 
     def strain(self, name: str, place: float) -> float:
-        """The strain at which a modulus is followed."""
+        """Return the strain at which a modulus is followed."""
         return float(place * self.found.best.valid[COMPONENTS[name]])
 
     def table(self) -> pd.DataFrame:
-        """A row a weight: how many times it counts, errors by test and comparison, moduli."""
+        """Return a row a weight: its factor, errors by test and comparison, moduli."""
         import pandas as pd
 
         units = {c.name: c.objective.unit for c in self.found.problem.comparisons}
-        told = []
+        table = []
         for run in self.ended:
             row: dict[str, float] = {"weight_times": run.count}
             row |= {f"relative {test}": value for test, value in run.relative.items()}
@@ -125,11 +125,11 @@ class WeightStudy:
             for name, values in run.moduli.items():
                 for place, value in zip(PLACES, values, strict=True):
                     row[f"{name}_MPa at {self.strain(name, place):.4g}"] = value
-            told.append({**row, "analyses": run.analyses})
-        return pd.DataFrame(told)
+            table.append({**row, "analyses": run.analyses})
+        return pd.DataFrame(table)
 
     def change(self, name: str) -> tuple[float, float]:
-        """Least and largest relative change of a modulus at any place, over all weights."""
+        """Return least and largest relative change of a modulus at any place, over all weights."""
         own = next(run for run in self.runs if run.count == 1)
         before = np.array(own.moduli[name])
         changes = np.array([run.moduli[name] for run in self.ended]) / before - 1.0
@@ -137,7 +137,7 @@ class WeightStudy:
         return float(low), float(high)
 
     def sigma(self, name: str) -> list[float] | None:
-        """1 sigma, relative, at the places, at the project's weights; None where not known."""
+        """Return 1 sigma, relative, at the places, at the project's weights; None if unknown."""
         sure = self.found.best.certainty
         if sure is None:
             return None
@@ -146,7 +146,7 @@ class WeightStudy:
 
     @property
     def notes(self) -> list[Note]:
-        """Fits that failed, and what a reader should know of the one at the project's weights."""
+        """Fits that failed, then the notes of the one at the project's weights."""
         failed = [
             Note(NoteKind.FAILED, run.failure, f"weight times {run.count:.3g}")
             for run in self.runs
@@ -156,7 +156,7 @@ class WeightStudy:
 
     @property
     def result(self) -> dict[str, Any]:
-        """What result.json says."""
+        """The content of result.json."""
         return {
             "command": "validate",
             "title": self.title,
@@ -181,69 +181,25 @@ class WeightStudy:
         }
 
     def lines(self) -> list[str]:
-        """A table for the terminal, and how far the weight moves each modulus."""
-        tests = list(self.ended[0].relative)
-        wide = [max(12, 2 + len(name)) for name in tests]
-        head = "".join(f"{name:>{w}}" for name, w in zip(tests, wide, strict=True))
+        """Return a table for the terminal, and how far the weight moves each modulus."""
+        tests = {name: max(12, 2 + len(name)) for name in self.ended[0].relative}
         half = [f"{name} at {self.strain(name, 0.5):.3g}" for name in COMPONENTS]
-        said = [
+        lines = [
             f"weight of {self.counted}, times what the project says; {ERROR}; moduli in MPa",
-            f"{'weight':>8}{head}" + "".join(f"{words:>16}" for words in half),
-        ]
-        middle = list(PLACES).index(0.5)
+            f"{'weight':>8}" + "".join(f"{name:>{wide}}" for name, wide in tests.items())
+            + "".join(f"{words:>16}" for words in half),
+        ]  # fmt: skip
+        middle = PLACES.index(0.5)
         for run in self.ended:
-            values = "".join(
-                f"{run.relative[name]:>{w}.4g}" for name, w in zip(tests, wide, strict=True)
-            )
+            values = "".join(f"{run.relative[name]:>{wide}.4g}" for name, wide in tests.items())
             moduli = "".join(f"{run.moduli[name][middle]:>16.4g}" for name in COMPONENTS)
-            said.append(f"{run.count:>8.3g}{values}{moduli}")
+            lines.append(f"{run.count:>8.3g}{values}{moduli}")
         for name in COMPONENTS:
             low, high = self.change(name)
             sigma = self.sigma(name)
             beside = "" if sigma is None else f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
-            said.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
-        return said
-
-    def write(self, folder: Path) -> None:
-        """weights.csv, weights.png, notes.csv and, last, result.json; raises OutputError."""
-        from ..reports.charts import Charts
-        from ..reports.html import write_report
-        from ..reports.studies import weights_charts
-        from ..reports.vega import save
-        from .folder import Store
-        from .series import study_page
-
-        with replacing(folder / TABLE) as path:
-            self.table().to_csv(path, index=False, float_format="%.9g")
-        shown = (
-            self.counted,
-            [run.count for run in self.ended],
-            {name: [run.relative[name] for run in self.ended] for name in self.ended[0].relative},
-            {
-                name: {
-                    self.strain(name, place): [run.moduli[name][k] for run in self.ended]
-                    for k, place in enumerate(PLACES)
-                }
-                for name in COMPONENTS
-            },
-            {name: self.sigma(name) for name in COMPONENTS},
-        )
-        parts = weights_charts(*shown)
-        every = [chart for part in parts for chart in part.charts]
-        save(folder / FIGURE, Charts("weights", every, "", columns=2))
-        write_notes(folder, self.notes)
-        title = f"{self.title}: the weight of {self.counted}"
-        said = (title, self.lines(), self.table(), TABLE, self.notes)
-        write_report(folder, study_page(*said, FIGURE, parts))
-        Store(folder).finish(self.result)
-
-
-STARTS = 5
-#: How many times as much the tests of the kind count, in steps of the square root of two.
-COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
-FITTED = "fit"
-#: Told the words of what is fitted, then the records of its starts; None now and then.
-Progress = Callable[[str | FitEvent | None], None]
+            lines.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
+        return lines
 
 
 def weight_study(
@@ -265,8 +221,8 @@ def weight_study(
     ----------
     counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
     starts : of the fit at the project's weights; the others begin at the optimum beside them.
-    counts : how many times their weight in the project the tests count.
-    out : folder in which every fit is written as it ends.
+    counts : factors of the weight in the project. out : folder in which every fit is written as it
+    ends.
 
     Raises
     ------
@@ -290,32 +246,21 @@ def weight_study(
         begin_study(folder, of, resume, overwrite, [FITTED], [RUNS])
     tell("the fit at the project's weights")
     found = stored_fit(
-        project,
-        [test.name for test in chosen],
-        None if folder is None else folder / FITTED,
-        resume=resume,
-        overwrite=overwrite,
-        progress=tell,
-        command_line=command_line,
-    )
+        project, [test.name for test in chosen], None if folder is None else folder / FITTED,
+        resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
+    )  # fmt: skip
     record = WeightsRecord(folder, found, names, resume)
     runs = sorted(_runs(found, names, sorted(counts), record, tell), key=lambda run: run.count)
     return WeightStudy(project.title, counted, tuple(names), found, tuple(runs))
 
 
 def _runs(
-    found: Fit,
-    names: Sequence[str],
-    counts: Sequence[float],
-    record: WeightsRecord,
-    tell: Progress,
+    found: Fit, names: Sequence[str], counts: Sequence[float], record: WeightsRecord, tell: Progress
 ) -> Iterator[WeightedFit]:
-    """At the project's weights, then upwards from there, then downwards."""
+    """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
     yield _weighted(found.setup, found, 1.0, found.problem, own.residual, own.unknowns, 0)
-    above = [c for c in counts if c > 1]
-    below = [c for c in reversed(counts) if c < 1]
-    for way in (above, below):
+    for way in ([c for c in counts if c > 1], [c for c in reversed(counts) if c < 1]):
         y = np.array(own.unknowns)
         for count in way:
             run = record.read(count)
@@ -329,7 +274,7 @@ def _runs(
 
 
 def refitted(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> WeightedFit:
-    """The fit with tests that count so many times, from the unknowns y of a neighbour."""
+    """Fit with the tests' weight times `count`, from the unknowns y of a neighbour."""
     setup = replace(found.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()
     optimum = fit_from(problem, y, setup.options, near=True)
@@ -340,14 +285,9 @@ def refitted(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> W
 
 
 def _weighted(
-    setup: FitSetup,
-    found: Fit,
-    count: float,
-    problem: FitProblem,
-    residual: np.ndarray,
-    unknowns: np.ndarray,
-    analyses: int,
-) -> WeightedFit:
+    setup: FitSetup, found: Fit, count: float, problem: FitProblem, residual: np.ndarray,
+    unknowns: np.ndarray, analyses: int,
+) -> WeightedFit:  # fmt: skip
     law = problem.unknowns.law(found.law, unknowns)
     moduli = {
         name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from bubblefit.reports.pdf import BROWSERS, browser_command
+from bubblefit.reports.html import BROWSERS, browser_command
 
 from . import needs
 

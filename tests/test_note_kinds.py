@@ -18,7 +18,7 @@ from bubblefit.cli.fits import lines_of
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.notes import FEW, Note, NoteKind, lines
 from bubblefit.project.project import read_project
-from bubblefit.reports import fit_page, law_page, vega
+from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
 from bubblefit.runs.poisson import vary_nu12
@@ -148,8 +148,8 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
 def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
-    patch.setattr(law_page, "save", lambda *_: None)
-    patch.setattr(law_page, "_side_by_side", lambda *_: [])
+    patch.setattr(study_pages, "save", lambda *_: None)
+    patch.setattr(study_pages, "_responses", lambda *_: [])
     done = fits.comparison(fit)
     page = done.report(folder)
     return Told(lines(done.notes), _json(folder), folder, page.read_text())

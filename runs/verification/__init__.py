@@ -1,7 +1,7 @@
-"""Published and closed-form numbers beside ours: is this program, as it is installed, right?
+"""Compare published and closed-form numbers with those of the program as it is installed.
 
-from bubblefit.studies.verification import numbers
-for number in numbers(): print(number.what, number.ours, number.theirs)
+from bubblefit.runs.verification import numbers
+for subject, several in numbers(): print(subject, [(n.what, n.ours, n.theirs) for n in several])
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
 def numbers(
     subjects: Iterable[str] = SUBJECTS, data: Path | None = None
 ) -> Iterator[tuple[str, list[Number]]]:
-    """The numbers of each subject as they are computed; none where its program is not installed.
+    """Yield the numbers of each subject; none where its program is not installed.
 
     Parameters
     ----------
-    data : folder of the measured strips, which are not part of the program: they come last.
+    data : folder of the measured strips, which are not part of the program; they come last.
 
     Raises
     ------

@@ -1,9 +1,14 @@
-"""Hencky's inflated circular membrane (1915): series solution, and ours at small strains.
+"""Closed forms: Hencky's membrane, thin-walled tubes and spheres, a tube with wrinkles.
 
-With S = N_r (E t p^2 R^2)^(-1/3) and r in units of R the equilibrium and compatibility of a flat,
+Hencky's inflated circular membrane (1915): with S = N_r (E t p^2 R^2)^(-1/3) and r in units
+of R the equilibrium and compatibility of a flat,
 linear elastic membrane under vertical pressure are  S'' + 3 S'/r + 1/(8 S^2) = 0, regular at
 r = 0, with u = 0 at the rim: N_theta = nu N_r, (1 - nu) S + S' = 0 at r = 1. The slope of the
 dome is -r/(2 S) (p R/(E t))^(1/3), whose integral is the height of the apex.
+
+A tube under pressure p bent beyond its first wrinkle (Comer and Levy 1963), its ends plane and
+turned against each other: no stress at angles below t from the compressed side, where cos t =
+(mean strain over strain by bending), and M/(pi p r^3) between 1/2 (first wrinkle) and 1.
 """
 
 from __future__ import annotations
@@ -40,7 +45,7 @@ ALLOWED, APEX_ALLOWED = 1e-3, 2e-3
 
 
 def stress_series(first: float) -> NDArray[np.float64]:
-    """Coefficients c_n (TERMS,) of S = sum c_n r^(2n) for S(0) = first."""
+    """Return the coefficients c_n (TERMS,) of S = sum c_n r^(2n) for S(0) = first."""
     c, square = np.zeros(TERMS), np.zeros(TERMS)
     c[0], square[0] = first, first**2
     # Powers of S^2 (S'' + 3 S'/r) = -1/8; S'' + 3 S'/r = sum 2n (2n + 2) c_n r^(2n - 2).
@@ -55,7 +60,7 @@ def stress_series(first: float) -> NDArray[np.float64]:
 
 
 def first_coefficient(nu: float) -> float:
-    """S(0): the one whose series fulfils the condition at the rim."""
+    """Return the S(0) whose series fulfils the condition at the rim."""
     powers = 2 * np.arange(TERMS)
 
     def rim(first: float) -> float:
@@ -67,7 +72,7 @@ def first_coefficient(nu: float) -> float:
 
 
 def apex_coefficient(nu: float) -> float:
-    """Apex height over R (p R/(E t))^(1/3)."""
+    """Return the apex height over R (p R/(E t))^(1/3)."""
     c, powers = stress_series(first_coefficient(nu)), 2 * np.arange(TERMS)
     r, weight = np.polynomial.legendre.leggauss(40)
     r, weight = 0.5 * (r + 1), 0.5 * weight
@@ -75,7 +80,7 @@ def apex_coefficient(nu: float) -> float:
 
 
 def hencky_membranes() -> Iterator[Number]:
-    """Stress at the centre and height of the apex of the embedded membrane's bubble."""
+    """Compare the stress at the centre and the height of the apex of the embedded membrane."""
     for nu, b_0 in FICHTER.items():
         height, stress = bubble(nu)
         yield Number(f"b_0 of Hencky's membrane, nu {nu:g}", stress, b_0, "", ALLOWED, SOURCE)
@@ -85,7 +90,7 @@ def hencky_membranes() -> Iterator[Number]:
 
 
 def bubble(nu: float) -> tuple[float, float]:
-    """Apex over R (p R/(E t))^(1/3), and b_0 from the strain at the centre, by the membrane."""
+    """Return apex over R (p R/(E t))^(1/3), and b_0 from the strain at the centre, computed."""
     pressure = (HEIGHT / apex_coefficient(nu)) ** 3 * MODULUS * THICKNESS / RADIUS
     law = HypoelasticLaw.linear(MODULUS, MODULUS, MODULUS / 2 / (1 + nu), nu)
     mesh = disk_mesh(RADIUS, QUADS, "quarter")
@@ -107,7 +112,7 @@ TUBE_MPA, SPHERE_MPA = 0.2, 0.8
 
 
 def thin_walls() -> Iterator[Number]:
-    """Radius and stresses of both, computed with the embedded membrane."""
+    """Compare radius and stresses of a tube and a sphere, by the embedded membrane."""
     strain = capped_strain(ISOTROPIC, TUBE_MPA, RADIUS_THIN_WALLS, THICKNESS_THIN_WALLS)
     radius = RADIUS_THIN_WALLS * float(np.exp(strain[1]))
     hoop = TUBE_MPA * radius / THICKNESS_THIN_WALLS
@@ -115,14 +120,8 @@ def thin_walls() -> Iterator[Number]:
     exact = (radius, hoop / 2, hoop)
     names = (("radius", "mm"), ("axial stress", "MPa"), ("hoop stress", "MPa"))
     for (name, unit), ours, theirs in zip(names, middle_of_tube(steps), exact, strict=True):
-        yield Number(
-            f"{name} of a capped tube",
-            ours,
-            theirs,
-            unit,
-            ALLOWED_THIN_WALLS,
-            "p r/t and p r/(2 t)",
-        )
+        what, source = f"{name} of a capped tube", "p r/t and p r/(2 t)"
+        yield Number(what, ours, theirs, unit, ALLOWED_THIN_WALLS, source)
     strain_of_sphere = sphere_strain(SPHERE_MPA)
     radius = RADIUS_THIN_WALLS * float(np.exp(strain_of_sphere))
     found = sphere((0.01, 0.1, 0.4, SPHERE_MPA))
@@ -135,7 +134,7 @@ def thin_walls() -> Iterator[Number]:
 def capped_strain(
     law: HypoelasticLaw, pressure: float, radius: float, thickness: float
 ) -> NDArray[np.float64]:
-    """Axial and hoop log strain of a long capped tube: D(eps) deps = d(p r/(2 t), p r/t)."""
+    """Return axial and hoop log strain of a long capped tube: D(eps) deps = d(p r/(2 t), p r/t)."""
     parts = np.array([0.5, 1.0])
 
     def rate(p: float, strain: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -150,7 +149,7 @@ def capped_strain(
 
 
 def sphere_strain(pressure: float) -> float:
-    """Log strain of a sphere: p r/(2 t) = E/(1 - nu) log(r/R), constant thickness."""
+    """Return the log strain of a sphere: p r/(2 t) = E/(1 - nu) log(r/R), constant thickness."""
 
     def excess(strain: float) -> float:
         return E / (1 - NU) * strain - pressure * RADIUS_THIN_WALLS * np.exp(strain) / (
@@ -161,7 +160,7 @@ def sphere_strain(pressure: float) -> float:
 
 
 def middle_of_tube(pressures: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
-    """Radius (mm), axial and hoop stress (MPa) in the middle of a tube with flat caps."""
+    """Compute radius (mm), axial and hoop stress (MPa) in the middle of a tube with flat caps."""
     model, solver = tube_model(24, 12, 600.0, pressures), MembraneSolver(1e-9)
     return in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
 
@@ -173,7 +172,7 @@ def tube_model(
     pressures: Sequence[float] | NDArray[np.float64],
     caps: bool = True,
 ) -> InflatedModel:
-    """Half of half a tube: x >= 0, z >= 0, its lowest node in the middle held up.
+    """Return a quarter of a tube: x >= 0, z >= 0, its lowest node in the middle held up.
 
     across, along : facets. caps : a flat one at the end, which otherwise keeps its place along z.
     """
@@ -192,7 +191,7 @@ def tube_model(
 def in_the_middle(
     model: InflatedModel, history: History, stress: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """Radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure.
+    """Return radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure.
 
     stress : (quads, points, 3) MPa, at the last pressure.
     """
@@ -206,13 +205,13 @@ def in_the_middle(
 def sphere_model(
     n: int, pressures: Sequence[float], warp: tuple[float, float, float] = (0.3, 0.2, 1.0)
 ) -> InflatedModel:
-    """An octant of 3 n^2 facets."""
+    """Return an octant of a sphere, of 3 n^2 facets."""
     mesh = sphere_octant(n, RADIUS_THIN_WALLS)
     return InflatedModel(mesh, THICKNESS_THIN_WALLS, warp, list(pressures), OCTANT, copies=8)
 
 
 def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
-    """Radius (mm), volume (mm^3) and stress (MPa) of a sphere at the last pressure."""
+    """Compute radius (mm), volume (mm^3) and stress (MPa) of a sphere at the last pressure."""
     model, solver = sphere_model(12, pressures), MembraneSolver(1e-9)
     history = solver.run(model, ISOTROPIC)
     radius = np.linalg.norm(model.mesh.points + history.displacement[-1], axis=1).mean()
@@ -221,19 +220,8 @@ def sphere(pressures: Sequence[float]) -> tuple[float, float, float]:
     return float(radius), float(volume[-1]), float(solver.stress[..., :2].mean())
 
 
-# A pressurised tube bent beyond its first wrinkle (Comer and Levy 1963).
-#
-# A tube under pressure p, its ends kept plane and turned against each other. No stress at angles
-# below t from the compressed side, where cos t = (mean strain over strain by bending), and
-# M/(pi p r^3) between 1/2 (first wrinkle) and 1.
-
-RADIUS_BENT_TUBE, LENGTH, THICKNESS_BENT_TUBE, MODULUS_BENT_TUBE, PRESSURE = (
-    100.0,
-    60.0,
-    1.0,
-    1000.0,
-    0.02,
-)
+RADIUS_BENT_TUBE, LENGTH, PRESSURE = 100.0, 60.0, 0.02
+THICKNESS_BENT_TUBE, MODULUS_BENT_TUBE = 1.0, 1000.0
 #: Curvature (1/mm) at which the first wrinkle comes, and multiples of it.
 FIRST = 0.5 * PRESSURE / (THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE)
 TIMES = (1.5, 2.5, 4.0)
@@ -242,18 +230,17 @@ SOURCE_BENT_TUBE = "Comer and Levy, AIAA Journal 1 (1963)"
 
 
 def bent_tubes() -> Iterator[Number]:
-    """Bending moments at multiples of the curvature of the first wrinkle."""
+    """Compare bending moments at multiples of the curvature of the first wrinkle."""
     tube = PlaneEnds(FACETS, SHARE)
     for times in TIMES:
         _, moment, radius = tube.moment(times * FIRST)
         what = f"M/(pi p r^3) at {times:g} times the first wrinkle's curvature"
-        yield Number(
-            what, moment, published_moment(times * FIRST, radius)[1], "", 2e-3, SOURCE_BENT_TUBE
-        )
+        theirs = published_moment(times * FIRST, radius)[1]
+        yield Number(what, moment, theirs, "", 2e-3, SOURCE_BENT_TUBE)
 
 
 def published_moment(curvature: float, radius: float) -> tuple[float, float]:
-    """Share of the circumference that wrinkles, and M/(pi p r^3), at a curvature in 1/mm."""
+    """Return the wrinkled share of the circumference, and M/(pi p r^3), at a curvature in 1/mm."""
 
     def excess_force(t: float) -> float:
         by_bending = 2.0 * radius**2 * THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE * curvature
@@ -265,7 +252,7 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
 
 
 class PlaneEnds:
-    """Half of half a tube whose end at `LENGTH` stays plane, at a given turn and stretch.
+    """A quarter of a tube whose end at `LENGTH` stays plane, at a given turn and stretch.
 
     Parameters
     ----------
@@ -300,7 +287,7 @@ class PlaneEnds:
         self.displacement = _found(self.membrane.equilibrium_from_slack(start, PRESSURE))
 
     def moment(self, curvature: float) -> tuple[float, float, float]:
-        """Share of the wall that wrinkles, M/(pi p r^3), r; the end carries what p pushes on it."""
+        """Return the wrinkled share of the wall, M/(pi p r^3) and r; p pushes on the end."""
 
         def excess_force(stretch: float) -> float:
             start = self.displacement.copy()
@@ -318,11 +305,11 @@ class PlaneEnds:
         return wrinkled, moment, radius
 
     def pull(self) -> NDArray[np.float64]:
-        """(nodes of the end,) N along the tube, of the whole circumference."""
+        """Return the forces (nodes of the end,) N along the tube, of the whole circumference."""
         return np.asarray(2.0 * self.membrane.residual.reshape(-1, 3)[self.end, 2])
 
     def radius(self) -> float:
-        """Mean radius of the end, mm."""
+        """Return the mean radius of the end, mm."""
         return float(np.hypot(*(self.points + self.displacement)[self.end, :2].T).mean())
 
 

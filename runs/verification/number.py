@@ -1,4 +1,4 @@
-"""One number of somebody else's beside ours."""
+"""A published number beside ours."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Number:
     ----------
     what : the quantity and the case.
     ours, theirs : in `unit` ("" for a pure number).
-    allowed : largest deviation: relative, or in `unit` where `absolute`. It is what the model, the
-        mesh or the reading of a figure can be off by, not what happens to be met.
-    source : who published it, or which closed form it is.
+    allowed : largest deviation: relative, or in `unit` where `absolute`. It follows from the error
+        of the model, the mesh or the reading of a figure.
+    source : publication or closed form.
     """
 
     what: str
@@ -29,26 +29,20 @@ class Number:
 
     @property
     def deviation(self) -> float:
-        """Ours less theirs: relative to theirs, or in `unit` where `absolute`."""
+        """Ours less theirs, relative to theirs, or in `unit` where `absolute`."""
         off = self.ours - self.theirs
         return off if self.absolute else off / abs(self.theirs)
 
     @property
     def met(self) -> bool:
-        """Whether the deviation is allowed; one that is no number is not."""
+        """True where the deviation is allowed; NaN is not."""
         return abs(self.deviation) <= self.allowed
 
     @property
     def row(self) -> dict[str, Any]:
-        """For tables and JSON."""
+        """The number in tables and JSON."""
         return {
-            "what": self.what,
-            "ours": self.ours,
-            "theirs": self.theirs,
-            "unit": self.unit,
-            "deviation": self.deviation,
-            "allowed": self.allowed,
-            "absolute": self.absolute,
-            "met": self.met,
-            "source": self.source,
-        }
+            "what": self.what, "ours": self.ours, "theirs": self.theirs, "unit": self.unit,
+            "deviation": self.deviation, "allowed": self.allowed, "absolute": self.absolute,
+            "met": self.met, "source": self.source,
+        }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Marc's end stresses of uniaxial models: the law itself."""
+"""Published results of Marc, Abaqus and the thesis: bars, bubbles, strips, Poisson's ratio."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ SOURCE = "MSC Marc; Jekel et al., Composite Structures 161 (2017)"
 
 
 def marc_bars(solver: Solver | None = None) -> Iterator[Number]:
-    """The four published bars on a solver, the embedded membrane unless given."""
+    """Compare the four published bars on a solver, the embedded membrane unless given."""
     return end_stresses(strip_stresses(solver or MembraneSolver()))
 
 
 def end_stresses(stresses: Sequence[float], program: str = "") -> Iterator[Number]:
-    """Those of the bars (MPa), in their order, beside Marc's; `program` begins what each is."""
+    """Compare end stresses (MPa) of the bars, in order, with Marc's; `program` begins each name."""
     for bar, stress in zip(BARS, stresses, strict=True):
         what = f"{program}end stress, {bar.model} {bar.direction} bar"
         yield Number(what, stress, bar.stress, "MPa", TOLERANCE, SOURCE)
@@ -47,7 +47,7 @@ ELEMENTS = 1600
 
 
 def abaqus_bubbles() -> Iterator[Number]:
-    """Apex at about 100 kPa and at the highest pressure, and the largest in-plane displacements."""
+    """Compare the apex at about 100 kPa and at the highest pressure, and in-plane displacements."""
     for (test, model), rows in cases():
         found = shapes(rows, ELEMENTS, MembraneSolver())
         low, high = int((rows["p_bar"] - LOW_BAR).abs().to_numpy().argmin()), len(rows) - 1
@@ -62,7 +62,7 @@ def abaqus_bubbles() -> Iterator[Number]:
 
 
 def cases() -> Iterator[tuple[tuple[int, str], pd.DataFrame]]:
-    """Test and model, with the rows of the published table."""
+    """Yield test and model with the rows of the published table."""
     table = pd.read_csv(TABLE, comment="#")
     for test, model in table[["test", "model"]].drop_duplicates().itertuples(index=False):
         rows = table[(table["test"] == test) & (table["model"] == model)]
@@ -70,7 +70,7 @@ def cases() -> Iterator[tuple[tuple[int, str], pd.DataFrame]]:
 
 
 def shapes(rows: pd.DataFrame, elements: int, solver: Solver) -> pd.DataFrame:
-    """apex, du_x and du_y (mm, the largest in-plane displacements) at the pressures of `rows`."""
+    """Return apex and the largest in-plane displacements du_x, du_y (mm) at the rows' pressures."""
     warp, fill, shear = 1e3 * rows[["E1", "E2", "G12"]].iloc[0].to_numpy(float)
     law = HypoelasticLaw.linear(warp, fill, shear, 0.24, "incompressible")
     pressures = (0.1 * rows["p_bar"]).tolist()
@@ -102,18 +102,18 @@ ELEMENTS_MARC_BUBBLE = 800
 
 
 def known_law(nu12: float = 0.24) -> HypoelasticLaw:
-    """The law of Table 4.2."""
+    """Return the law of Table 4.2."""
     return HypoelasticLaw(1e3 * np.array(SOLUTION), nu12, np.array(STRAIN_RANGE))
 
 
 def known_bubble() -> BubbleModel:
-    """The thesis' bubble: radius 100 mm, thickness 0.81 mm, seven pressures; a quarter of it."""
+    """Return a quarter of the thesis' bubble: radius 100 mm, thickness 0.81 mm, seven pressures."""
     mesh = disk_mesh(100.0, ELEMENTS_MARC_BUBBLE, "quarter")
     return BubbleModel(mesh, 0.81, PRESSURES, default_increments(PRESSURES))
 
 
 def marc_bubble() -> Iterator[Number]:
-    """Height of the apex at the seven pressures."""
+    """Compare the height of the apex at the seven pressures."""
     table = pd.read_csv(TABLE_MARC_BUBBLE, comment="#")
     model = known_bubble()
     history = MembraneSolver().run(model, known_law())
@@ -133,7 +133,7 @@ SOURCE_POISSON = "thesis Fig. 4.2"
 
 
 def poisson_ratios() -> Iterator[Number]:
-    """Largest displacement relative to the mean of the five."""
+    """Compare the largest displacements, relative to the mean of the five."""
     model, largest = known_bubble(), []
     for nu12 in FIGURE:
         history = MembraneSolver().run(model, known_law(nu12))
@@ -159,7 +159,7 @@ FILE = "valmex7318_load_gauge.csv"
 
 
 def strips() -> Iterator[Number]:
-    """Strain of the gauge on the computed strips, and end loads beside the modulus' integral."""
+    """Compare strains of the gauge, and end loads with the integral of the modulus."""
     for direction, (first, last, strain, _) in TABLE_3_1.items():
         model = strip(direction)
         history = MembraneSolver(1e-10).run(model, known_law())
@@ -174,11 +174,9 @@ def strips() -> Iterator[Number]:
 
 
 def measured_strips(folder: Path) -> Iterator[Number]:
-    """R^2 of the fourth-order polynomials through the measured points in `folder`.
+    """Compare R^2 of the fourth-order polynomials through the measured points in `folder`.
 
-    Raises
-    ------
-    InputError : the file is not there, or cannot be read.
+    Raises InputError: the file is missing, or cannot be read.
     """
     for curve in read_load_curves(folder / FILE):
         ours = fit_load_polynomial(curve.elongation, curve.load).r_squared
@@ -188,7 +186,7 @@ def measured_strips(folder: Path) -> Iterator[Number]:
 
 
 def strip(direction: str) -> UniaxialModel:
-    """A strip of Table 3.1, 25 mm wide."""
+    """Return a strip of Table 3.1, 25 mm wide."""
     first, last, *_ = TABLE_3_1[direction]
     if direction == "bias":
         return bias_strip(first, last, THICKNESS)
@@ -196,7 +194,7 @@ def strip(direction: str) -> UniaxialModel:
 
 
 def end_load(direction: str, strain: float) -> float:
-    """Load (N) of a homogeneous strip of Table 4.2's law at a log strain.
+    """Return the load (N) of a homogeneous strip of Table 4.2's law at a log strain.
 
     Across, d eps1 = -nu21 d eps2 with nu21 = nu12 E2/E1, and d eps2 = -nu12 d eps1. In the fill
     test E1 is held at its value at zero strain, because the warp gets shorter. A modulus is held
@@ -218,7 +216,7 @@ CASE, ELEMENTS_CALCULIX, ALLOWED_CALCULIX = (2, "e"), 432, 3e-3
 
 
 def with_calculix() -> Iterator[Number]:
-    """Bars beside Marc's, a bubble beside Abaqus'; nothing where no ccx is usable."""
+    """Compare CalculiX' bars with Marc's, a bubble with Abaqus'; nothing without a usable ccx."""
     usable = next((one for one in diagnose() if one.usable), None)
     if usable is None or usable.stresses is None or usable.path is None:
         return

@@ -17,7 +17,7 @@ from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.reports import prediction_page
+from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import registry
 
@@ -53,7 +53,7 @@ def formula(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFa
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without figures and page, which take the longest and are looked at elsewhere."""
     monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
-    monkeypatch.setattr(prediction_page, "write_report", lambda folder, page: folder)
+    monkeypatch.setattr(run_pages, "write_report", lambda folder, page: folder)
 
 
 def bend(*arguments, cwd: Path, code: int = 0, command=("bend",)):
@@ -240,7 +240,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path, monkeypatc
     table = pd.read_csv(tmp_path / "failed" / "runs.csv")
     assert table["ended"].tolist() == ["failed: made to fail", "finished"] * 2
 
-    # tests/fits/test_predictions.py draws those that stop.
+    # tests/runs/test_predictions.py draws those that stop.
     monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]

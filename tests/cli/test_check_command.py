@@ -14,7 +14,7 @@ from bubblefit.experiments.bubble import doubts as size
 from bubblefit.experiments.kinds import ROUGH
 from bubblefit.experiments.registry import kinds
 from bubblefit.experiments.strips import doubts
-from bubblefit.runs.check import check, expected_of
+from bubblefit.runs.fit import check, expected_of
 from bubblefit.runs.setup import prepare_fit
 
 from ..camera import camera_project

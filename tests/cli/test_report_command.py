@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.reports import pdf
+from bubblefit.reports import html as pdf
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
-from bubblefit.reports.unfinished import UNFINISHED, page_of_folder
+from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
 from click.testing import CliRunner, Result
 
 from ..reports.test_html import drawn, full_report

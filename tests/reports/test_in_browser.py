@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 from bubblefit.reports.content import Report, Section
-from bubblefit.reports.html import write_report
-from bubblefit.reports.pdf import print_page
+from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.studies import plan_charts
 
 from .. import needs

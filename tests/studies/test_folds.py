@@ -308,11 +308,11 @@ def test_a_direction_is_foretold_by_the_other_test(tmp_path):
     project = read_project(constant_strips(tmp_path))
     found = validation.validate(project, leave="directions", starts=1, out=tmp_path / "out")
     warp, fill = found.judged
-    assert (warp.foretold.test, fill.foretold.test) == ("one: warp", "one: fill")
+    assert (warp.predicted.test, fill.predicted.test) == ("one: warp", "one: fill")
     loads = np.concatenate([20 * e * STRAIN for e in (300, 360)])
     rms = float(np.sqrt(np.mean((20 * 370 * np.tile(STRAIN, 2) - loads) ** 2)))
-    assert warp.foretold.rms == {"one: warp": pytest.approx(rms, rel=1e-3)}
-    assert warp.foretold.error == pytest.approx(rms / loads.max(), rel=1e-3)
+    assert warp.predicted.rms == {"one: warp": pytest.approx(rms, rel=1e-3)}
+    assert warp.predicted.error == pytest.approx(rms / loads.max(), rel=1e-3)
 
     record = tmp_path / "out" / "constant-without-directions.json"
     content = json.loads(record.read_text())
@@ -321,12 +321,12 @@ def test_a_direction_is_foretold_by_the_other_test(tmp_path):
     again = validation.validate(
         project, leave="directions", starts=1, out=tmp_path / "out", resume=True
     )
-    assert [one.foretold.error for one in again.judged] == [0.5, fill.foretold.error]
+    assert [one.predicted.error for one in again.judged] == [0.5, fill.predicted.error]
     record.write_text(json.dumps({**content, "of": "another fit"}))
     again = validation.validate(
         project, leave="directions", starts=1, out=tmp_path / "out", resume=True
     )
-    assert again.judged[0].foretold.error == pytest.approx(rms / loads.max(), rel=1e-3)
+    assert again.judged[0].predicted.error == pytest.approx(rms / loads.max(), rel=1e-3)
 
 
 @pytest.fixture(scope="module")

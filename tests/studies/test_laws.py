@@ -15,11 +15,10 @@ import pytest
 from bubblefit.errors import OutputError
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.notes import Note, NoteKind, rows
-from bubblefit.reports import law_page
-from bubblefit.reports import law_page as law_words
+from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Report
-from bubblefit.reports.law_page import conclusion, lines_of, table_of
+from bubblefit.runs import compare
 from bubblefit.runs.compare import (
     LOST,
     FoldError,
@@ -44,10 +43,10 @@ class Run:
         self.events: list[Any] = []
         self.pages: list[Report] = []
         self.drawn: list[tuple[Any, ...]] = []
-        patch.setattr(law_page, "save", lambda *args: self.drawn.append(args))
-        patch.setattr(law_page, "_side_by_side", lambda *_: [("loads.png", "loads")])
+        patch.setattr(study_pages, "save", lambda *args: self.drawn.append(args))
+        patch.setattr(study_pages, "_responses", lambda *_: [("loads.png", "loads")])
         patch.setattr(bf.Fit, "report", lambda *_: None)
-        patch.setattr(law_page, "write_report", self.page)
+        patch.setattr(study_pages, "write_report", self.page)
 
     def page(self, folder: Path, report: Report) -> Path:
         self.pages.append(report)
@@ -118,7 +117,7 @@ def test_every_number(compared):
 
 
 def test_table_and_page(compared, run):
-    compared.report(run.out)
+    compared.write(run.out)
     result = json.loads((run.out / "result.json").read_text())
     assert result == compared.result
     found, ((path, charts),) = run.pages[-1], run.drawn
@@ -200,25 +199,14 @@ def test_what_is_replaced_is_not_gone_on_with(run, compared):
     assert [form.fit.project.fit.seed for form in again.forms] == [8, 8]
 
 
-RESULT = {
-    "objective_is": "sum of RMS errors, N", "noise": 81.234,
-    "forms": [
-        {"form": "constant", "coefficients": 3, "fitted": 150.04, "cross_validated": 161.27},
-        {"form": "cubic", "coefficients": 12, "fitted": 60.5, "cross_validated": None},
-    ],
-    "least_cross_validated": "constant", "simplest_as_good": "constant",
-}  # fmt: skip
-
-
+@pytest.mark.usefixtures("no_noise")
 def test_lines_for_the_terminal():
-    lines = lines_of(RESULT)
-    for line, words in zip(lines[2:5], ("161.3", "failed", "81.23"), strict=True):
+    forms = form("constant", 3, 161.27), form("cubic", 12, None)
+    lines = LawComparison(forms, 2).lines()
+    for line, words in zip(lines[2:5], ("161.3", "failed", "0.75"), strict=True):
         assert words in line
     assert len(lines) == 6 and "constant" in lines[5]
-
-
-def test_without_a_fold_that_ended_there_is_no_conclusion():
-    assert conclusion({**RESULT, "simplest_as_good": None}) == []
+    assert LawComparison(forms[1:], 2).conclusion == []
 
 
 def test_folds_of_another_fit_are_not_taken(tmp_path):
@@ -266,7 +254,7 @@ def form(name: str, coefficients: int, *folds: float | None) -> Form:
 @pytest.fixture
 def no_noise(monkeypatch):
     every = {"warp": 0.5, "fill": 0.25, "b": 7.0}
-    monkeypatch.setattr(law_words, "noise_of", lambda problem: every)
+    monkeypatch.setattr(compare, "noise_of", lambda problem: every)
 
 
 @pytest.mark.usefixtures("no_noise")
@@ -285,7 +273,7 @@ def test_the_simplest_form_that_is_as_good():
     assert first["cross_validated_by_part"] == {"warp": 50.0, "fill": 25.0}
     assert last["cross_validated"] is None and last["folds"] == [1.0, None]
     assert last["cross_validated_by_part"] == {"warp": None, "fill": None}
-    table = table_of(LawComparison(tuple(forms), 2))
+    table = LawComparison(tuple(forms), 2).table()
     assert table["cross_validated"].tolist()[:3] == pytest.approx([100.0, 104.9, 105.1])
     assert math.isnan(table["cross_validated"][3]) and np.isnan(table["left out warp, N"][3])
     assert table["left out fill, N"].tolist()[:2] == pytest.approx([25.0, 26.225])

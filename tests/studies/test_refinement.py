@@ -16,6 +16,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
 from bubblefit.notes import Note, NoteKind
+from bubblefit.reports.study_pages import panels
 from bubblefit.runs.refinement import (
     RMS,
     Convergence,
@@ -275,8 +276,6 @@ def test_table():
 
 
 def test_panels():
-    from bubblefit.runs.refinement import panels
-
     (panel,) = panels(study(RUNS))
     assert (panel.name, panel.sizes) == ("bar", [8.0, 4.0, 2.0])
     assert (panel.work, panel.seconds) == ([250, 1000, 4000], [0.25, 1.0, 4.0])

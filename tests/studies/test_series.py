@@ -9,7 +9,7 @@ import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import pandas as pd
 import pytest
@@ -18,6 +18,8 @@ from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import Note, NoteKind
+from bubblefit.reports import study_pages
+from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import read_page_data
 from bubblefit.runs import simulation as analyses
 from bubblefit.runs.folder import FOLDER
@@ -29,7 +31,6 @@ from bubblefit.runs.series import (
     parts_of,
     studied_tests,
     thickness_notes,
-    write_study,
 )
 
 from ..bars import BarKind, BarTest, project_of
@@ -107,13 +108,27 @@ def test_analyses_are_told_one_after_the_other(bars):
     assert [note.kind for note in series.notes(history)] == [NoteKind.BEYOND_CARD]
 
 
-def test_what_a_study_writes(tmp_path):
-    table, drawn = pd.DataFrame({"a": [1, 2], "b": ["x", "y"]}), []
-    out, notes = tmp_path / "new", [Note(NoteKind.SNAP, "snaps", "one")]
-    write_study(out, "mesh", table, drawn.append, {"a": [1]}, notes, "Finer", ["it settles"])
+class Made:
+    """The result of a study."""
+
+    notes = (Note(NoteKind.SNAP, "snaps", "one"),)
+    result: ClassVar = {"a": [1]}
+
+    def table(self) -> pd.DataFrame:
+        return pd.DataFrame({"a": [1, 2], "b": ["x", "y"]})
+
+    def lines(self) -> list[str]:
+        return ["it settles"]
+
+
+def test_what_a_study_writes(tmp_path, monkeypatch):
+    drawn: list[Path] = []
+    monkeypatch.setattr(study_pages, "save", lambda path, _: drawn.append(path))
+    out, study = tmp_path / "new", Made()
+    study_pages.write_plain(out, study, "Finer", "mesh", [], Charts("x", [], ""))
     page = read_page_data(out)
-    assert page.title == "Finer" and page.warnings == [note.line for note in notes]
-    assert page.tables[0].header == list(table.columns)
+    assert page.title == "Finer" and page.warnings == [note.line for note in study.notes]
+    assert page.tables[0].header == ["a", "b"]
     assert (page.sections[0].parts[0].text, page.figures[0][0]) == ("it settles", "mesh.png")
     assert "it settles" in (out / "report.html").read_text()
     assert (out / "mesh.csv").read_bytes() == b"a,b\n1,x\n2,y\n" and drawn == [out / "mesh.png"]
@@ -138,8 +153,7 @@ def folder(tmp_path, monkeypatch):
     for name, modulus in (("card", 800.0), ("other", 700.0)):
         law = HypoelasticLaw.linear(modulus, 400.0, 80.0)
         write_card(MaterialCard(law, 0.81, name), tmp_path / f"{name}.toml")
-    for figure in ("plot_convergence", "plot_nu12"):
-        monkeypatch.setattr(f"bubblefit.reports.{figure}", lambda path, *_: path.touch())
+    monkeypatch.setattr(study_pages, "save", lambda path, charts: path.touch())
     return tmp_path
 
 

@@ -34,7 +34,7 @@ from bubblefit.runs.verification.published import marc_bars
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import bubblefit, in_process
+from ..commands import in_process
 from ..page_charts import charts_of
 from ..places import KNOWN
 from ..projects import ELONGATION, MODULI, changed, constant_strips
@@ -58,14 +58,14 @@ def test_what_a_fit_to_the_other_test_foretells(tmp_path):
         progress=lambda event: told.append(event) if isinstance(event, str) else None,
     )  # fmt: skip
     assert told == ["constant: all tests", "constant: without one", "constant: without two"]
-    assert [one.foretold.test for one in found.judged] == ["one", "two"]
+    assert [one.predicted.test for one in found.judged] == ["one", "two"]
     two = found.judged[1]
     rms, relative = warp_of_two(330.0)
-    assert two.foretold.rms == {"two: warp": pytest.approx(rms, rel=1e-4)}
-    assert two.foretold.error == pytest.approx(relative, rel=1e-4)
-    assert two.foretold.units == {"two: warp": "N"}
+    assert two.predicted.rms == {"two: warp": pytest.approx(rms, rel=1e-4)}
+    assert two.predicted.error == pytest.approx(relative, rel=1e-4)
+    assert two.predicted.units == {"two: warp": "N"}
     # Given the test itself, it is nearer to it: both tests' warp strips pull at E1.
-    assert two.fitted is not None and two.fitted.error < two.foretold.error
+    assert two.fitted is not None and two.fitted.error < two.predicted.error
     found.write(tmp_path / "out")
     table = pd.read_csv(tmp_path / "out" / "validation.csv")
     pd.testing.assert_frame_equal(table, found.table(), rtol=1e-8)
@@ -74,15 +74,15 @@ def test_what_a_fit_to_the_other_test_foretells(tmp_path):
     assert row["fitted_rms"] == pytest.approx(two.fitted.rms["two: warp"])
     said = json.loads((tmp_path / "out" / "result.json").read_text())
     assert said["mean_foretold"]["constant"] == pytest.approx(
-        (found.judged[0].foretold.error + relative) / 2, rel=1e-4
+        (found.judged[0].predicted.error + relative) / 2, rel=1e-4
     )
     folders = {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()}
     assert folders == {"constant-all", "constant-without-1", "constant-without-2"}
     assert all((tmp_path / "out" / name / "report.html").exists() for name in folders)
     # In the test's own words, too, as after a fit.
-    own = two.foretold.rms["two: warp"]
+    own = two.predicted.rms["two: warp"]
     assert f"constant, two: RMS errors in N: warp {own:.4g}" in found.lines()
-    assert two.foretold.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
+    assert two.predicted.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
     assert found.lines()[-1] == (
         f"constant: foretold {100 * said['mean_foretold']['constant']:.3g} % on average"
     )
@@ -94,7 +94,7 @@ def test_a_card_is_judged_without_a_fit(tmp_path):
     law = replace(law, strain_range=np.array([0.1, 0.14, 0.1]))
     write_card(MaterialCard(law, 0.8, "made"), tmp_path / "card.toml")
     command = ("validate", "project.toml", "--card", "card.toml", "--out", "judged")
-    done = bubblefit(*command, cwd=tmp_path)
+    done = in_process(*command, cwd=tmp_path)
     table = pd.read_csv(tmp_path / "judged" / "validation.csv")
     rms, relative = warp_of_two(350.0)
     row = table[table["test"] == "two"].iloc[0]
@@ -103,11 +103,12 @@ def test_a_card_is_judged_without_a_fit(tmp_path):
     )
     assert np.isnan(row["fitted_rms"])
     assert (
-        "made, two: warp strain 0.118 is beyond 0.100, up to which the law is known" in done.stdout
+        "made, two: warp strain 0.118 is beyond 0.100, up to which the law is known" in done.output
     )
-    assert f"{rms:12.4g}" in done.stdout and path.exists()
-    again = bubblefit(*command, cwd=tmp_path, code=2)
-    assert "judged" in again.stderr and "--overwrite" in again.stderr
+    assert f"{rms:12.4g}" in done.output and path.exists()
+    again = in_process(*command, cwd=tmp_path, code=2)
+    said = again.output + again.stderr
+    assert "judged" in said and "--overwrite" in said
 
 
 def test_a_card_of_another_thickness_is_refused(tmp_path):

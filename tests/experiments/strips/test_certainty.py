@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.strips.data import Strip
 from bubblefit.experiments.strips.prepared import PLACES, SPECIMENS, independent_loads, loads_alike
-from bubblefit.inference.assessment import certainty
+from bubblefit.inference.assessment import certainty, uncertainty_from
 from bubblefit.inference.descent import descend
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.forms.base import COMPONENTS

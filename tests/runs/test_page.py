@@ -17,7 +17,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
-from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.cylinder import report as cylinders
+from bubblefit.experiments.strips import report as strips_report
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.unknowns import LawBounds
 from bubblefit.materials.card import MaterialCard
@@ -27,7 +28,7 @@ from bubblefit.notes import Note, NoteKind, foremost, marks, rows
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import SHIPPED, _plain, _used, schema_text
 from bubblefit.reports import fit_page as page
-from bubblefit.reports import prediction_page
+from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Report, Table, Words
 from bubblefit.reports.fit_page import (
@@ -38,8 +39,8 @@ from bubblefit.reports.fit_page import (
     two_digits,
 )
 from bubblefit.reports.html import number, percent
-from bubblefit.runs.check import expected_of
 from bubblefit.runs.executor import cores
+from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import write_table
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
 from bubblefit.runs.record import versions
@@ -59,12 +60,17 @@ class Told:
     """What is drawn and written, without drawing it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.calls: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
-        for name in ("plot_optima", "plot_moduli", "plot_pinned"):
-            monkeypatch.setattr(page, name, self.keep(name))
+        self.calls: dict[str, tuple[Any, ...]] = {}
+        monkeypatch.setattr(page, "save", lambda path, charts: None)
+        for name in ("optima_chart", "moduli_charts", "pinned_charts"):
+            monkeypatch.setattr(page, name, self.keep(name, getattr(page, name)))
 
-    def keep(self, name: str) -> Any:
-        return lambda path, *args, **named: self.calls.update({name: (args, named)})
+    def keep(self, name: str, declare: Any) -> Any:
+        def kept(*args: Any) -> Any:
+            self.calls[name] = args
+            return declare(*args)
+
+        return kept
 
 
 @pytest.fixture
@@ -118,8 +124,8 @@ def written(together, tmp_path_factory):
 
 @pytest.fixture
 def nothing_shown(together, monkeypatch):
-    """No picture of a test, which takes longest."""
-    monkeypatch.setattr(type(together.setup.tests[0]), "show", lambda *_: Exhibit())
+    """Let the tests draw nothing, which takes longest."""
+    monkeypatch.setattr(strips_report, "show", lambda *_: Exhibit())
 
 
 def points(test: str, direction: str) -> tuple[np.ndarray, np.ndarray]:
@@ -268,11 +274,11 @@ def test_what_is_determined_in_closed_form(together, written):
         ["all together", "E1", percent(e1), percent(e1)], ["all together", "E2", e2, e2],
         ["all together", "G12", *unknown],
     ]  # fmt: skip
-    (strains, curves, known), drawn = told.calls["plot_moduli"]
+    strains, curves, known, band, _ = told.calls["moduli_charts"]
     assert known is None and len(curves) == 2
     assert strains == pytest.approx(np.linspace(0, fit.best.valid, len(strains[0])).T)
     assert curves[0][0] == pytest.approx(np.full(121, fit.law.beta[11]))
-    lower, upper = drawn["band"]
+    lower, upper = band
     for k, (place, sigma) in enumerate(((11, e1), (7, pinned["one"]["E2"]["median"]))):
         half = 1.96 * sigma * fit.law.beta[place]
         assert fit.law.beta[place] - lower[k] == pytest.approx(np.full(121, half), rel=0.15)
@@ -280,7 +286,7 @@ def test_what_is_determined_in_closed_form(together, written):
     # Of shear nothing is known: 95 % of what lies between its bounds is its band.
     assert lower[2] == pytest.approx(np.full(121, 5.0 + 0.025 * 195.0), rel=0.25)
     assert upper[2] == pytest.approx(np.full(121, 200.0 - 0.025 * 195.0), rel=0.03)
-    (strains, sigma), _ = told.calls["plot_pinned"]
+    strains, sigma, _ = told.calls["pinned_charts"]
     assert strains[:, -1] == pytest.approx(fit.best.valid) and strains[:, 0].tolist() == [0, 0, 0]
     assert list(sigma) == ["one", "two", "all together"]
     assert sigma["two"][0] == pytest.approx(np.full(61, 100 * pinned["two"]["E1"]["median"]))
@@ -316,13 +322,13 @@ def test_starts_that_failed_other_programs_and_no_certainty(together, told, tmp_
     pairs = dict(facts(found))
     assert pairs["starts"] == "1 feasible of 2" and pairs["of them by membrane"] == 4
     assert pairs["of them from the cache"] == 3
-    (values,), _ = told.calls["plot_optima"]
+    values, _ = told.calls["optima_chart"]
     assert values == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
     answer = titled(found, "Moduli")
     assert answer.rows[0][2] == f"{fit.law.beta[11]:.3g}" and "brackets" not in answer.note
-    assert told.calls["plot_moduli"][1] == {"band": None}
-    assert "plot_pinned" not in told.calls and "uncertainty" not in fit.result
+    assert told.calls["moduli_charts"][3] is None
+    assert "pinned_charts" not in told.calls and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
     assert fit.coefficients()["sigma"].isna().all()
     assert fit.moduli().index.tolist() == list(range(3 * 61))
@@ -343,11 +349,12 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
 def test_a_known_solution_with_the_band_of_noise(together, told, tmp_path, monkeypatch):
     monkeypatch.setattr(type(together.setup.tests[0]), "known", together.law)
     found = reported(together, tmp_path, monkeypatch)
-    (_, curves, known), drawn = told.calls["plot_moduli"]
+    _, curves, known, band, _ = told.calls["moduli_charts"]
     np.testing.assert_array_equal(known, curves[0])
-    assert drawn == {"band": None}
+    assert band is not None
     (charts,) = (part for part in found.parts if getattr(part, "name", "") == "moduli")
-    for name, chart in zip(("E1", "E2", "G12"), charts.charts, strict=True):
+    assert len(charts.charts) == 6  # the moduli, and their deviations from the known ones
+    for name, chart in zip(("E1", "E2", "G12"), charts.charts, strict=False):
         best = chart.series[0]
         ends = together.best.certainty.band[name]
         assert (best.lower[0], best.upper[0]) == pytest.approx(ends[:, 0], rel=1e-5)
@@ -361,10 +368,10 @@ def test_the_band_is_about_the_best_fit(together, told, tmp_path):
     best = replace(together.best, ranked=[one, replace(two, unknowns=unknowns)])
     fit = replace(together, best=best)
     page._moduli(fit, tmp_path)
-    (_, curves, _), drawn = told.calls["plot_moduli"]
+    _, curves, _, band, _ = told.calls["moduli_charts"]
     assert curves[1][0] == pytest.approx(1.5 * curves[0][0])
     own = fit.best.certainty.band["E1"]
-    assert drawn["band"][:, 0] == pytest.approx(np.tile(own[:, :1], 121))
+    assert band[:, 0] == pytest.approx(np.tile(own[:, :1], 121))
     # Of many, those of the five best.
     many = replace(fit, best=replace(best, ranked=[one, *[two] * 7]))
     assert len(many.laws) == 5
@@ -498,8 +505,8 @@ def test_an_end_that_is_asked_for_is_run_alone(tmp_path):
 
 def test_the_page_says_which_wall_a_note_is_of(tmp_path, monkeypatch):
     pages: list[Report] = []
-    monkeypatch.setattr(CylinderOutcome, "show", lambda *_: Exhibit())
-    monkeypatch.setattr(prediction_page, "write_report", lambda folder, page: pages.append(page))
+    monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
+    monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
     banded(tmp_path, FAILS, out=tmp_path / "out").report(tmp_path / "out")
     (page,) = pages
     (notes,) = [table for table in page.tables if table.title == "Notes"]

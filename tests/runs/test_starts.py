@@ -368,7 +368,7 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
     for fails, tried in ((0, [3]), (4, [3, 5]), (99, [3, 5, 8])):
         begun.clear()
         told: list[Any] = []
-        last = stages._going_on(fitted.setup, [group])(0, told.append)
+        last = stages._continuation(fitted.setup, [group])(0, told.append)
         assert begun == [(n, n) for n in tried]
         full = {r.number: r for r in (*told, last)}
         assert sorted(full) == tried

@@ -16,18 +16,16 @@ import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.cylinder.predicted import CylinderOutcome
 from bubblefit.experiments.kinds import Output, PredictedRun, RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import FEW, Note, NoteKind, rows
 from bubblefit.project import project as project_module
 from bubblefit.project.project import Project, chosen_cards, read_project
-from bubblefit.reports import prediction_page
+from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit, Report, Words
 from bubblefit.reports.html import percent
 from bubblefit.runs import executor
-from bubblefit.runs import predictions as prediction_result
 from bubblefit.runs import predictions as predictions_module
 from bubblefit.runs.predictions import Predictions, RunEvent, measured_tests, predict
 from bubblefit.runs.record import versions
@@ -218,7 +216,7 @@ def test_a_card_runs_with_its_own_thickness(project):
 
 
 def test_notes_stand_wherever_a_run_does(project, tmp_path, monkeypatch):
-    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+    monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     short = replace(law, strain_range=np.array([0.3, 0.01, 0.3]))
     done = predict(project, cards={"short": MaterialCard(short, 0.9)}, jobs=1)
@@ -286,7 +284,7 @@ def seen(monkeypatch, no_pictures):
         reports.append(report)
         return folder / "report.html"
 
-    monkeypatch.setattr(prediction_page, "write_report", keep)
+    monkeypatch.setattr(run_pages, "write_report", keep)
     return reports
 
 
@@ -419,11 +417,6 @@ class StrutOutcome:
     def lines(self) -> Sequence[str]:
         return [f"struts: {self.forces}"]
 
-    def show(self, out: Output) -> Exhibit:
-        out.path("struts.txt").parent.mkdir(parents=True, exist_ok=True)
-        out.path("struts.txt").write_text("struts")
-        return Exhibit([("struts", len(self.forces))], files=[(out.name("struts.txt"), "struts")])
-
 
 class StrutKind:
     name, title, fitted, studied = "strut", "a strut", False, None
@@ -432,6 +425,15 @@ class StrutKind:
     @property
     def predicted(self) -> StrutKind:
         return self
+
+    @property
+    def report(self) -> StrutKind:
+        return self
+
+    def show_outcome(self, outcome: StrutOutcome, out: Output) -> Exhibit:
+        out.path("struts.txt").parent.mkdir(parents=True, exist_ok=True)
+        out.path("struts.txt").write_text("struts")
+        return Exhibit([("struts", len(outcome.forces))], files=[(out.name("struts.txt"), "s")])
 
     def depends_on(self, model: Strut) -> Sequence[object]:
         return (model,)
@@ -465,7 +467,7 @@ def mixed(tmp_path, monkeypatch):
     def kind_named(name):
         return kind if name == "strut" else ours(name)
 
-    for module in (prediction_result, predictions_module):
+    for module in (predictions_module, kinds_of_test):
         monkeypatch.setattr(module, "kind_named", kind_named)
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
     read = read_project(write_project(tmp_path))

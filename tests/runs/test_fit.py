@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,11 +25,10 @@ from bubblefit.project.project import Project, read_project
 from bubblefit.reports.content import Exhibit, Report, Table, read_page_data
 from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
-from bubblefit.runs import check as room
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
-from bubblefit.runs.check import Check
-from bubblefit.runs.fit import fit
+from bubblefit.runs.fit import Check, fit
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
+from bubblefit.runs.presenters import PRESENTERS
 from bubblefit.runs.result import notes_of_fit
 from bubblefit.runs.setup import bounds_of, law_of, prepare_fit, shared_unknowns
 from bubblefit.runs.starts import StartRecord
@@ -387,15 +387,8 @@ def test_noise_is_what_a_perfect_law_leaves(together):
 SURE, VAGUE = Doubt("unit", True, "off by 1000"), Doubt("slack", False, "0.2 mm of slack")
 
 
-def looked(*judgements: Judgement, examine: bool = False) -> Check:
-    tests = []
-    for judgement in judgements:
-        one = SimpleNamespace(test=SimpleNamespace(name=judgement.test))
-        if examine:
-            one.examine = lambda out, name=judgement.test: Exhibit(
-                figures=[(f"{name}.png", name)], facts=[("points", 3)], tables=[Table(name, [], [])]
-            )
-        tests.append(one)
+def looked(*judgements: Judgement) -> Check:
+    tests = [SimpleNamespace(test=SimpleNamespace(name=j.test, kind="made")) for j in judgements]
     setup: Any = SimpleNamespace(tests=tests, project=SimpleNamespace(title="made"))
     return Check(setup, judgements)
 
@@ -431,8 +424,15 @@ def test_result():
 @pytest.mark.parametrize("judgements", [(ONE, TWO), (TWO, FINE), (FINE,)])
 def test_page(tmp_path, monkeypatch, judgements):
     seen: list[Report] = []
-    monkeypatch.setattr(room, "write_report", lambda _, report: seen.append(report))
-    done = looked(*judgements, examine=True)
+    presenter = import_module(f"bubblefit.reports.{PRESENTERS['Check'][0]}")
+    monkeypatch.setattr(presenter, "write_report", lambda _, report: seen.append(report))
+
+    def examine(one, out):
+        name = one.test.name
+        return Exhibit([("points", 3)], [(f"{name}.png", name)], [Table(name, [], [])])
+
+    monkeypatch.setattr(presenter, "report_of", lambda kind: SimpleNamespace(examine=examine))
+    done = looked(*judgements)
     done.report(tmp_path / "a" / "b")
     (page,) = seen
     names = [judgement.test for judgement in judgements]
@@ -527,13 +527,11 @@ def test_the_spread_stands_wherever_the_load_does(tmp_path, monkeypatch, drawn):
     assert [run["load_sigma_N"] for run in done.result["runs"][2:]] == [
         dict.fromkeys(("40 mm", "100 mm", "240 mm"))
     ] * 2
-    (axes,) = [a for f in drawn for a in f.axes if a.get_ylabel() == "load, N"]
-    dotted = [line.get_ydata() for line in axes.lines if line.get_linewidth() == 1.2]
+    (chart,) = [c for charts in drawn for c in charts.charts if c.y_label == "load, N"]
+    (sure,) = [s for s in chart.series if s.y and s.lower]
     ends = [known["load_N"] + sign * 1.96 * known["load_sigma_N"] for sign in (-1, 1)]
-    assert len(dotted) == 2
-    np.testing.assert_allclose(dotted, ends)
-    names = [text.get_text() for f in drawn for g in f.legends for text in g.get_texts()]
-    assert "95 % by the card" in names
+    np.testing.assert_allclose([sure.lower, sure.upper], ends, rtol=1e-5)
+    assert "95 % by the card" in [s.name for s in chart.series]
 
 
 def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):

@@ -22,6 +22,7 @@ from bubblefit.inference.unknowns import ProposedStarts, SobolStarts
 from bubblefit.materials.forms.trilinear import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, project_text, read_project, settings_of
+from bubblefit.reports.fit_page import record_tables
 from bubblefit.runs.folder import AS_RUN, PROVENANCE, RUN, Store, differences
 from bubblefit.runs.record import Record, data_rows, facts_of, solver_facts, this_run
 from bubblefit.runs.setup import FitSetup, fingerprints, prepare_fit, proposals
@@ -339,7 +340,7 @@ def test_the_record_says_when_where_and_with_what(tmp_path):
 
 def test_the_record_on_the_page(tmp_path):
     setup = prepared(read_project(written(tmp_path)))
-    facts, files = recorded(setup, ["bubblefit", "fit", "p.toml"]).tables()
+    facts, files = record_tables(recorded(setup, ["bubblefit", "fit", "p.toml"]))
     assert facts.title == "The record"
     assert ["command", "bubblefit fit p.toml"] in [list(row) for row in facts.rows]
     digest = hashlib.sha256((tmp_path / "low.csv").read_bytes()).hexdigest()
@@ -347,7 +348,7 @@ def test_the_record_on_the_page(tmp_path):
     low = list(files.rows[0])
     assert low[:4] == ["first", "low.csv", digest[:12], "csv"] and low[4].startswith(columns)
     assert low[6] == "1 flagged as doubtful"
-    (none,) = Record(tmp_path / "p.toml", None, None, [], {}, [this_run(None)]).tables()
+    (none,) = record_tables(Record(tmp_path / "p.toml", None, None, [], {}, [this_run(None)]))
     assert "called from Python" in dict(map(tuple, none.rows))["command"]
 
 

@@ -1,0 +1,270 @@
+"""Write the pages of predictions, of a look at the data before a fit, and of unfinished folders."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..experiments.kinds import Output
+from ..experiments.registry import report_of
+from ..files import __version__, replacing, write_text
+from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
+from ..runs.fit import Check
+from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Store
+from ..runs.predictions import Predictions
+from ..runs.starts import HISTORY, STARTS, RunningFiles
+from .content import (
+    PAGE_DATA,
+    Exhibit,
+    Facts,
+    Part,
+    Report,
+    Section,
+    Table,
+    Words,
+    read_page_data,
+)
+from .fit_page import citation, record_tables
+from .html import percent, write_report
+
+RUNS_TABLE = "runs.csv"
+
+
+def write_predictions(predictions: Predictions, folder: Path) -> Path:
+    """Write the folder of predictions; return the page's path. Raises OutputError."""
+    (folder / RESULT).unlink(missing_ok=True)
+    if predictions.record is not None:
+        predictions.record.write(folder)
+    several = len(predictions.outcomes) > 1
+    exhibits = {
+        kind: report_of(kind).show_outcome(outcome, Output(folder, f"{kind}/" if several else ""))
+        for kind, (outcome, _) in predictions.outcomes.items()
+    }
+    write_notes(folder, predictions.notes)
+    with replacing(folder / RUNS_TABLE) as path:
+        predictions.runs().to_csv(path, index=False)
+    page = write_report(folder, _page(predictions, exhibits))
+    Store(folder).finish(predictions.result)
+    return page
+
+
+def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
+    each, result = predictions.each, predictions.result
+    ended = [predictions.ended(i) for i in range(len(each))]
+    finished = sum(not (run.record.failure or run.record.early) for run in each)
+    summary = f"{finished} of {len(each)} runs finished."
+    noted = sum(bool(run.notes) for run in each)
+    if noted:
+        summary += f" {noted} have notes."
+    for mark in MARKS:
+        count = sum(mark in marks(run.notes) for run in each)
+        if count:
+            summary += f" Marked {mark.value!r}: {count}."
+    if predictions.worst is not None:
+        summary += f" Largest error against measured values: {percent(predictions.worst)}."
+    record = [] if predictions.record is None else record_tables(predictions.record)
+    return Report(
+        title=predictions.project.title,
+        summary=summary,
+        facts=[
+            ("tests", len(result["tests"])),
+            ("cards", len(result["cards"])),
+            ("solver", result["solver"]),
+            ("wall time, s", float(result["wall_s"])),
+            *([("runs from the cache", predictions.cached)] if predictions.cached else []),
+            ("seconds of all runs", float(sum(run.record.seconds for run in each))),
+            *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
+        ],
+        warnings=[
+            f"{run.title}: {how}"
+            for run, how in zip(each, ended, strict=True)
+            if run.record.failure or run.record.early
+        ],
+        sections=[
+            Section("What was predicted", [
+                part
+                for exhibit in exhibits.values()
+                for part in replace(exhibit, facts=()).all_parts()
+            ]),
+            Section("What to know of the runs", _notes(predictions)),
+            Section(
+                "The record", record
+            ),
+            Section("How to cite", citation()),
+        ],
+        files=[
+            (RUNS_TABLE, "the table of runs with all its columns"),
+            (NOTES, NOTES_ARE),
+            (RESULT, "all numbers of this page, for programs"),
+            *(file for exhibit in exhibits.values() for file in exhibit.files),
+            *([] if predictions.record is None else predictions.record.files),
+        ],
+        versions=result["versions"],
+    )  # fmt: skip
+
+
+def _notes(predictions: Predictions) -> list[Table]:
+    walls = ["wall"] if any(run.wall for run in predictions.each) else []
+    rows: list[list[object]] = [
+        [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind.value, str(note)]
+        for run in predictions.each
+        for note in run.notes
+    ]
+    if not rows:
+        return []
+    what = "What a reader of the numbers above should know of each run."
+    header = ["test", "card", *walls, "kind", "note"]
+    return [Table("Notes", header, rows, what, text=tuple(range(1, len(header))))]
+
+
+def write_check(check: Check, folder: Path) -> Path:
+    """Write check.json, the tests' own figures and report.html; return the page's path.
+
+    Raises OutputError: they cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "check.json", json.dumps(check.result, indent=1) + "\n")
+    several = len(check.setup.tests) > 1
+    exhibits: list[tuple[str, Exhibit]] = []
+    for one in check.setup.tests:
+        if (examine := getattr(report_of(one.test.kind), "examine", None)) is not None:
+            out = Output.of(folder, one.test.name, several)
+            exhibits.append((one.test.name, examine(one, out)))
+    header = ["test", "", "doubt", "what was seen"]
+    doubts = Table("Doubts", header, [list(row) for row in check.rows()], text=(1, 2, 3))
+    facts = [
+        (f"{name}: {label}" if several else label, value)
+        for name, exhibit in exhibits
+        for label, value in exhibit.facts
+    ]
+    report = Report(
+        title=f"{check.setup.project.title}: a look at the data",
+        summary=_check_summary(check),
+        facts=facts,
+        warnings=[
+            words
+            for j in check.judgements
+            for words in (
+                *(f"{j.test}: {d.text}" for d in j.errors),
+                *(n.line for n in j.notes),
+            )
+        ],
+        sections=[
+            Section("Doubts", [doubts]),
+            Section(
+                "What was seen",
+                [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
+            ),
+        ],
+        files=[("check.json", "the doubts in plain values")],
+        versions={"bubblefit": __version__},
+    )
+    return write_report(folder, report)
+
+
+def _check_summary(check: Check) -> str:
+    if not check.sound:
+        return "A fit would not begin."
+    doubts = sum(len(judgement.doubts) for judgement in check.judgements)
+    if doubts:
+        return f"A fit would begin, and carry {doubts} of the doubts below with it."
+    return "The data are fit to be fitted."
+
+
+UNFINISHED = (
+    "Unfinished: there is no result yet, only what was recorded so far; --resume goes on with it."
+)
+
+
+def page_of_folder(folder: Path) -> Report:
+    """Return the page of an output folder: of its page.json, else of its records so far.
+
+    Raises
+    ------
+    InputError : no output folder, or a damaged one, or one of a version that wrote no page.json.
+    """
+    if (folder / PAGE_DATA).exists():
+        return read_page_data(folder)
+    if (folder / RESULT).exists():
+        problem = f"has a result but no {PAGE_DATA}: an older version wrote it; run it again"
+        raise InputError(folder, "", problem)
+    within = _folders_within(folder)
+    if not (folder / RUN).exists() and not within:
+        raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
+    return Report(
+        title=_title(folder),
+        summary=UNFINISHED,
+        sections=[
+            Section("So far", [*_starts(folder), *_runs(folder), *within]),
+            Section("The record", _record(folder)),
+        ],
+    )
+
+
+def _title(folder: Path) -> str:
+    project = _provenance(folder).get("project", {})
+    named = project.get("file") if isinstance(project, dict) else None
+    return f"{Path(str(named)).name if named else folder.resolve().name}: unfinished"
+
+
+def _starts(folder: Path) -> list[Part]:
+    """Return facts and a table of the starts that ended; nothing of a folder without a fit."""
+    if not (folder / STARTS).exists():
+        return []
+    records = RunningFiles(Store(folder), (), ()).finished()
+    rows: list[list[object]] = [
+        [r.number, r.mesh, r.objective, r.analyses, r.status] for r in records
+    ]
+    history = folder / HISTORY
+    lines = history.read_text(encoding="utf-8", errors="replace").count("\n")
+    facts: list[tuple[str, object]] = [
+        ("starts that ended", len({r.number for r in records})),
+        ("analyses", max(lines - 1, 0)),
+    ]
+    header = ["start", "mesh", "objective", "analyses", "how it ended"]
+    return [Facts(facts), *([Table("Starts", header, rows, text=(1, 4))] if rows else [])]
+
+
+def _runs(folder: Path) -> list[Part]:
+    """Return the number of predictions that are kept."""
+    kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
+    return [Facts([("runs that ended", len(kept))])] if kept else []
+
+
+def _folders_within(folder: Path) -> list[Part]:
+    """Return a table of the fits of a study, a folder each, and how far they are."""
+    rows: list[list[object]] = []
+    for path in sorted(folder.glob("*/")):
+        if (path / RESULT).exists():
+            rows.append([path.name, "finished"])
+        elif (path / RUN).exists():
+            rows.append([path.name, "unfinished"])
+    return [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
+
+
+def _provenance(folder: Path) -> dict[str, Any]:
+    """Read the provenance of the results; empty where it is missing or damaged."""
+    try:
+        content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _record(folder: Path) -> list[Part]:
+    content = _provenance(folder)
+    if not content:
+        return [Words(["Nothing is recorded of what this is of."])]
+    rows: list[list[object]] = [["project file", str(content.get("project", {}).get("file", ""))]]
+    for run in content.get("runs", []):
+        rows.append(["command", " ".join(map(str, run.get("command_line") or ["Python"]))])
+        rows.append(["begun", str(run.get("date", ""))])
+    rows += [
+        [f"data: {row.get('name')}", f"sha256 {str(row.get('sha256', ''))[:DIGITS]} …"]
+        for row in content.get("data", [])
+    ]
+    return [Table("What it is of", ["", ""], rows, text=(1,))]

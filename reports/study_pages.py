@@ -1,0 +1,384 @@
+"""Write the folder of a study: tables, figures, notes.csv, report.html and, last, result.json.
+
+A function a study, found by the type of its result (`runs.presenters`); all end in `write_folder`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+
+from ..errors import SolverFailure
+from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
+from ..experiments.registry import report_of
+from ..files import replacing, write_text
+from ..inference.likelihood import THRESHOLD
+from ..inference.posterior import LEVEL
+from ..materials.forms.base import COMPONENTS
+from ..notes import NOTES, NOTES_ARE, Note, percent, write_notes
+from ..runs import bootstrap, plan, profile, weights
+from ..runs.compare import LawComparison, noise
+from ..runs.folder import RESULT
+from ..runs.poisson import Nu12Study
+from ..runs.refinement import Refinement, ended, largest_load, rms_changes
+from ..runs.validation import Validation
+from .charts import Charts
+from .content import Listing, Picture, Report, Section, Table, pictures
+from .fit_page import citation, two_digits
+from .html import write_report
+from .moduli import bootstrap_charts
+from .studies import (
+    ConvergencePanel,
+    LawRow,
+    ProfilePanel,
+    convergence_charts,
+    held_out_charts,
+    law_charts,
+    nu12_charts,
+    plan_charts,
+    profile_charts,
+    weights_charts,
+)
+from .vega import save
+
+#: Files of every study, after its own.
+FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
+BANDS = (
+    f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
+    "band by the noise alone"
+)
+LIKELIHOODS = (
+    "-2 log L of each modulus held at a value, everything else fitted anew (dots), and by the "
+    "1 sigma of the fit, its bounds left aside (dashed); the horizontal line is the threshold "
+    f"of {100 * LEVEL:.0f} %"
+)
+UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square along each"
+ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
+
+
+class Study(Protocol):
+    """The result of a study: its numbers, and what is to be said of them."""
+
+    @property
+    def notes(self) -> Sequence[Note]: ...
+    @property
+    def result(self) -> dict[str, Any]: ...
+    def table(self) -> pd.DataFrame: ...
+    def lines(self) -> list[str]: ...
+
+
+def write_folder(
+    folder: Path,
+    study: Study,
+    page: Report,
+    tables: Mapping[str, pd.DataFrame],
+    figures: Mapping[str, Charts],
+    digits: int | None = None,
+) -> Path:
+    """Write everything of a study; return the page's path.
+
+    Parameters
+    ----------
+    tables, figures : by the names of their files.
+    digits : significant ones of the tables' numbers, all unless given.
+
+    Raises
+    ------
+    OutputError : a file cannot be written.
+    """
+    if (folder / RESULT).exists():  # a folder that is half written has no result
+        (folder / RESULT).unlink()
+    form = None if digits is None else f"%.{digits}g"
+    for name, table in tables.items():
+        with replacing(folder / name) as path:
+            table.to_csv(path, index=False, float_format=form, lineterminator="\n")
+    for name, charts in figures.items():
+        save(folder / name, charts)
+    write_notes(folder, study.notes)
+    written = write_report(folder, page)
+    write_text(folder / RESULT, json.dumps(study.result, indent=1) + "\n")
+    return written
+
+
+def write_plain(
+    folder: Path,
+    study: Study,
+    title: str,
+    name: str,
+    charts: Sequence[Charts],
+    figure: Charts | None = None,
+    digits: int | None = None,
+) -> Path:
+    """Write a study whose page is its lines, charts and table; return the page's path.
+
+    name : of the table NAME.csv and, where there is a figure, of NAME.png.
+    """
+    table, lines = study.table(), study.lines()
+    text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
+    rows = table.to_numpy(object).tolist()
+    file, picture = f"{name}.csv", f"{name}.png"
+    shown = charts or ([Picture(picture, title)] if figure else [])
+    page = Report(
+        title=title,
+        warnings=[note.line for note in study.notes],
+        sections=[
+            Section("What it comes to", [Listing("\n".join(lines))] if lines else []),
+            Section("Figure", shown),
+            Section("The numbers", [Table("The numbers", list(table.columns), rows, text=text)]),
+            Section("How to cite", citation()),
+        ],
+        files=[
+            (file, "the table"),
+            *([(picture, "picture of the charts")] if figure else []),
+            *FILES,
+        ],
+    )
+    figures = {} if figure is None else {picture: figure}
+    return write_folder(folder, study, page, {file: table}, figures, digits)
+
+
+def write_refinement(study: Refinement, folder: Path) -> Path:
+    """Write the folder of a study of meshes or increments."""
+    title = f"{study.project.name}: finer and finer {study.what}"
+    charts = convergence_charts(panels(study), study.what, title)
+    return write_plain(folder, study, title, "convergence", [charts], charts)
+
+
+def panels(study: Refinement) -> list[ConvergencePanel]:
+    """Return relative changes from each level to the next finer one, by model."""
+    drawn = []
+    for name, runs in study.runs.items():
+        good = ended(runs)
+        every = [run.values or {} for run in good]
+        changes: dict[str, list[float]] = {}
+        for quantity, last in (every[-1] if good else {}).items():
+            values = np.array([own.get(quantity, np.nan) for own in every])
+            changes[quantity] = (100 * np.abs(np.diff(values) / last)).tolist()
+        if rms := rms_changes(runs):
+            largest = largest_load(good)
+            changes["RMS along the load curve"] = [100 * r / largest for r in rms]
+        sizes = [run.level.size for run in good]
+        work = [run.level.elements * run.level.part.increments for run in good]
+        drawn.append(ConvergencePanel(name, sizes, changes, work, [run.seconds for run in good]))
+    return drawn
+
+
+def write_nu12(study: Nu12Study, folder: Path) -> Path:
+    """Write the folder of a study of nu12."""
+    shown = {
+        name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
+        for name, part in study.parts.items()
+    }
+    title = f"{study.project.name}: what nu12 changes"
+    charts = nu12_charts(shown, study.base, study.response, title)
+    return write_plain(folder, study, title, "nu12", [charts], charts)
+
+
+def write_validation(study: Validation, folder: Path) -> Path:
+    """Write the folder of a validation."""
+    title = f"{study.title}: does a fit foretell what it was not given?"
+    charts = held_out_charts(*study.errors(), "Errors at what a fit was not given, and was")
+    return write_plain(folder, study, title, "validation", [charts], digits=9)
+
+
+def write_weights(study: weights.WeightStudy, folder: Path) -> Path:
+    """Write the folder of a study of weights."""
+    ended = study.ended
+    moduli = {
+        name: {
+            study.strain(name, place): [run.moduli[name][k] for run in ended]
+            for k, place in enumerate(weights.PLACES)
+        }
+        for name in COMPONENTS
+    }
+    parts = weights_charts(
+        study.counted,
+        [run.count for run in ended],
+        {name: [run.relative[name] for run in ended] for name in ended[0].relative},
+        moduli,
+        {name: study.sigma(name) for name in COMPONENTS},
+    )
+    figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
+    title = f"{study.title}: the weight of {study.counted}"
+    return write_plain(folder, study, title, "weights", parts, figure, 9)
+
+
+def write_bootstrap(study: bootstrap.Bootstrap, folder: Path) -> Path:
+    """Write the folder of a bootstrap."""
+    found, law = study.found, study.found.best.law
+    best = {name: law.modulus(name, strain) for name, strain in study.strains.items()}
+    charts = bootstrap_charts(study.strains, best, study.bands, study.of_fit, BANDS)
+    coefficients = study.coefficients()
+    sigma = ", ".join(f"{name} {percent(own)}" for name, (own, _) in study.sigma.items())
+    rows: list[list[object]] = [[name, *map(percent, study.sigma[name])] for name in COMPONENTS]
+    header = ["modulus", "1 sigma of the samples", "of the fit, by noise"]
+    scatter = Table("How far the moduli scatter", header, rows, bootstrap.METHOD, text=(1, 2))
+    page = Report(
+        title=f"{found.setup.project.title}: bootstrap over {study.over}",
+        summary=f"1 sigma over {len(study.samples)} samples: {sigma}.",
+        facts=[
+            ("card", found.card),
+            ("tests", ", ".join(test.test.name for test in found.setup.tests)),
+            ("drawn", ", ".join(f"{group.name}: {len(group.units)}" for group in study.groups)),
+            ("analyses", study.analyses),
+            ("samples that did not settle", study.unfinished),
+        ],
+        warnings=[note.line for note in study.notes],
+        sections=[Section("The samples", [charts, scatter, _correlations(coefficients)])],
+        files=[
+            ("bootstrap.csv", "moduli along their strains, with both bands"),
+            ("bootstrap.png", "picture of the moduli"),
+            ("coefficients.csv", "the unknowns, with their correlations over the samples"),
+            (bootstrap.SAMPLES, "every sample: what was drawn, and the optimiser's unknowns"),
+            *FILES,
+        ],
+    )
+    tables = {"bootstrap.csv": study.table(), "coefficients.csv": coefficients}
+    return write_folder(folder, study, page, tables, {"bootstrap.png": charts}, 9)
+
+
+def _correlations(found: pd.DataFrame) -> Table:
+    names = found["unknown"].tolist()
+    own = ["unknown", "value", "sigma", "sigma_of_fit"]
+    rows: list[list[object]] = [
+        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
+        for _, row in found.iterrows()
+    ]
+    header = ["unknown", "value", "1 sigma", "of the fit", *names]
+    note = "Coefficients in MPa; then the correlations over the samples."
+    return Table("Unknowns over the samples", header, rows, note)
+
+
+def write_profiles(study: profile.Profiles, folder: Path) -> Path:
+    """Write the folder of profile likelihoods."""
+    shown = [
+        ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
+        for one in study.each
+    ]
+    charts = profile_charts(shown, THRESHOLD, LIKELIHOODS)
+    header = [
+        "modulus", "MPa", f"{100 * LEVEL:.0f} % from, MPa", "to, MPa", "band of the fit from, MPa",
+        "to, MPa", "upper over lower distance", "analyses",
+    ]  # fmt: skip
+    rows = [_interval(one) for one in study.each]
+    page = Report(
+        title=f"{study.title}: profile likelihood",
+        summary=f"{study.each[0].name}: {study.each[0].words}.",
+        facts=[
+            ("card", study.card),
+            ("tests", ", ".join(study.tests)),
+            ("analyses", study.analyses),
+        ],
+        warnings=[note.line for note in study.notes],
+        sections=[
+            Section(
+                "The profiles",
+                [charts, Table("Between what each modulus lies", header, rows, profile.METHOD)],
+            )
+        ],
+        files=[("profile.csv", "the curves"), ("profile.png", "picture of the profiles"), *FILES],
+    )
+    tables, figures = {"profile.csv": study.table()}, {"profile.png": charts}
+    return write_folder(folder, study, page, tables, figures, 9)
+
+
+def _interval(one: profile.Profile) -> list[object]:
+    low, high = (
+        end if end is not None else f"not closed: {side.why}"
+        for end, side in zip(one.ends, (one.below, one.above), strict=True)
+    )
+    skew = "" if one.asymmetry is None else one.asymmetry
+    return [one.name, one.best, low, high, *one.band, skew, one.analyses]
+
+
+def write_plan(study: plan.Plan, folder: Path) -> Path:
+    """Write the folder of a plan."""
+    words, now, first = plan.words, study.now, study.candidates[0]
+    every = [("the present tests alone", now)]
+    every += [(f"{k}. {p.title}", p) for k, p in enumerate(study.candidates, start=1)]
+    sigma = {name: [100 * one.summary[name] for _, one in every] for name in COMPONENTS}
+    charts = plan_charts([title for title, _ in every], sigma, UNCERTAINTIES)
+    rows: list[list[object]] = [
+        [title, *(words(p.summary[name]) for name in COMPONENTS), p.noise] for title, p in every
+    ]
+    header = ["test", *(f"1 sigma of {name}" for name in COMPONENTS), "noise"]
+    along = [
+        Table(
+            f"1 sigma of {name}",
+            ["test", *(f"at strain {strain:.3g}" for strain in study.strains[name])],
+            [[title, *map(words, study.at(p)[name])] for title, p in every],
+        )
+        for name in COMPONENTS
+    ]
+    facts = [
+        ("card", study.card),
+        ("present tests", ", ".join(study.tests)),
+        ("ranked by", study.criterion),
+    ]
+    if study.following is not None:
+        after = ", ".join(f"{name} {words(s)}" for name, s in study.following.summary.items())
+        facts.append(("best after the first", f"{study.following.title}: {after}"))
+    change = ", ".join(
+        f"{name} {words(now.summary[name])} to {words(first.summary[name])}" for name in COMPONENTS
+    )
+    title = "Which test next"
+    page = Report(
+        title=f"{study.title}: which test next?",
+        summary=f"{first.title}: 1 sigma of {change}.",
+        facts=facts,
+        warnings=[note.line for note in study.notes],
+        sections=[
+            Section(title, [charts, Table(title, header, rows, plan.ASSUMED, text=(4,))]),
+            Section("Along the strains", along),
+        ],
+        files=[("plan.csv", "the tables"), ("plan.png", "picture of the chart"), *FILES],
+    )
+    return write_folder(folder, study, page, {"plan.csv": study.table()}, {"plan.png": charts}, 6)
+
+
+def write_comparison(study: LawComparison, folder: Path) -> Path:
+    """Write the folder of a comparison of forms."""
+    error, total = study.result["objective_is"], sum(noise(study.forms[0]).values())
+    rows = [
+        LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out()) for f in study.forms
+    ]
+    charts, table = law_charts(rows, total, error, ERRORS), study.table()
+    note = "fitted: to all points; left out: at what the fits of the folds were not given"
+    cells = table.to_numpy(dtype=object).tolist()
+    tests = study.forms[0].fit.setup.tests
+    responses = [shown for test in tests for shown in _responses(study, test, folder)]
+    page = Report(
+        title=f"{study.project.title}: forms of the moduli",
+        summary="; ".join(study.conclusion),
+        facts=[("error", error), ("the data's own noise", total)],
+        warnings=[note.line for note in study.notes],
+        sections=[
+            Section("Errors", [charts, Table("Errors", list(table.columns), cells, note)]),
+            Section("The forms side by side", pictures(responses)),
+        ],
+        files=[("comparison.csv", "the table"), ("laws.png", "picture of the errors"), *FILES],
+    )
+    tables, figures = {"comparison.csv": table}, {"laws.png": charts}
+    return write_folder(folder, study, page, tables, figures, 9)
+
+
+def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:
+    """Return what the kind of a test draws of several cards: here those of the forms."""
+    own = test.test
+    runs = {}
+    for form in study.forms:
+        for part, model in own.models().items():
+            try:
+                outcome = form.fit.setup.make_solver().run(model, form.fit.law)
+            except SolverFailure as failure:
+                outcome = failure
+            runs[form.name, part] = CardRun(model, outcome)
+    out = Output.of(folder, own.name, len(study.forms[0].fit.setup.tests) > 1)
+    cards = {form.name: form.fit.card for form in study.forms}
+    return report_of(own.kind).simulate(own, cards, runs, out).figures
