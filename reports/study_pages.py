@@ -27,9 +27,10 @@ from ..runs.folder import RESULT
 from ..runs.poisson import Nu12Study
 from ..runs.refinement import Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
+from ..solvers.base import History
 from ..writing import replacing, write_text
 from .charts import Charts
-from .content import Listing, Picture, Report, Section, Table, pictures
+from .content import Listing, Report, Section, Table, pictures
 from .fit_page import citation, two_digits
 from .html import write_report
 from .moduli import bootstrap_charts
@@ -123,13 +124,12 @@ def write_plain(
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     rows = table.to_numpy(object).tolist()
     file, picture = f"{name}.csv", f"{name}.png"
-    shown = charts or ([Picture(picture, title)] if figure else [])
     page = Report(
         title=title,
         warnings=[note.line for note in study.notes],
         sections=[
             Section("What it comes to", [Listing("\n".join(lines))] if lines else []),
-            Section("Figure", shown),
+            Section("Figure", charts),
             Section("The numbers", [Table("The numbers", list(table.columns), rows, text=text)]),
             Section("How to cite", citation()),
         ],
@@ -374,6 +374,7 @@ def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequen
     runs = {}
     for form in study.forms:
         for part, model in own.models().items():
+            outcome: History | SolverFailure
             try:
                 outcome = form.fit.setup.make_solver().run(model, form.fit.law)
             except SolverFailure as failure:

@@ -322,7 +322,7 @@ def name_of(setup: FitSetup, part: Part) -> str:
     return f"{setup.tests[part.test].test.name}: {part.name}"
 
 
-def judged_with(found: Fit, part: Part) -> HeldOut:
+def errors_of_fit(found: Fit, part: Part) -> HeldOut:
     """Return the errors of the fit to all of the data at a part of them."""
     setup, problem, y = found.setup, found.problem, found.best.point.unknowns
     nuisance = {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
@@ -330,7 +330,7 @@ def judged_with(found: Fit, part: Part) -> HeldOut:
     return held_out_part(test, law, setup.make_solver, part.alone, nuisance, name)
 
 
-def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
+def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
     name, test = name_of(setup, part), setup.tests[part.test]
     units = {c: "" for c in part.masks}
@@ -354,10 +354,10 @@ def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
 def _task(
     setup: FitSetup, parts: Sequence[Part], starts: int
 ) -> Callable[[int, Callable[[Any], None]], tuple[int, HeldOut]]:
-    return lambda number, tell: (number, without(setup, parts[number], starts))
+    return lambda number, tell: (number, fit_without(setup, parts[number], starts))
 
 
-def recorded(
+def errors_left_out(
     setup: FitSetup,
     parts: Sequence[Part],
     starts: int,
@@ -473,9 +473,9 @@ def validate(
             if overwrite and folder is not None:
                 (folder / file).unlink(missing_ok=True)
             tell(f"{form}: without each of {len(parts[form])} {leave}")
-            alone = recorded(setups[form], parts[form], starts, folder, file, tell)
+            alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
             pairs = zip(parts[form], alone, strict=True)
-            judged += [Judged(form, one, judged_with(together, part)) for part, one in pairs]
+            judged += [Judged(form, one, errors_of_fit(together, part)) for part, one in pairs]
             continue
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]

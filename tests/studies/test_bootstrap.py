@@ -138,14 +138,14 @@ def test_frames_drawn_again(tmp_path):
 def test_a_bootstrap_goes_on_where_it_was(tmp_path, monkeypatch):
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
     whole = bootstrap(project, "specimens", 4, CARD, "one")
-    write = module.BootstrapRecord.write
+    write = module.StudyRecord.write
 
     def stops(record, sample):
         write(record, sample)
-        if len(record.samples) == 2:
+        if len(record.rows) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(module.BootstrapRecord, "write", stops)
+    monkeypatch.setattr(module.StudyRecord, "write", stops)
     with pytest.raises(KeyboardInterrupt):
         bootstrap(project, "specimens", 4, CARD, "one", out=tmp_path / "out")
     fitted: list[int] = []
@@ -154,7 +154,7 @@ def test_a_bootstrap_goes_on_where_it_was(tmp_path, monkeypatch):
         fitted.append(sample.number)
         write(record, sample)
 
-    monkeypatch.setattr(module.BootstrapRecord, "write", counts)
+    monkeypatch.setattr(module.StudyRecord, "write", counts)
     with pytest.raises(OutputError, match="already holds results"):
         bootstrap(project, "specimens", 4, CARD, "one", out=tmp_path / "out")
     given = {"card": CARD, "tests": "one", "out": tmp_path / "out", "resume": True}
@@ -681,7 +681,7 @@ def test_moduli_and_errors_follow_the_weight(tmp_path):
 
 def test_a_study_of_weights_goes_on_where_it_was(tmp_path, monkeypatch):
     project = read_project(constant_strips(tmp_path))
-    whole = study_of.refitted
+    whole = study_of.refit
     asked: list[float] = []
 
     def counting(found, names, count, y):
@@ -690,7 +690,7 @@ def test_a_study_of_weights_goes_on_where_it_was(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return whole(found, names, count, y)
 
-    monkeypatch.setattr(study_of, "refitted", counting)
+    monkeypatch.setattr(study_of, "refit", counting)
     given = {"starts": 1, "counts": (0.5, 1, 2, 4), "out": tmp_path / "out"}
     with pytest.raises(KeyboardInterrupt):
         weight_study(project, "two", **given)
