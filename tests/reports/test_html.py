@@ -189,11 +189,8 @@ def test_data_that_are_no_page(tmp_path: Path, content: str, said: str):
     (tmp_path / "page.json").write_text(content)
     with pytest.raises(InputError, match=re.escape(said)):
         read_page_data(tmp_path)
-
-
-def test_no_data(tmp_path: Path):
     with pytest.raises(InputError, match=r"page\.json.*cannot be read"):
-        read_page_data(tmp_path)
+        read_page_data(tmp_path / "none")
 
 
 def test_data_are_strict_json(tmp_path: Path):
