@@ -254,7 +254,7 @@ def held_out_charts(
     caption: str,
 ) -> Charts:
     """Return relative errors by law at each test: predicted, and by the fit to all of them."""
-    errors = {f"{law}, foretold": 100 * np.asarray(own) for law, own in predicted.items()}
+    errors = {f"{law}, predicted": 100 * np.asarray(own) for law, own in predicted.items()}
     errors |= {f"{law}, fitted": 100 * np.asarray(own) for law, own in fitted.items()}
     alt = f"errors at {', '.join(tests)}"
     chart = _named("left out", "relative RMS error, %", tests, errors, alt)

@@ -182,8 +182,10 @@ def write_nu12(study: Nu12Study, folder: Path) -> Path:
 
 def write_validation(study: Validation, folder: Path) -> Path:
     """Write the folder of a validation."""
-    title = f"{study.title}: does a fit foretell what it was not given?"
-    charts = held_out_charts(*study.errors(), "Errors at what a fit was not given, and was")
+    title = f"{study.title}: errors at data left out of the fit"
+    charts = held_out_charts(
+        *study.errors(), "Errors at data left out of the fit (predicted), and given to it (fitted)"
+    )
     return write_plain(folder, study, title, "validation", [charts], digits=9)
 
 

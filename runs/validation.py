@@ -238,7 +238,7 @@ class Validation(Presented):
         table = self.table()
         wide = max([20, *(2 + len(name) for name in table["test"])])
         head = "left out" if self.leave != "tests" else "test left out"
-        said = [f"{'law':14}{head:{wide}}{'compared':24}{'foretold':>12}{'fitted':>10}  unit"]
+        said = [f"{'law':14}{head:{wide}}{'compared':24}{'predicted':>12}{'fitted':>10}  unit"]
         for row in table.itertuples():
             said.append(
                 f"{row.law:14}{row.test:{wide}}{row.compared:24}{row.foretold_rms:12.4g}"
@@ -250,9 +250,9 @@ class Validation(Presented):
             if one.predicted.words
         ]
         means = {law: mean for law, mean in self.means.items() if not np.isnan(mean)}
-        said += [f"{law}: foretold {100 * mean:.3g} % on average" for law, mean in means.items()]
+        said += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
-            said.append(f"foretells best: {min(means, key=means.__getitem__)}")
+            said.append(f"predicts best: {min(means, key=means.__getitem__)}")
         return said
 
     def errors(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:

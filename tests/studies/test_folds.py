@@ -297,7 +297,7 @@ def test_a_specimen_is_foretold_by_the_other(tmp_path):
         own = row["fitted_rms"], row["fitted_relative"]
         assert own == pytest.approx(fitted, rel=1e-3), name
     mean = np.mean([foretold[1] for foretold, _ in expected.values()])
-    assert f"constant: foretold {100 * mean:.3g} % on average" in done.output
+    assert f"constant: predicted {100 * mean:.3g} % on average" in done.output
     said = json.loads((tmp_path / "out" / "result.json").read_text())
     assert said["left_out"] == "specimens"
     assert said["mean_foretold"]["constant"] == pytest.approx(mean, rel=1e-3)
