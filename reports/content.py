@@ -205,7 +205,7 @@ def read_page_data(folder: Path) -> Report:
         raise InputError(path, ".".join(map(str, first["loc"])), first["msg"]) from None
 
 
-def as_written(report: Report) -> Report:
+def round_trip(report: Report) -> Report:
     """Return the report as read back from page.json, so that pages made later are the same."""
     return _adapter().validate_python(plain(report))
 

@@ -96,10 +96,6 @@ def bending_charts(
     A band is what the card leaves open; the other end of the solver's band is a dashed curve of
     the card's colour. misses : whether charts of model less mean follow, of
     cases that were measured.
-
-    Raises
-    ------
-    ValueError : no case with a curve.
     """
     if not any(panel.lines for panel in panels):
         raise ValueError("bending_charts: no cases to draw")

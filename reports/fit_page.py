@@ -119,7 +119,7 @@ def _checked(fit: Fit) -> list[str]:
     lines = []
     if fit.judgements:
         doubts = sum(len(judgement.doubts) for judgement in fit.judgements)
-        seen = f"{doubts} doubts, told below" if doubts else "nothing doubtful"
+        seen = f"{doubts} doubts, listed below" if doubts else "nothing doubtful"
         tests = ", ".join(judgement.test for judgement in fit.judgements)
         lines.append(f"The data were looked at before the fit ({tests}): {seen}.")
     leading = (fit.best.differentiated or fit.best.point).histories

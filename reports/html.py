@@ -26,7 +26,7 @@ from ..files import TEMPLATES, environment, replacing
 from ..notes import percent as percent
 from . import maps, vega
 from .charts import Charts
-from .content import Report, as_written, write_page_data
+from .content import Report, round_trip, write_page_data
 
 PAGE = "report.html"
 #: In the order in which they are read.
@@ -50,7 +50,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
     folder = Path(folder)
     (folder / PAGE).unlink(missing_ok=True) if folder.is_dir() else None
     write_page_data(folder, report)
-    return write_page(folder, as_written(report))
+    return write_page(folder, round_trip(report))
 
 
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:

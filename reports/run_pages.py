@@ -176,7 +176,7 @@ def _check_summary(check: Check) -> str:
 
 
 UNFINISHED = (
-    "Unfinished: there is no result yet, only what was recorded so far; --resume goes on with it."
+    "Unfinished: there is no result yet, only what was recorded so far; --resume continues."
 )
 
 

@@ -85,10 +85,6 @@ def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> 
 
     Differences are those from the polynomial, with the measured points' own as dots; from the
     points where there is no polynomial. There is none where a strip has neither.
-
-    Raises
-    ------
-    ValueError : no curves.
     """
     if not curves:
         raise ValueError("load_charts: no strips to draw")
@@ -178,10 +174,6 @@ def order_charts(directions: Sequence[OrderErrors]) -> Charts:
     """Return RMSE and leave-one-out error over the polynomial order, a chart a direction.
 
     A ring marks the chosen order. An axis is logarithmic where its errors span a decade.
-
-    Raises
-    ------
-    ValueError : no directions.
     """
     if not directions:
         raise ValueError("order_charts: no directions to draw")

@@ -32,13 +32,10 @@ ROOM, POINTS = 1.6, 81
 
 @dataclass(frozen=True, eq=False)
 class ConvergencePanel:
-    """One model of a study of refinement.
+    """One model of a study of refinement; sizes, work and seconds are (levels,), coarse to fine.
 
-    Parameters
-    ----------
-    sizes : (levels,) coarse to fine.
-    changes : by quantity, (levels - 1,) percent, from each level to the next finer one.
-    work, seconds : (levels,) element-increments and wall clock.
+    changes : by quantity, (levels - 1,) percent, from each level to the next finer one. work :
+    element-increments. seconds : wall clock.
     """
 
     name: str
@@ -50,11 +47,7 @@ class ConvergencePanel:
 
 @dataclass(frozen=True, eq=False)
 class LawRow:
-    """One form of the law: name, number of coefficients, and its errors (N).
-
-    `fitted` is the error on the data it was fitted to, `validated` the cross-validated error and
-    `folds` that of every fold. NaN where there is no result.
-    """
+    """Errors of one form of the law: of the fit, cross-validated, and of every fold; or NaN."""
 
     name: str
     coefficients: int
@@ -113,10 +106,6 @@ def convergence_charts(models: Sequence[ConvergencePanel], what: str, caption: s
 
     A change that falls like size^p lies on a straight line of slope p; grey lines show 1 and 2.
     what : "elements" or "increments".
-
-    Raises
-    ------
-    ValueError : no models.
     """
     if not models:
         raise ValueError("convergence_charts: no models to draw")
@@ -166,10 +155,6 @@ def nu12_charts(
 
     models : by name of the model and of the response, nu12 and ratio, (n,) each; a ratio that is
     not finite is a gap. base : nu12 where the ratio is one. response : its name on the axis.
-
-    Raises
-    ------
-    ValueError : no models.
     """
     if not models:
         raise ValueError("nu12_charts: no models to draw")
@@ -269,7 +254,7 @@ def held_out_charts(
     caption: str,
 ) -> Charts:
     """Return relative errors by law at each test: predicted, and by the fit to all of them."""
-    errors = {f"{law}, foretold": 100 * np.asarray(own) for law, own in predicted.items()}
+    errors = {f"{law}, predicted": 100 * np.asarray(own) for law, own in predicted.items()}
     errors |= {f"{law}, fitted": 100 * np.asarray(own) for law, own in fitted.items()}
     alt = f"errors at {', '.join(tests)}"
     chart = _named("left out", "relative RMS error, %", tests, errors, alt)
@@ -281,10 +266,6 @@ def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption:
 
     noise : of the specimens, which no law can beat, as a line. label : of the error, with its
     unit. The axis is logarithmic where the errors span more than a decade.
-
-    Raises
-    ------
-    ValueError : no rows.
     """
     if not rows:
         raise ValueError("law_charts: no laws to draw")
@@ -321,10 +302,6 @@ def plan_charts(tests: Sequence[str], sigma: Mapping[str, Sequence[float]], capt
     """Return a chart of 1 sigma, %, of each modulus with each test that could be made.
 
     sigma : by modulus, one a test; from 100 % on as unknown: a ring at the end of the axis.
-
-    Raises
-    ------
-    ValueError : no tests.
     """
     if not tests:
         raise ValueError("plan_charts: no tests to draw")

@@ -28,8 +28,9 @@ from ..runs.folder import RESULT
 from ..runs.poisson import Nu12Study
 from ..runs.refinement import Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
+from ..solvers.base import History
 from .charts import Charts
-from .content import Listing, Picture, Report, Section, Table, pictures
+from .content import Listing, Report, Section, Table, pictures
 from .fit_page import citation, two_digits
 from .html import write_report
 from .moduli import bootstrap_charts
@@ -123,13 +124,12 @@ def write_plain(
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     rows = table.to_numpy(object).tolist()
     file, picture = f"{name}.csv", f"{name}.png"
-    shown = charts or ([Picture(picture, title)] if figure else [])
     page = Report(
         title=title,
         warnings=[note.line for note in study.notes],
         sections=[
             Section("What it comes to", [Listing("\n".join(lines))] if lines else []),
-            Section("Figure", shown),
+            Section("Figure", charts),
             Section("The numbers", [Table("The numbers", list(table.columns), rows, text=text)]),
             Section("How to cite", citation()),
         ],
@@ -182,8 +182,10 @@ def write_nu12(study: Nu12Study, folder: Path) -> Path:
 
 def write_validation(study: Validation, folder: Path) -> Path:
     """Write the folder of a validation."""
-    title = f"{study.title}: does a fit foretell what it was not given?"
-    charts = held_out_charts(*study.errors(), "Errors at what a fit was not given, and was")
+    title = f"{study.title}: errors at data left out of the fit"
+    charts = held_out_charts(
+        *study.errors(), "Errors at data left out of the fit (predicted), and given to it (fitted)"
+    )
     return write_plain(folder, study, title, "validation", [charts], digits=9)
 
 
@@ -374,6 +376,7 @@ def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequen
     runs = {}
     for form in study.forms:
         for part, model in own.models().items():
+            outcome: History | SolverFailure
             try:
                 outcome = form.fit.setup.make_solver().run(model, form.fit.law)
             except SolverFailure as failure:

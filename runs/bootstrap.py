@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,7 @@ from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Store
 from .presenters import Presented
-from .series import mark_of, read_marked, write_marked
+from .series import StudyRecord
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
 
@@ -69,37 +69,6 @@ class Sample:
     unknowns: Sequence[float]
     analyses: int
     status: str
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values, exact in JSON."""
-        return asdict(self)
-
-
-class BootstrapRecord:
-    """Samples under a mark of all that they depend on, the optimum they began at among it.
-
-    folder : None where nothing is written. resume : read what the folder holds.
-    """
-
-    def __init__(self, folder: Path | None, found: Optimum, over: str, resume: bool) -> None:
-        at = [f"{value:.6g}" for value in found.point.unknowns]
-        parts = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
-        self._mark = mark_of(parts)
-        self._folder = folder
-        self.samples: dict[int, Sample] = {}
-        if folder is not None and resume:
-            self.samples = read_marked(folder / SAMPLES, self._mark, _by_number) or {}
-
-    def write(self, sample: Sample) -> None:
-        """Write a sample; raises OutputError."""
-        self.samples[sample.number] = sample
-        if self._folder is not None:
-            rows = [one.to_json() for one in self.samples.values()]
-            write_marked(self._folder, SAMPLES, self._mark, {"samples": rows})
-
-
-def _by_number(content: dict[str, Any]) -> dict[int, Sample]:
-    return {row["number"]: Sample(**row) for row in content["samples"]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,8 +276,10 @@ def bootstrap(
     folder = None if out is None else Path(out)
     if folder is not None:
         Store(folder).begin({"version": __version__, "over": over}, resume, overwrite, (SAMPLES,))
-    record = BootstrapRecord(folder, found, over, resume)
-    done = {n: sample for n, sample in record.samples.items() if n < samples}
+    at = [f"{value:.6g}" for value in found.point.unknowns]
+    depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
+    record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
+    done = {n: sample for n, sample in record.rows.items() if n < samples}
     tell = progress or (lambda done, total, what: None)
     tell(len(done), samples, "")
     missing = [n for n in range(samples) if n not in done]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -26,7 +26,7 @@ from .executor import executor_of
 from .fit import FitEvent, stored_fit
 from .presenters import Presented
 from .result import Fit
-from .series import begin_study, mark_of, read_marked, write_marked
+from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 
 if TYPE_CHECKING:
@@ -96,10 +96,6 @@ class FoldError:
     fold: int
     value: float | None
     rms: Mapping[str, float]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values, exact in JSON."""
-        return asdict(self)
 
 
 #: Called with the name of each form, then the records of its starts and folds; None now and then.
@@ -195,7 +191,7 @@ def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
     }
 
 
-def validated_folds(
+def errors_of_folds(
     setup: FitSetup,
     found: Fit,
     folds: int,
@@ -208,23 +204,13 @@ def validated_folds(
     folds : at most; starts : random starts of each. folder : None where nothing is written. tell :
     called with each fold that ended, and with None now and then.
     """
-    parts = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
-    mark = mark_of(parts)
-    known = {} if folder is None else written_folds(folder / VALIDATION, mark)
-    for event in validate(setup, folds, starts, tuple(known)):
+    depends = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
+    record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
+    for event in validate(setup, folds, starts, tuple(record.rows)):
         if event is not None:
-            known[event.fold] = event
-            if folder is not None:
-                plain = [known[fold].to_json() for fold in sorted(known)]
-                write_marked(folder, VALIDATION, mark, {"folds": plain})
+            record.write(event)
         tell(event)
-    return tuple(known[fold] for fold in sorted(known))
-
-
-def written_folds(path: Path, mark: str) -> dict[int, FoldError]:
-    """Read the errors of an interrupted run, by fold; none of another fit."""
-    found = read_marked(path, mark, lambda told: [FoldError(**fold) for fold in told["folds"]])
-    return {error.fold: error for error in found or ()}
+    return tuple(record.rows[fold] for fold in sorted(record.rows))
 
 
 @dataclass(frozen=True, eq=False)
@@ -436,7 +422,7 @@ def compare_laws(
             own, [test.name for test in chosen], place, resume=resume, overwrite=overwrite,
             progress=tell, command_line=command_line,
         )  # fmt: skip
-        errors = validated_folds(setups[name], found, folds, fold_starts, place, tell)
+        errors = errors_of_folds(setups[name], found, folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return LawComparison(tuple(done), fold_starts)
 

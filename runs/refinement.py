@@ -58,10 +58,6 @@ class Convergence:
     previous: float | None = None
     remark: str = ""
 
-    def error(self, value: float) -> float | None:
-        """Return the deviation of `value` from the limit, relative; None where there is none."""
-        return None if not self.limit else value / self.limit - 1.0
-
 
 def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     """Return the order p with which two successive changes fall.

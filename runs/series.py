@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..errors import InputError
 from ..experiments.kinds import Refined, Studied, Test, notes_of, other_thickness
@@ -21,6 +21,9 @@ from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 from .folder import Store
 from .simulation import Analyses, Progress
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +163,7 @@ def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
 
 
 T = TypeVar("T")
+R = TypeVar("R", bound="DataclassInstance")
 
 
 def begin_study(
@@ -200,3 +204,35 @@ def read_marked(path: Path, mark: str, read: Callable[[dict[str, Any]], T]) -> T
 def write_marked(folder: Path, file: str, mark: str, content: Mapping[str, Any]) -> None:
     """Write a record into an existing folder; raises OutputError."""
     Store(folder).write(file, json.dumps({"of": mark, **content}, indent=1) + "\n")
+
+
+class StudyRecord(Generic[R]):
+    """Rows of a study under a mark of all that they depend on, each written as it ends.
+
+    Parameters
+    ----------
+    folder : None where nothing is read or written. file : its name. name : of the rows in the file.
+    row : their class, a dataclass of plain values. key : field by which `rows` are sorted.
+    depends : on what they depend, in plain values. read : take over what the file holds.
+    """
+
+    def __init__(
+        self, folder: Path | None, file: str, name: str, row: type[R], key: str,
+        depends: Mapping[str, Any], read: bool = True,
+    ) -> None:  # fmt: skip
+        self._folder, self._file, self._name, self._key = folder, file, name, key
+        self._mark = mark_of(depends)
+        self.rows: dict[Any, R] = {}
+        if folder is not None and read:
+            for one in read_marked(folder / file, self._mark, self._rows_of(row)) or ():
+                self.rows[getattr(one, key)] = one
+
+    def _rows_of(self, row: type[R]) -> Callable[[dict[str, Any]], list[R]]:
+        return lambda content: [row(**own) for own in content[self._name]]
+
+    def write(self, row: R) -> None:
+        """Add a row and write the file; raises OutputError."""
+        self.rows[getattr(row, self._key)] = row
+        if self._folder is not None:
+            rows = [asdict(self.rows[key]) for key in sorted(self.rows)]
+            write_marked(self._folder, self._file, self._mark, {self._name: rows})

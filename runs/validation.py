@@ -237,7 +237,7 @@ class Validation(Presented):
         table = self.table()
         wide = max([20, *(2 + len(name) for name in table["test"])])
         head = "left out" if self.leave != "tests" else "test left out"
-        said = [f"{'law':14}{head:{wide}}{'compared':24}{'foretold':>12}{'fitted':>10}  unit"]
+        said = [f"{'law':14}{head:{wide}}{'compared':24}{'predicted':>12}{'fitted':>10}  unit"]
         for row in table.itertuples():
             said.append(
                 f"{row.law:14}{row.test:{wide}}{row.compared:24}{row.foretold_rms:12.4g}"
@@ -249,9 +249,9 @@ class Validation(Presented):
             if one.predicted.words
         ]
         means = {law: mean for law, mean in self.means.items() if not np.isnan(mean)}
-        said += [f"{law}: foretold {100 * mean:.3g} % on average" for law, mean in means.items()]
+        said += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
-            said.append(f"foretells best: {min(means, key=means.__getitem__)}")
+            said.append(f"predicts best: {min(means, key=means.__getitem__)}")
         return said
 
     def errors(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
@@ -321,7 +321,7 @@ def name_of(setup: FitSetup, part: Part) -> str:
     return f"{setup.tests[part.test].test.name}: {part.name}"
 
 
-def judged_with(found: Fit, part: Part) -> HeldOut:
+def errors_of_fit(found: Fit, part: Part) -> HeldOut:
     """Return the errors of the fit to all of the data at a part of them."""
     setup, problem, y = found.setup, found.problem, found.best.point.unknowns
     nuisance = {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
@@ -329,7 +329,7 @@ def judged_with(found: Fit, part: Part) -> HeldOut:
     return held_out_part(test, law, setup.make_solver, part.alone, nuisance, name)
 
 
-def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
+def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
     name, test = name_of(setup, part), setup.tests[part.test]
     units = {c: "" for c in part.masks}
@@ -353,10 +353,10 @@ def without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
 def _task(
     setup: FitSetup, parts: Sequence[Part], starts: int
 ) -> Callable[[int, Callable[[Any], None]], tuple[int, HeldOut]]:
-    return lambda number, tell: (number, without(setup, parts[number], starts))
+    return lambda number, tell: (number, fit_without(setup, parts[number], starts))
 
 
-def recorded(
+def errors_left_out(
     setup: FitSetup,
     parts: Sequence[Part],
     starts: int,
@@ -472,9 +472,9 @@ def validate(
             if overwrite and folder is not None:
                 (folder / file).unlink(missing_ok=True)
             tell(f"{form}: without each of {len(parts[form])} {leave}")
-            alone = recorded(setups[form], parts[form], starts, folder, file, tell)
+            alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
             pairs = zip(parts[form], alone, strict=True)
-            judged += [Judged(form, one, judged_with(together, part)) for part, one in pairs]
+            judged += [Judged(form, one, errors_of_fit(together, part)) for part, one in pairs]
             continue
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from .compare import errors
 from .fit import FitEvent, stored_fit
 from .presenters import Presented
 from .result import Fit
-from .series import begin_study, mark_of, read_marked, write_marked
+from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints
 
 if TYPE_CHECKING:
@@ -53,40 +53,6 @@ class WeightedFit:
     unknowns: Sequence[float]
     analyses: int
     failure: str = ""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values, exact in JSON."""
-        return asdict(self)
-
-
-class WeightsRecord:
-    """Fits under a mark of all that they depend on, the optimum they began at among it.
-
-    folder : None where nothing is written. resume : read what the folder holds.
-    """
-
-    def __init__(self, folder: Path | None, found: Fit, names: Sequence[str], resume: bool) -> None:
-        own = [f"{value:.9g}" for value in found.best.point.unknowns]
-        parts = {**fingerprints(found.setup, found.problem), "tests": list(names), "at": own}
-        self._mark = mark_of(parts)
-        self._folder, self._runs = folder, dict[float, dict[str, Any]]()
-        if folder is not None and resume:
-            self._runs = read_marked(folder / RUNS, self._mark, _by_count) or {}
-
-    def read(self, count: float) -> WeightedFit | None:
-        """Return the fit at this weight; None where there is none, or it failed."""
-        row = self._runs.get(count)
-        return None if row is None or row["failure"] else WeightedFit(**row)
-
-    def write(self, run: WeightedFit) -> None:
-        """Write a fit; raises OutputError."""
-        self._runs[run.count] = run.to_json()
-        if self._folder is not None:
-            write_marked(self._folder, RUNS, self._mark, {"runs": list(self._runs.values())})
-
-
-def _by_count(content: dict[str, Any]) -> dict[float, dict[str, Any]]:
-    return {row["count"]: WeightedFit(**row).to_json() for row in content["runs"]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,13 +215,19 @@ def weight_study(
         project, [test.name for test in chosen], None if folder is None else folder / FITTED,
         resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
     )  # fmt: skip
-    record = WeightsRecord(folder, found, names, resume)
+    at = [f"{value:.9g}" for value in found.best.point.unknowns]
+    depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
+    record = StudyRecord(folder, RUNS, "runs", WeightedFit, "count", depends, resume)
     runs = sorted(_runs(found, names, sorted(counts), record, tell), key=lambda run: run.count)
     return WeightStudy(project.title, counted, tuple(names), found, tuple(runs))
 
 
 def _runs(
-    found: Fit, names: Sequence[str], counts: Sequence[float], record: WeightsRecord, tell: Progress
+    found: Fit,
+    names: Sequence[str],
+    counts: Sequence[float],
+    record: StudyRecord[WeightedFit],
+    tell: Progress,
 ) -> Iterator[WeightedFit]:
     """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
@@ -263,17 +235,17 @@ def _runs(
     for way in ([c for c in counts if c > 1], [c for c in reversed(counts) if c < 1]):
         y = np.array(own.unknowns)
         for count in way:
-            run = record.read(count)
-            if run is None:
+            run = record.rows.get(count)
+            if run is None or run.failure:
                 tell(f"weight times {count:.3g}")
-                run = refitted(found, names, count, y)
+                run = refit(found, names, count, y)
                 record.write(run)
             yield run
             if not run.failure:
                 y = np.array(run.unknowns)
 
 
-def refitted(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> WeightedFit:
+def refit(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> WeightedFit:
     """Fit with the tests' weight times `count`, from the unknowns y of a neighbour."""
     setup = replace(found.setup, counts=dict.fromkeys(names, count))
     problem = setup.problem()

@@ -151,7 +151,8 @@ def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note
     patch.setattr(study_pages, "save", lambda *_: None)
     patch.setattr(study_pages, "_responses", lambda *_: [])
     done = fits.comparison(fit)
-    page = done.report(folder)
+    done.write(folder)
+    page = folder / "report.html"
     return Told(lines(done.notes), _json(folder), folder, page.read_text())
 
 

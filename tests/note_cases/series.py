@@ -41,8 +41,13 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
     """A project of one bar; what its solver `says` and `fails` at."""
     solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
     solver.says = says or solver.says
-    for module in ("studies.series", "fits.simulation", "fits.project"):
+    for module in ("runs.series", "project.project"):
         patch.setattr(f"bubblefit.{module}.kinds", lambda: known)
+    reports = experiments.report_of
+    patch.setattr(
+        "bubblefit.runs.simulation.report_of",
+        lambda name: BarKind() if name == "bars" else reports(name),
+    )
     patch.setitem(registry.SOLVERS, "bars", lambda: solver)
     return project_of(BarTest("a bar"))
 

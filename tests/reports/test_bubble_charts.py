@@ -12,6 +12,8 @@ from bubblefit.reports.bubbles import (
     cut_charts,
     disk_charts,
     height_charts,
+    node_cut,
+    point_cut,
     registration_charts,
     rise_charts,
     sphere_charts,
@@ -20,8 +22,21 @@ from bubblefit.reports.charts import axis_ends, scale_ends
 
 from ..drawings import data, legend, lines, named, shown
 from ..figure_checks import check_charts
-from .test_reports import FULL, QUARTER, cap
 
+
+def cap(xy: np.ndarray, height: float) -> np.ndarray:
+    """Displacement (n, 3) of a parabolic cap of radius 100 mm."""
+    inside = 1 - (xy**2).sum(axis=1) / 1e4
+    return np.column_stack([0.05 * xy * inside[:, None], height * inside])
+
+
+def polar(angles: np.ndarray) -> np.ndarray:
+    r, t = np.meshgrid(np.linspace(10, 100, 10), angles)
+    ring = np.column_stack([(r * np.cos(t)).ravel(), (r * np.sin(t)).ravel()])
+    return np.vstack([[0.0, 0.0], ring])
+
+
+QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
 PRESSURES = np.array([0.022, 0.186, 0.3])
 TURN = np.linspace(0.0, 2 * np.pi, 37)
 EDGE = 100.0 * np.column_stack([np.cos(TURN), np.sin(TURN)])
@@ -187,3 +202,73 @@ def test_pressures_and_heights_by_one_clock() -> None:
     assert lines(both, "taken")[0].tolist() == [[20.0], [4.0]] and named(both)["taken"].hollow
     assert shown(log) == ("time by the log's clock, s", "pressure, kPa", "pressure of the log")
     assert shown(both)[:2] == ("pressure, kPa", "height of the apex, mm")
+
+
+def test_cut_of_a_mesh_without_nodes_on_the_axis_is_interpolated():
+    turned = polar(np.linspace(0, 2 * np.pi, 73)[:-1] + np.pi / 72)
+    cut = node_cut(turned, cap(turned, 30.0), 0)
+    middle = np.interp(0.0, cut.position, cut.height)
+    assert len(cut.position) > 70 and middle == pytest.approx(30.0, rel=0.01)
+
+
+#: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
+ALONG = np.arange(0.0, 100.0, 10.0)
+ROWS = np.vstack(
+    [np.column_stack([ALONG, 0 * ALONG]), np.column_stack([ALONG + 5, 0 * ALONG + 2.5])]
+)
+
+
+def still(points: np.ndarray) -> np.ndarray:
+    """Risen by 1 mm for every mm of x, not moved aside."""
+    return np.column_stack([0 * points, points[:, 0]])
+
+
+@pytest.mark.parametrize(("on", "used"), [(10, 10), (5, 5), (4, 14)])
+def test_five_points_on_the_axis_are_its_profile(on: int, used: int) -> None:
+    """Of fewer, those beside it count as well."""
+    points = np.vstack([ROWS[:on], ROWS[10:]])
+    cut = point_cut(points, still(points), 0)
+    assert len(cut.position) == used
+    np.testing.assert_array_equal(cut.height, cut.position)
+    assert (np.diff(cut.position) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "used"),
+    [([[3.0, 2.0], [3.0, -2.0]], 2), ([[3.0, 2.0], [7.0, 2.5]], 1), ([[3.0, 2.0]], 0),
+     ([[3.0, 0.0]], 1), ([[3.0, 2.0], [6.0, 2.0]], 0)],
+)  # fmt: skip
+def test_few_points(points: list[list[float]], used: int) -> None:
+    """Half their distance from the axis at most; one alone has to lie on it."""
+    given = np.array(points)
+    assert len(point_cut(given, still(given), 0).position) == used
+
+
+def test_no_points() -> None:
+    assert len(point_cut(np.zeros((0, 2)), np.zeros((0, 3)), 1).position) == 0
+
+
+@pytest.mark.parametrize(("on", "taken"), [(5, 5), (4, 81)])
+def test_five_nodes_on_the_axis_are_its_profile(on: int, taken: int) -> None:
+    """Of fewer, the mesh is cut at as many places from end to end."""
+    x = np.linspace(0.0, 80.0, on)
+    beside = np.column_stack([np.repeat([0.0, 80.0], 2), np.tile([-10.0, 10.0], 2)])
+    points = np.vstack([np.column_stack([x, 0 * x]), beside])
+    cut = node_cut(points, still(points), 0)
+    assert len(cut.position) == taken
+    np.testing.assert_allclose(cut.position, np.linspace(0.0, 80.0, taken))
+    np.testing.assert_allclose(cut.height, cut.position)
+
+
+@pytest.mark.parametrize("cut", [node_cut, point_cut])
+def test_heights_at_rest_do_not_count(cut) -> None:
+    """Points of a measured sheet have three coordinates: places are told by x and y."""
+    draw = np.random.default_rng(2)
+    flat = draw.uniform(-50, 50, (200, 2))
+    moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
+    raised = np.column_stack([flat, 600.0 + 40.0 * draw.normal(size=200)])
+    for axis in (0, 1):
+        one, other = cut(flat, moved, axis), cut(raised, moved, axis)
+        assert len(one.position) > 3
+        np.testing.assert_array_equal(one.position, other.position)
+        np.testing.assert_array_equal(one.height, other.height)

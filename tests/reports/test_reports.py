@@ -1,4 +1,4 @@
-"""Cuts through a bubble, VTU files, numbers of the page, files written whole."""
+"""VTU files, numbers of the page, files written whole."""
 
 from __future__ import annotations
 
@@ -11,45 +11,8 @@ import pytest
 from bubblefit.errors import OutputError
 from bubblefit.files import replacing
 from bubblefit.meshes.mesh import Mesh
-from bubblefit.reports.bubbles import node_cut, point_cut
 from bubblefit.reports.html import number, percent
 from bubblefit.reports.vtu import write_vtu
-
-
-def cap(xy: np.ndarray, height: float) -> np.ndarray:
-    """Displacement (n, 3) of a parabolic cap of radius 100 mm."""
-    inside = 1 - (xy**2).sum(axis=1) / 1e4
-    return np.column_stack([0.05 * xy * inside[:, None], height * inside])
-
-
-def polar(angles: np.ndarray) -> np.ndarray:
-    r, t = np.meshgrid(np.linspace(10, 100, 10), angles)
-    ring = np.column_stack([(r * np.cos(t)).ravel(), (r * np.sin(t)).ravel()])
-    return np.vstack([[0.0, 0.0], ring])
-
-
-QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_cut_follows_the_nodes_on_the_axis(axis: int):
-    cut = node_cut(QUARTER, cap(QUARTER, 30.0), axis)
-    assert len(cut.position) == 11 and cut.height[0] == pytest.approx(30.0)
-    assert (np.diff(cut.position) > 0).all() and (np.diff(cut.height) < 0).all()
-    assert cut.position[5] == pytest.approx(50 + 0.05 * 50 * 0.75)
-
-
-def test_cut_of_a_mesh_without_nodes_on_the_axis_is_interpolated():
-    turned = polar(np.linspace(0, 2 * np.pi, 73)[:-1] + np.pi / 72)
-    cut = node_cut(turned, cap(turned, 30.0), 0)
-    middle = np.interp(0.0, cut.position, cut.height)
-    assert len(cut.position) > 70 and middle == pytest.approx(30.0, rel=0.01)
-
-
-def test_measured_points_beside_the_axis_count():
-    x, y = np.meshgrid(np.arange(-87.5, 90, 5.0), np.arange(-87.5, 90, 5.0))
-    grid = np.column_stack([x.ravel(), y.ravel()])
-    assert len(point_cut(grid, cap(grid, 30.0), 0).position) == 2 * x.shape[1]
 
 
 def square() -> Mesh:

@@ -138,14 +138,14 @@ def test_frames_drawn_again(tmp_path):
 def test_a_bootstrap_goes_on_where_it_was(tmp_path, monkeypatch):
     project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
     whole = bootstrap(project, "specimens", 4, CARD, "one")
-    write = module.BootstrapRecord.write
+    write = module.StudyRecord.write
 
     def stops(record, sample):
         write(record, sample)
-        if len(record.samples) == 2:
+        if len(record.rows) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(module.BootstrapRecord, "write", stops)
+    monkeypatch.setattr(module.StudyRecord, "write", stops)
     with pytest.raises(KeyboardInterrupt):
         bootstrap(project, "specimens", 4, CARD, "one", out=tmp_path / "out")
     fitted: list[int] = []
@@ -154,7 +154,7 @@ def test_a_bootstrap_goes_on_where_it_was(tmp_path, monkeypatch):
         fitted.append(sample.number)
         write(record, sample)
 
-    monkeypatch.setattr(module.BootstrapRecord, "write", counts)
+    monkeypatch.setattr(module.StudyRecord, "write", counts)
     with pytest.raises(OutputError, match="already holds results"):
         bootstrap(project, "specimens", 4, CARD, "one", out=tmp_path / "out")
     given = {"card": CARD, "tests": "one", "out": tmp_path / "out", "resume": True}
@@ -165,20 +165,6 @@ def test_a_bootstrap_goes_on_where_it_was(tmp_path, monkeypatch):
     # Samples of other draws are others.
     bootstrap(project, "specimens", 2, **given, seed=8)
     assert fitted == [2, 3, 0, 1]
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"over": "frames"}, "--over: no test has two or more frames"),
-        ({"over": "tests"}, "--over: no kind of which the project has two tests or more"),
-        ({"samples": 1}, "--samples: expected two or more, got 1"),
-    ],
-)
-def test_what_cannot_be_meant(tmp_path, given, said):
-    project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
-    with pytest.raises(InputError, match=said):
-        bootstrap(project, **{"over": "specimens", "card": CARD, "tests": "one", **given})
 
 
 def test_values_of_no_known_part(tmp_path):
@@ -360,21 +346,6 @@ def test_strains_at_which_moduli_are_asked_for(tmp_path, few):
             plan(project, PLANNED, strain=strain)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"rank": "G23"}, "--rank: expected one of worst, E1, E2, G12, got 'G23'"),
-        ({"noise": {"strips": 0.0}}, "--noise: expected KIND=VALUE above 0, KIND of: "),
-        ({"noise": {"torsion": 1.0}}, "got torsion=1"),
-        ({"card": None}, "fit first"),
-    ],
-)
-def test_what_cannot_be_meant_plan(tmp_path, given, said):
-    project = read_project(constant_strips(tmp_path))
-    with pytest.raises(InputError, match=said):
-        plan(project, **{"card": PLANNED, **given})
-
-
 def test_the_command_plan(tmp_path, few):
     constant_strips(tmp_path)
     with_range = replace(PLANNED, law=replace(PLANNED.law, strain_range=np.array(ENDS_PLAN)))
@@ -482,22 +453,6 @@ def test_words_of_what_is_uneven():
     kinds = {note.kind: str(note) for note in better.notes}
     assert "another optimum fits the data better" in kinds[NoteKind.NOT_THE_CARD]
     assert kinds[NoteKind.NOT_CLOSED].startswith("not closed above")
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"moduli": {"G23": []}}, "--modulus: expected one of E1, E2, G12, got 'G23'"),
-        ({"moduli": {"E1": [-0.1]}}, "--modulus: expected strains of 0 or more, got -0.1"),
-        ({"moduli": {"E1": [0.3]}}, "E1 is fitted up to strain 0.12; got 0.3"),
-        ({"card": MaterialCard(HypoelasticLaw(np.ones(12)), 0.8, "cubic")}, "of this project's"),
-        ({"card": None}, "fit first"),
-    ],
-)
-def test_what_cannot_be_meant_profile(tmp_path, given, said):
-    project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
-    with pytest.raises(InputError, match=said):
-        profile(project, **{"card": PROFILED, **given})
 
 
 def test_the_command_profile(tmp_path):
@@ -681,7 +636,7 @@ def test_moduli_and_errors_follow_the_weight(tmp_path):
 
 def test_a_study_of_weights_goes_on_where_it_was(tmp_path, monkeypatch):
     project = read_project(constant_strips(tmp_path))
-    whole = study_of.refitted
+    whole = study_of.refit
     asked: list[float] = []
 
     def counting(found, names, count, y):
@@ -690,7 +645,7 @@ def test_a_study_of_weights_goes_on_where_it_was(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return whole(found, names, count, y)
 
-    monkeypatch.setattr(study_of, "refitted", counting)
+    monkeypatch.setattr(study_of, "refit", counting)
     given = {"starts": 1, "counts": (0.5, 1, 2, 4), "out": tmp_path / "out"}
     with pytest.raises(KeyboardInterrupt):
         weight_study(project, "two", **given)
@@ -702,8 +657,40 @@ def test_a_study_of_weights_goes_on_where_it_was(tmp_path, monkeypatch):
         weight_study(project, "one", **given, resume=True)
 
 
-@pytest.mark.parametrize("counted", ["strips", "three"])
-def test_the_weight_is_of_some_tests(tmp_path, counted):
-    project = read_project(constant_strips(tmp_path))
-    with pytest.raises(InputError, match=r"--weights: .* not of all: strips, one, two; got"):
-        weight_study(project, counted)
+@pytest.mark.parametrize(
+    ("study", "given", "said"),
+    [
+        (bootstrap, {"over": "frames"}, "--over: no test has two or more frames"),
+        (
+            bootstrap,
+            {"over": "tests"},
+            "--over: no kind of which the project has two tests or more",
+        ),
+        (bootstrap, {"samples": 1}, "--samples: expected two or more, got 1"),
+        (profile, {"moduli": {"G23": []}}, "--modulus: expected one of E1, E2, G12, got 'G23'"),
+        (profile, {"moduli": {"E1": [-0.1]}}, "--modulus: expected strains of 0 or more, got -0.1"),
+        (profile, {"moduli": {"E1": [0.3]}}, "E1 is fitted up to strain 0.12; got 0.3"),
+        (
+            profile,
+            {"card": MaterialCard(HypoelasticLaw(np.ones(12)), 0.8, "cubic")},
+            "of this project's",
+        ),
+        (profile, {"card": None}, "fit first"),
+        (plan, {"rank": "G23"}, "--rank: expected one of worst, E1, E2, G12, got 'G23'"),
+        (plan, {"noise": {"strips": 0.0}}, "--noise: expected KIND=VALUE above 0, KIND of: "),
+        (plan, {"noise": {"torsion": 1.0}}, "got torsion=1"),
+        (plan, {"card": None}, "fit first"),
+        (weight_study, {"counted": "strips"}, r"--weights: .* not of all: strips, one, two; got"),
+        (weight_study, {"counted": "three"}, r"--weights: .* not of all: strips, one, two; got"),
+    ],
+)
+def test_what_cannot_be_meant(tmp_path, study, given, said):
+    project = read_project(constant_strips(tmp_path)).with_fit(jobs=1)
+    usual = {
+        bootstrap: {"over": "specimens", "card": CARD, "tests": "one"},
+        profile: {"card": PROFILED},
+        plan: {"card": PLANNED},
+        weight_study: {},
+    }
+    with pytest.raises(InputError, match=said):
+        study(project, **{**usual[study], **given})

@@ -22,7 +22,7 @@ from bubblefit.runs import validation as left_out
 from bubblefit.runs.compare import FoldError, fit_of, folds, specimens_of, validate
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import FitSetup, prepare_fit
-from bubblefit.runs.validation import parts_of, without
+from bubblefit.runs.validation import fit_without, parts_of
 from bubblefit.solvers.base import History
 
 from .. import projects
@@ -297,7 +297,7 @@ def test_a_specimen_is_foretold_by_the_other(tmp_path):
         own = row["fitted_rms"], row["fitted_relative"]
         assert own == pytest.approx(fitted, rel=1e-3), name
     mean = np.mean([foretold[1] for foretold, _ in expected.values()])
-    assert f"constant: foretold {100 * mean:.3g} % on average" in done.output
+    assert f"constant: predicted {100 * mean:.3g} % on average" in done.output
     said = json.loads((tmp_path / "out" / "result.json").read_text())
     assert said["left_out"] == "specimens"
     assert said["mean_foretold"]["constant"] == pytest.approx(mean, rel=1e-3)
@@ -343,7 +343,7 @@ def bubble(tmp_path_factory):
 def test_a_frame_is_foretold_by_the_others(bubble):
     first, second = parts_of(bubble, "frames")
     assert (first.name, second.name) == ("22 kPa", "59 kPa")
-    found = without(bubble, second, 1)
+    found = fit_without(bubble, second, 1)
     measured = bubble.tests[0].fields[1].displacement
     off = measured - measured / 1.1
     assert found.test == "bubble: 59 kPa"
@@ -351,7 +351,7 @@ def test_a_frame_is_foretold_by_the_others(bubble):
     relative = np.sqrt(np.mean(off**2, axis=0)) / np.abs(measured).max(axis=0)
     assert found.error == pytest.approx(relative.mean(), rel=1e-4)
     # The other way round the moduli are those of a sheet that is a tenth too high: not exact.
-    assert without(bubble, first, 1).error > 0.02
+    assert fit_without(bubble, first, 1).error > 0.02
 
 
 def test_what_is_kept_of_a_bubble_is_as_in_the_whole(bubble):
@@ -395,6 +395,6 @@ def test_what_cannot_be_left_out_is_said_before_any_fit(tmp_path, monkeypatch):
 def test_a_part_without_a_fit_is_told(bubble, monkeypatch):
     part = parts_of(bubble, "frames")[0]
     monkeypatch.setattr(left_out, "fit_of", lambda setup, masks, starts: (setup, None))
-    found = without(bubble, part, 1)
+    found = fit_without(bubble, part, 1)
     assert found.error is None
     assert [note.line for note in found.notes] == ["bubble: 22 kPa: no fit without it ended well"]

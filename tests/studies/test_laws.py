@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,8 +26,8 @@ from bubblefit.runs.compare import (
     FormFit,
     LawComparison,
     compare_laws,
-    written_folds,
 )
+from bubblefit.runs.series import StudyRecord, mark_of
 
 from ..projects import ELONGATION, MODULI, constant_strips
 
@@ -180,7 +181,7 @@ def test_going_on_validates_nothing_twice(compared, run):
     again = run.compare(resume=True)
     assert [form.folds for form in again.forms] == before
     (fold,) = [event for event in run.events if isinstance(event, FoldError)]
-    assert fold.to_json() == written["folds"][1]
+    assert asdict(fold) == written["folds"][1]
 
 
 def test_what_is_replaced_is_not_gone_on_with(run, compared):
@@ -209,18 +210,17 @@ def test_lines_for_the_terminal():
     assert LawComparison(forms[1:], 2).conclusion == []
 
 
-def test_folds_of_another_fit_are_not_taken(tmp_path):
-    path = tmp_path / "validation.json"
-    path.write_text(json.dumps({"of": "this", "folds": []}))
-    assert written_folds(path, "this") == {}
+def test_rows_of_another_fit_are_not_taken(tmp_path):
+    def rows(of: str, folder: Path = tmp_path) -> dict[int, FoldError]:
+        return StudyRecord(folder, "rows.json", "folds", FoldError, "fold", {"of": of}).rows
+
+    path, mark = tmp_path / "rows.json", mark_of({"of": "this"})
     first = {"fold": 1, "value": 0.5, "rms": {}}
-    path.write_text(json.dumps({"of": "this", "folds": [first]}))
-    assert written_folds(path, "this") == {1: FoldError(**first)}
-    assert written_folds(path, "another") == {}
-    path.write_text(json.dumps({"of": "this", "folds": [{"colour": 1}]}))
-    assert written_folds(path, "this") == {}
+    for folds, wanted in (([], {}), ([first], {1: FoldError(**first)}), ([{"colour": 1}], {})):
+        path.write_text(json.dumps({"of": mark, "folds": folds}))
+        assert rows("this") == wanted and rows("another") == {}
     path.write_text("{")
-    assert written_folds(path, "this") == {} and written_folds(tmp_path / "none", "this") == {}
+    assert rows("this") == {} and rows("this", tmp_path / "none") == {}
 
 
 class Form(FormFit):

@@ -19,7 +19,6 @@ from bubblefit.notes import Note, NoteKind
 from bubblefit.reports.study_pages import panels
 from bubblefit.runs.refinement import (
     RMS,
-    Convergence,
     Level,
     LevelRun,
     Refinement,
@@ -349,7 +348,6 @@ def test_a_sequence_that_has_settled_needs_no_remark():
     found = convergence(sizes, manufactured(sizes, 2.0, 40.0, 0.01).tolist())
     assert (found.order, found.previous, found.limit) == pytest.approx((2.0, 2.0, 40.0))
     assert found.remark == ""
-    assert found.error(40.4) == pytest.approx(0.01)
 
 
 def test_a_second_term_makes_the_order_move_and_is_said():
@@ -364,13 +362,6 @@ def test_a_second_term_makes_the_order_move_and_is_said():
     assert settled.remark == ""
     moving = convergence(h.tolist(), (40.0 + 0.3 * h + 0.02 * h**4).tolist())
     assert "still moves" in moving.remark
-
-
-@pytest.mark.parametrize(
-    ("limit", "error"), [(2.0, -0.25), (-2.0, -1.75), (0.0, None), (None, None)]
-)
-def test_error_beside_the_limit(limit, error):
-    assert Convergence(limit=limit).error(1.5) == error
 
 
 @pytest.mark.parametrize(
@@ -430,4 +421,3 @@ def test_limits_of_the_extrapolation_are_said(values, words):
     found = convergence(sizes, values, noise=1e-8)
     assert words in found.remark
     assert (found.limit is None) == (found.order is None)
-    assert (found.error(1.0) is None) == (found.limit is None)

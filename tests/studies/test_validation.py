@@ -84,7 +84,7 @@ def test_what_a_fit_to_the_other_test_foretells(tmp_path):
     assert f"constant, two: RMS errors in N: warp {own:.4g}" in found.lines()
     assert two.predicted.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
     assert found.lines()[-1] == (
-        f"constant: foretold {100 * said['mean_foretold']['constant']:.3g} % on average"
+        f"constant: predicted {100 * said['mean_foretold']['constant']:.3g} % on average"
     )
 
 
@@ -224,8 +224,8 @@ def test_table_and_result(tmp_path):
     (chart,) = charts_of(tmp_path / "new" / "folder")["held out"]
     assert chart.x_names == ["one", "two"]
     assert {series.name: series.y for series in chart.series} == {
-        "cubic, foretold": [5.0, 15.0], "constant, foretold": [6.0, 7.0],
-        "spline, foretold": [5.0, None], "cubic, fitted": [2.0, None],
+        "cubic, predicted": [5.0, 15.0], "constant, predicted": [6.0, 7.0],
+        "spline, predicted": [5.0, None], "cubic, fitted": [2.0, None],
     }  # fmt: skip
     for series in chart.series:
         assert np.round(series.x).tolist() == [1.0, 2.0]
