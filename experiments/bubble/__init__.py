@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from ...materials.law import HypoelasticLaw
 from ..kinds import Candidate, MakeSolver, Place, Planning
 from .candidates import candidates
-from .data import prepare
-from .forward import STUDIED
-from .prepared import PreparedBubble
+from .prepared import PreparedBubble, prepare
 from .section import BubbleSection
-from .test import BubbleTest, read
+from .test import STUDIED, BubbleTest, read
 
 NAMES = (
     "length-unit", "zero-points", "repeated-frame", "z-flipped", "frame-order",

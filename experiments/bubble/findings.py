@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...inference.assessment import moduli_error
-from ...materials.forms.base import COMPONENTS
 from ...meshes.bubble_model import BubbleModel
-from ...notes import Note, NoteKind, percent
+from ...notes import Note, NoteKind
 from ...readers.pressure_log import ClockOffset
-from ..kinds import Findings, FittedTest
-from .objective import FieldObjective, displacement_offset
+from ..kinds import FittedTest
+from .objective import FieldObjective
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
@@ -224,58 +222,6 @@ def objective_of(fitted: FittedTest) -> FieldObjective:
     (comparison,) = fitted.comparisons
     assert isinstance(comparison.objective, FieldObjective)
     return comparison.objective
-
-
-def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
-    """Numbers for result.json, warnings, and words for terminal, card and page."""
-    test, objective = prepared.test, objective_of(fitted)
-    offset = displacement_offset(fitted.nuisance)
-    mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
-    numbers: dict[str, Any] = {
-        "mean_abs_mm": mean,
-        "nuisance": {
-            "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
-            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
-        },
-        "data": {
-            "matched_by": test.match_by,
-            "places": [len(t.displacement) for t in objective.targets],
-            "doubtful_dropped": prepared.dropped,
-            **_as_read(prepared),
-            "outside_dropped": prepared.outside,
-        },
-    }
-    taken = recorded_of(prepared)
-    if taken is not None:
-        numbers["data"]["pressures"] = recorded_numbers(taken)
-    numbers["sheet"] = sheet_numbers(prepared, fitted)
-    if prepared.surfaces:
-        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
-    lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    lines += [] if taken is None else recorded_lines(taken)
-    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
-    lines += [f"data: {note}" for note in notes]
-    if prepared.known is not None:
-        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
-        numbers["moduli_error"] = errors
-        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
-        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
-        said = ", ".join(
-            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
-        )
-        lines.append(f"largest error of the moduli over the strain reached: {said}")
-    if prepared.registration is not None:
-        numbers["registration"] = registration_numbers(prepared.registration)
-        lines.append(registration_line(prepared.registration))
-    lines += sheet_lines(numbers["sheet"])
-    lines += _offset_words(prepared, fitted)
-    return Findings(
-        numbers,
-        (*sheet_warnings(prepared), *_warnings(prepared)),
-        tuple(lines),
-        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
-        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
-    )
 
 
 def recorded_of(prepared: PreparedBubble) -> RecordedFrames | None:

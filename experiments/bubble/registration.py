@@ -14,13 +14,13 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
-from .equilibrium import apex_shape
 from .placement import (
     LEAST,
     UNKNOWN,
     Placement,
     RigidMotion,
     all_applied,
+    apex_shape,
     axes_angle,
     clamp_motion,
     clamp_points,

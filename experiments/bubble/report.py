@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard
+from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
+from ...notes import percent
 from ...readers.fields import DisplacementField
 from ...readers.surfaces import write_surfaces
 from ...reports.bubbles import (
@@ -38,21 +42,30 @@ from ...solvers.base import History
 from ...writing import replacing
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .findings import (
+    _as_read,
+    _offset_words,
+    _warnings,
     clock_words,
     constant_field,
     fitted_model,
     objective_of,
+    recorded_lines,
+    recorded_numbers,
     recorded_of,
+    registration_line,
+    registration_numbers,
     sheet_lines,
+    sheet_numbers,
+    sheet_warnings,
     used_of,
 )
-from .forward import apex_heights, at_nodes, inflated_sheets
 from .objective import displacement_offset
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS, Sheet
-from .test import PART, BubbleTest
+from .sheet import at_nodes, inflated_sheets
+from .test import PART, BubbleTest, apex_heights
 
 PICTURE, TABLE = "reference_surface.png", "reference_surface.csv"
 CONSTANT_PICTURE, CONSTANT_TABLE = "constant_field.png", "constant_field.csv"
@@ -723,3 +736,55 @@ def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
         for load, u in zip(history.load, history.displacement, strict=True)
     ]
     return pd.concat(frames, ignore_index=True)
+
+
+def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
+    """Numbers for result.json, warnings, and words for terminal, card and page."""
+    test, objective = prepared.test, objective_of(fitted)
+    offset = displacement_offset(fitted.nuisance)
+    mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
+    numbers: dict[str, Any] = {
+        "mean_abs_mm": mean,
+        "nuisance": {
+            "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
+            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
+        },
+        "data": {
+            "matched_by": test.match_by,
+            "places": [len(t.displacement) for t in objective.targets],
+            "doubtful_dropped": prepared.dropped,
+            **_as_read(prepared),
+            "outside_dropped": prepared.outside,
+        },
+    }
+    taken = recorded_of(prepared)
+    if taken is not None:
+        numbers["data"]["pressures"] = recorded_numbers(taken)
+    numbers["sheet"] = sheet_numbers(prepared, fitted)
+    if prepared.surfaces:
+        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
+    lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    lines += [] if taken is None else recorded_lines(taken)
+    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
+    lines += [f"data: {note}" for note in notes]
+    if prepared.known is not None:
+        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
+        numbers["moduli_error"] = errors
+        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
+        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
+        said = ", ".join(
+            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
+        )
+        lines.append(f"largest error of the moduli over the strain reached: {said}")
+    if prepared.registration is not None:
+        numbers["registration"] = registration_numbers(prepared.registration)
+        lines.append(registration_line(prepared.registration))
+    lines += sheet_lines(numbers["sheet"])
+    lines += _offset_words(prepared, fitted)
+    return Findings(
+        numbers,
+        (*sheet_warnings(prepared), *_warnings(prepared)),
+        tuple(lines),
+        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
+        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
+    )

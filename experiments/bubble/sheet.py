@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import QhullError, cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import Nuisance
+from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes
+from ...meshes.mesh import surface_strain
 from ...readers.fields import DisplacementField
+from ...solvers.base import History
 from .section import Sheet
 
 Array = NDArray[np.float64]
@@ -197,3 +203,86 @@ def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisa
         most = MOST_SIGMAS * own
         unknowns += [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
     return unknowns
+
+
+#: States of a quad by its principal stresses, as the files have them.
+TAUT, WRINKLED, LOOSE = 0, 1, 2
+
+
+#: Stress over the largest of the sheet that is taken as none.
+NONE = 1e-6
+
+
+#: Distances between neighbouring measured places: farther from all of them nothing is measured.
+FAR = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class InflatedSheet:
+    """The sheet at one reported pressure.
+
+    pressure : MPa. displacement : (nodes, 3) mm. strain : (quads, 3) log strain (eps1, eps2,
+    gamma12) in the middle of the quads; stress : (quads, 3) MPa, Cauchy, along the turned yarns, in
+    the same order. state : (quads,) of `TAUT`, `WRINKLED` (tension in one direction only), `LOOSE`
+    (in none).
+    """
+
+    pressure: float
+    displacement: Array
+    strain: Array
+    stress: Array
+    state: NDArray[np.intp]
+
+
+def inflated_sheets(
+    model: BubbleModel, history: History, law: HypoelasticLaw
+) -> Iterator[InflatedSheet]:
+    """One a reported pressure; the law is integrated along the increments that the history has."""
+    path, reported = history.path, model.reported
+    if path is None or len(path) != len(model.increments):
+        path, reported = history.displacement, np.arange(len(history.displacement))
+    frames = {int(step): frame for frame, step in enumerate(reported)}
+    strain = stress = np.zeros((len(model.mesh.quads), 3))
+    for step, u in enumerate(path):
+        before, strain = strain, sheet_strain(model, u)
+        stress, _ = law.increment(before, strain, stress)
+        if step in frames:
+            load = float(history.load[frames[step]])
+            yield InflatedSheet(load, u, strain, stress, states(stress))
+
+
+def sheet_strain(model: BubbleModel, displacement: Array) -> Array:
+    """(quads, 3) log strain since the sheet was without stress; displacement (nodes, 3) mm."""
+    mesh, rest = model.mesh, model.stress_free
+    warp = mesh.warp
+    if warp is None:
+        warp = np.tile([1.0, 0.0, 0.0], (len(mesh.quads), 1))
+    return surface_strain(replace(mesh, points=rest, warp=warp), mesh.points + displacement - rest)
+
+
+def states(stress: Array) -> NDArray[np.intp]:
+    """(n,) states of stresses (n, 3) of one sheet."""
+    mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+    size = np.hypot(half, stress[:, 2])
+    none = NONE * float(np.abs(mean).max() + size.max())
+    largest, least = mean + size, mean - size
+    return np.where(largest <= none, LOOSE, np.where(least <= none, WRINKLED, TAUT))
+
+
+def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
+    """Values (n, 3) at measured places (n, 2) carried to nodes (nodes, 2); NaN where none is near.
+
+    Linear between the places; a node beyond them, or in a hole of them, has none.
+    """
+    if len(places) == len(nodes) and np.allclose(places, nodes):
+        return values
+    found = np.full((len(nodes), 3), np.nan)
+    if len(places) < 4:
+        return found
+    tree = cKDTree(places)
+    apart = float(np.median(tree.query(places, k=2)[0][:, 1]))
+    near = tree.query(nodes)[0] <= FAR * apart
+    if near.any():
+        with suppress(QhullError):  # all places on one line: there is nothing between them
+            found[near] = LinearNDInterpolator(places, values)(nodes[near])
+    return found

@@ -14,7 +14,8 @@ from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.reading import Facet
-from ..kinds import Place, Reach, Refined
+from ...solvers.base import History
+from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
 from .section import (
     BubbleSection,
@@ -304,3 +305,32 @@ def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None
             problem = f"pressures must increase, got {given[i]:g} after {given[i - 1]:g}"
             raise place.error(f"pressures[{i}]", problem)
     return tuple(p * place.scales.pressure for p in given)
+
+
+def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
+    """(frames,) mm."""
+    apex = int(model.mesh.node_sets["apex"][0])
+    return np.asarray(history.displacement[:, apex, 2])
+
+
+def quantities(model: BubbleModel, history: History) -> dict[str, float]:
+    """Apex heights, and the largest in-plane displacement at the last pressure."""
+    kilo, heights = 1e3 * history.load, apex_heights(model, history)
+    in_plane = np.linalg.norm(history.displacement[-1, :, :2], axis=1).max()
+    values = {f"apex at {p:.4g} kPa, mm": float(z) for p, z in zip(kilo, heights, strict=True)}
+    last = f"largest in-plane displacement at {kilo[-1]:.4g} kPa, mm"
+    return {**values, last: float(in_plane)}
+
+
+def responses(model: BubbleModel, history: History) -> dict[str, float]:
+    """Largest displacement at every pressure, mm."""
+    largest = np.linalg.norm(history.displacement, axis=2).max(axis=1)
+    return {f"{p:.4g} kPa": float(u) for p, u in zip(1e3 * history.load, largest, strict=True)}
+
+
+STUDIED = Studied(
+    steps=lambda model: model.increments,
+    quantities=quantities,
+    responses=responses,
+    response="largest displacement",
+)

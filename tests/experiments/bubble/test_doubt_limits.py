@@ -10,8 +10,7 @@ import pytest
 from bubblefit.experiments.bubble import doubts as motion
 from bubblefit.experiments.bubble import doubts as place
 from bubblefit.experiments.bubble import doubts as size
-from bubblefit.experiments.bubble.doubts import View
-from bubblefit.experiments.bubble.equilibrium import Apex
+from bubblefit.experiments.bubble.doubts import Apex, View
 from bubblefit.experiments.kinds import Expected
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField

@@ -14,13 +14,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ....errors import InputError
-from ....meshes.disk import Outline
-from ....readers.fields import DisplacementField
-from ...kinds import Doubt, Expected
-from ..equilibrium import Apex, apex_of
-from ..placement import in_all_quarters, line_angle
-from ..registration import Axes, Rim, rim_of_motion, symmetry_axes
+from ...errors import InputError
+from ...meshes.disk import Outline
+from ...readers.fields import DisplacementField
+from ..kinds import Doubt, Expected
+from .placement import POWERS, apex_shape, in_all_quarters, line_angle
+from .registration import Axes, Rim, rim_of_motion, symmetry_axes
 
 Array = NDArray[np.float64]
 
@@ -410,3 +409,71 @@ def doubts_of(view: View, expected: Expected) -> Sequence[Doubt]:
 
 
 __all__ = ["CHECKS", "View", "doubts_of"]
+
+
+@dataclass(frozen=True)
+class Apex:
+    """What the shape says at the centre of one field.
+
+    Parameters
+    ----------
+    pressure : MPa. height : mm, rise of the centre.
+    curvature : 1/mm, k1 + k2 of the inflated surface; positive where it is a dome.
+    force : N/mm, the membrane force p / (k1 + k2), the same in all directions if the two are equal.
+    error : N/mm, standard error of the force from the scatter of the points about a smooth surface.
+    strain : logarithmic, along x and along y.
+    """
+
+    pressure: float
+    height: float
+    curvature: float
+    force: float
+    error: float
+    strain: tuple[float, float]
+
+    @property
+    def stiffness(self) -> float:
+        """Force over the mean of the two strains, N/mm; infinite where nothing is strained."""
+        mean = 0.5 * (self.strain[0] + self.strain[1])
+        return self.force / mean if mean > 0 else float("inf")
+
+
+def apex_of(field: DisplacementField, radius: float) -> Apex:
+    """The apex of a field about the rim's centre; radius of the rim in mm.
+
+    Raises
+    ------
+    InputError : too few points about the centre.
+    """
+    before = field.frame.points
+    after = before + field.displacement
+    try:
+        shape = apex_shape(field.points, np.hstack([after, before]), radius)
+    except InputError as error:
+        raise InputError(field.path, error.field, error.problem) from None
+    left = after[shape.near, 2] - shape.terms @ shape.coefficients[:, 2]
+    tangents = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
+    metric = tangents[:, :3] @ tangents[:, :3].T
+    first = tangents[:, 3:] @ tangents[:, 3:].T
+    normal = np.cross(tangents[0, :3], tangents[1, :3])
+    normal /= np.linalg.norm(normal)
+    second = np.array(
+        [
+            [shape.at_centre(2, 0)[:3] @ normal, shape.at_centre(1, 1)[:3] @ normal],
+            [shape.at_centre(1, 1)[:3] @ normal, shape.at_centre(0, 2)[:3] @ normal],
+        ]
+    )
+    curvature = -float(np.trace(np.linalg.solve(metric, second)))
+    variance = float(left @ left) / (len(left) - len(POWERS))
+    inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
+    both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
+    spread = float(np.sqrt(variance * inverse[np.ix_(both, both)].sum())) * 2 / radius**2
+    stretch = np.sqrt(np.diag(metric) / np.diag(first))
+    strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
+    centre = shape.at_centre()
+    height = float(centre[2] - centre[5])
+    force = doubt = float("inf")
+    if curvature > 0:
+        force = field.pressure / curvature
+        doubt = force * spread / curvature
+    return Apex(field.pressure, height, curvature, force, doubt, strain)
