@@ -119,8 +119,6 @@ def test_one_card(tmp_path, drawn):
     ((path, name, pressures, points, shown),) = drawn
     assert name == "soft" and path == tmp_path / "profiles.png"
     assert tuple(pressures) == MODEL.pressures
-        name == "soft" and path == tmp_path / "profiles.png" and tuple(pressures) == MODEL.pressures
-    )
     np.testing.assert_array_equal(points, MODEL.mesh.points)
     np.testing.assert_array_equal(shown, history().displacement)
     assert (tmp_path / "bubble.pvd").exists()
