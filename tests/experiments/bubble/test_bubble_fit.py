@@ -29,7 +29,6 @@ from bubblefit.experiments.bubble.prepared import (
     INWARD,
     _same_steps_and_mesh,
     _sample,
-    finer_bubble,
     resampled,
 )
 from bubblefit.experiments.bubble.report import left_at_nodes, write_series
@@ -349,7 +348,7 @@ def test_quads_and_increments_are_divided(tmp_path, factor):
     (prepared,) = setup.tests
     assert prepared.finer(setup.make_solver, Weighting(), factor)[0].model.mesh is not None
     (own,) = prepared.comparisons(setup.make_solver, Weighting())
-    (found,) = finer_bubble(prepared, setup.make_solver, Weighting(), factor)
+    found = prepared._refined(own, factor)
     assert found.name == own.name and found.objective is not own.objective
     quads = len(found.model.mesh.quads) / len(own.model.mesh.quads)
     assert quads == (4.0 if factor == 2.0 else pytest.approx(factor**2, rel=0.35))
