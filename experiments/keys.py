@@ -1,4 +1,4 @@
-"""How a project says what a column of readings means, for every kind of test."""
+"""Sections of columns and formats that several kinds of test share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .kinds import Place
 
 
 class ChannelSection(Section):
-    """How a column of a measured file is meant."""
+    """The meaning of a column of a measured file."""
 
     column: str | None = None
     unit: str | None = None
@@ -19,20 +19,15 @@ class ChannelSection(Section):
 
 
 def channel_of(section: ChannelSection) -> Channel:
-    """The channel that a section describes."""
+    """Return the channel that a section describes."""
     return Channel(**section.model_dump())
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
-    """The name, if there is such a format; None where the section leaves it to the files.
+    """Return the name if there is such a format; None where the section leaves it to the files.
 
-    Parameters
-    ----------
-    field : dotted key of the name below the section.
-
-    Raises
-    ------
-    InputError : naming file and key. PlugInFailure : a reader of a plug-in that does not work.
+    field : dotted key of the name below the section. Raises InputError naming file and key,
+    PlugInFailure for a reader of a plug-in that does not work.
     """
     if name is not None:
         try:
