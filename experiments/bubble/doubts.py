@@ -100,11 +100,11 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     stretch = np.sqrt(np.diag(metric) / np.diag(first))
     strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
     centre = shape.at_centre()
-    force = error = float("inf")
+    force = doubt = float("inf")
     if curvature > 0:
         force = field.pressure / curvature
-        error = force * spread / curvature
-    return Apex(field.pressure, float(centre[2] - centre[5]), curvature, force, error, strain)
+        doubt = force * spread / curvature
+    return Apex(field.pressure, float(centre[2] - centre[5]), curvature, force, doubt, strain)
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,8 +154,8 @@ class PreparedBubble:
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """Return the same places on a finer mesh with finer increments, or on a coarser mesh."""
-        own = self.comparisons(make_solver, weighting)
-        return own if self.by_this_model and factor > 1 else (self._refined(*own, factor),)
+        (own,) = self.comparisons(make_solver, weighting)
+        return (own if self.by_this_model and factor > 1 else self._refined(own, factor),)
 
     def _refined(self, own: Comparison, factor: float) -> Comparison:
         """Return a comparison of quads and increments divided by a factor; below one of quads.

@@ -353,15 +353,13 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     objective, name = objective_of(fitted), prepared.test.name
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     displacement, targets = fitted.histories[0].displacement, objective.targets
-    values = (
-        [np.asarray(target.displacement) for target in targets],
-        objective.modelled(displacement, fitted.nuisance),
-        objective.differences(displacement, fitted.nuisance),
-    )
-    rows = [
-        (quantity, "mm", *([own[:, axis] for own in one] for one in values))
-        for axis, quantity in enumerate(DIRECTIONS)
-    ]
+    measured = [np.asarray(target.displacement) for target in targets]
+    modelled = objective.modelled(displacement, fitted.nuisance)
+    left = objective.differences(displacement, fitted.nuisance)
+    rows = []
+    for k, quantity in enumerate(DIRECTIONS):
+        a, b, c = ([own[:, k] for own in one] for one in (measured, modelled, left))
+        rows.append((quantity, "mm", a, b, c))
     caption = (
         f"{name}: displacement of {_source(prepared)}, of the model, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."

@@ -169,13 +169,13 @@ def registration_options(
     """
     if section is None:
         return None
-    marks = section.warp_points
+    marks = [_point(one, scale) for one in section.warp_points or ()]
     try:
         return RegistrationOptions(
             plane=section.plane,
-            centre=section.centre and _point(section.centre, scale),
+            centre=None if section.centre is None else _point(section.centre, scale),
             warp=section.warp,
-            warp_points=marks and (_point(marks[0], scale), _point(marks[1], scale)),
+            warp_points=(marks[0], marks[1]) if marks else None,
             warp_is_stiff=section.warp_is == "stiff",
             remove_clamp_motion=section.remove_clamp_motion,
         )
